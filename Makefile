@@ -1,0 +1,53 @@
+# `make help` lists the commands. environment.md says what is installed, and why.
+
+help: ## show this list
+	@sed -n 's/^\([a-z]*\):.*## /  make \1	/p' Makefile | expand -t 18
+
+lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, LAB_ARGS=... change how
+	@$(PYTHON) -m jupyterlab --ServerApp.root_dir=. --LabApp.default_url=/lab/tree/notebooks/00_start_here.ipynb $(lab_options) $(LAB_ARGS)
+
+test: set_up lint ## all checks: lint, tests of the helpers, every notebook compared with its saved outputs
+	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope $(PYTEST_ARGS)
+
+notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
+	@$(PYTHON) tools/notebooks.py $(if $(LESSON),--lesson "$(LESSON)")
+
+lint: set_up ## ruff: style and format of modules and notebooks
+	@.venv/bin/ruff check && .venv/bin/ruff format --check
+
+lock: set_up ## write requirements.lock from pyproject.toml; UPGRADE=yes takes newer versions
+	@tools/lock.sh .venv/bin/uv $(if $(filter yes,$(UPGRADE)),--upgrade)
+
+clean: ## remove the environment, JupyterLab's state and caches
+	rm -rf .venv .jupyter .hypothesis .pytest_cache .ruff_cache
+	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
+
+set_up:
+	@tools/set_up.sh
+
+.PHONY: help lab test notebooks lint lock clean set_up
+
+PYTHON := .venv/bin/python
+
+# Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker.
+WORKERS := 4
+
+# A port that you name is the one you get, or an error. Without a name, the first free one from 8888.
+lab_options := $(if $(PORT),--port="$(PORT)" --ServerApp.port_retries=0) \
+	$(if $(filter no,$(BROWSER)),--no-browser) \
+	$(if $(filter 0,$(shell id -u)),--allow-root)
+
+# What you have set for other work stays out: another ROS 2 that is sourced, Python's and Jupyter's
+# variables, the settings in your home folder. JupyterLab's state of this course is in .jupyter.
+unexport $(filter PYTHON% ROS_% RMW_% RCUTILS_% FASTDDS_% FASTRTPS_% JUPYTER% IPYTHON% \
+	_ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH COLCON_% CMAKE_PREFIX_PATH \
+	VIRTUAL_ENV MPLBACKEND,$(.VARIABLES))
+ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
+# The libraries of that other ROS 2. The wheels set their own path.
+unexport LD_LIBRARY_PATH
+endif
+export JUPYTER_CONFIG_DIR := $(CURDIR)/.jupyter
+export JUPYTER_DATA_DIR := $(CURDIR)/.jupyter/data
+export JUPYTER_RUNTIME_DIR := $(CURDIR)/.jupyter/runtime
+export IPYTHONDIR := $(CURDIR)/.jupyter/ipython
+export ROS_LOG_DIR := $(CURDIR)/.jupyter/ros_log

@@ -1,0 +1,1 @@
+"""What a notebook needs and a terminal does not: sessions, records, queues, pictures, checks."""

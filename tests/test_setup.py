@@ -1,0 +1,350 @@
+"""The set-up script, on a small lock that needs no network, and what the real lock must hold."""
+
+import base64
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+import zipfile
+from importlib.metadata import distribution
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PYPROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())
+LOCK = (ROOT / 'requirements.lock').read_text()
+BASE_PYTHON = Path(sys._base_executable)
+HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
+
+
+def direct_dependencies() -> list[str]:
+    extras = PYPROJECT['project']['optional-dependencies']
+    requirements = [*PYPROJECT['project']['dependencies'], *extras['ros'], *extras['dev']]
+    return [re.match(r'[\w-]+', requirement)[0] for requirement in requirements]
+
+
+# --- The lock ------------------------------------------------------------------------------------
+
+
+def pins(lock: str) -> dict[str, str]:
+    """Return the text of each pin, with its hashes, by the name of the package."""
+    return {
+        re.match(r'[\w.-]+', pin)[0]: pin
+        for pin in re.split(r'\n(?=[a-z])', lock)
+        if not pin.startswith('#')
+    }
+
+
+def test_every_pin_has_a_version_and_a_hash():
+    assert len(pins(LOCK)) > 100
+    for name, pin in pins(LOCK).items():
+        assert re.match(rf'{re.escape(name)}==\d', pin), pin
+        assert '--hash=sha256:' in pin, name
+
+
+def test_the_lock_names_no_index():
+    assert not re.search(r'://|--(extra-)?index|--find-links|file:|@', LOCK)
+
+
+def test_the_lock_names_the_pythons_it_fits():
+    versions = re.findall(r'^# Every wheel exists for Python (.*)$', LOCK, re.MULTILINE)
+    assert len(versions) == 1
+    assert HERE in versions[0].split()
+
+
+@pytest.mark.parametrize('name', direct_dependencies())
+def test_a_direct_dependency_is_locked_and_has_its_reason(name):
+    assert name in pins(LOCK)
+    reasons = (ROOT / 'environment.md').read_text()
+    assert re.search(rf'^\| `{re.escape(name)}(\[\w+\])?` \| .{{10,}} \|$', reasons, re.MULTILINE)
+
+
+def test_the_environment_holds_what_the_lock_says():
+    for name in direct_dependencies():
+        assert f'{name}=={distribution(name).version} ' in LOCK, name
+
+
+# --- The choice of a Python ----------------------------------------------------------------------
+
+
+@pytest.fixture
+def path(tmp_path):
+    """Return a folder that is the whole PATH, with the commands that the scripts use."""
+    for command in ('cat', 'cksum', 'cp', 'dirname', 'env', 'flock', 'grep', 'head', 'mkdir', 'mv',
+                    'rm', 'sed', 'sh', 'tr'):  # fmt: skip
+        where = shutil.which(command)
+        if where:
+            (tmp_path / command).symlink_to(where)
+    return tmp_path
+
+
+def put(folder: Path, name: str, script: str) -> None:
+    program = folder / name
+    program.write_text(f'#!/bin/sh\n{script}\n')
+    program.chmod(0o755)
+
+
+def find_python(path: Path, versions: str = '3.14 3.13 3.12 3.11') -> subprocess.CompletedProcess:
+    return subprocess.run(
+        ['/bin/sh', ROOT / 'tools/find_python.sh', versions],
+        env={'PATH': str(path)},
+        capture_output=True,
+        text=True,
+    )
+
+
+def last_line(text: str) -> str:
+    return text.strip().rpartition('\n')[2]
+
+
+def test_a_shim_that_does_not_run_is_passed_over(path):
+    put(path, 'python3.14', 'echo "pyenv: python3.14: command not found" >&2; exit 127')
+    put(path, 'python3', f'exec "{BASE_PYTHON}" "$@"')
+    answer = find_python(path)
+    assert answer.returncode == 0, answer.stderr
+    assert Path(answer.stdout.strip()).samefile(BASE_PYTHON)
+
+
+def test_the_newest_is_chosen_whatever_its_place_on_the_path(path):
+    for name, version in {'python3': '3.12', 'python3.11': '3.11', 'python3.13': '3.13'}.items():
+        put(path, name, f'echo "{version} /chosen/{version}"')
+    assert find_python(path).stdout == '/chosen/3.13\n'
+    assert find_python(path, '3.12 3.11').stdout == '/chosen/3.12\n'
+
+
+def test_a_python_of_a_virtual_environment_stands_for_the_one_it_was_made_with(path):
+    (path / 'python3').symlink_to(sys.executable)
+    answer = find_python(path)
+    assert answer.returncode == 0, answer.stderr
+    assert Path(answer.stdout.strip()).samefile(BASE_PYTHON)
+    assert not Path(answer.stdout.strip()).is_relative_to(sys.prefix)
+
+
+def test_variables_of_the_user_change_nothing(path):
+    (path / 'python3').symlink_to(BASE_PYTHON)
+    answer = subprocess.run(
+        ['/bin/sh', ROOT / 'tools/find_python.sh', HERE],
+        env={'PATH': str(path), 'PYTHONHOME': '/nowhere', 'PYTHONPATH': '/nowhere'},
+        capture_output=True,
+        text=True,
+    )
+    assert answer.returncode == 0, answer.stderr
+
+
+def test_without_a_python_one_sentence_says_what_to_install(path):
+    put(path, 'python3', 'exit 1')
+    answer = find_python(path)
+    assert answer.returncode == 1
+    assert answer.stdout == ''
+    assert f'{path}/python3 does not run\n' in answer.stderr
+    assert last_line(answer.stderr) == (
+        'No usable Python 3.11 to 3.14 is on the PATH: install one, for example with '
+        '`sudo apt install python3 python3-venv`, then try again.'
+    )
+
+
+def test_a_python_too_old_is_named(path):
+    (path / 'python3').symlink_to(BASE_PYTHON)
+    answer = find_python(path, '3.99')
+    assert answer.returncode == 1
+    assert f'python3 is Python {HERE}\n' in answer.stderr
+
+
+def test_a_python_without_venv_is_said_to_be_one(path):
+    # What Debian's python3 is without the package python3-venv.
+    put(
+        path,
+        'python3',
+        f"""
+for word; do
+    case $word in *ensurepip*) probe=$word ;; esac
+done
+without_ensurepip='import sys; sys.modules["ensurepip"] = None'
+exec "{BASE_PYTHON}" -I -S -c "$without_ensurepip
+$probe" "{HERE}"
+""",
+    )
+    answer = find_python(path)
+    assert answer.returncode == 1
+    assert last_line(answer.stderr) == (
+        'python3 cannot make a virtual environment: run `sudo apt install python3-venv`, '
+        'then try again.'
+    )
+
+
+# --- Making .venv --------------------------------------------------------------------------------
+
+
+def wheel_of(name: str, folder: Path) -> str:
+    """Pack an installed distribution into a wheel again. Return its pin, with the hash."""
+    installed = distribution(name)
+    info = next(f.parts[0] for f in installed.files if f.parts[0].endswith('.dist-info'))
+    tag = re.search(r'^Tag: (.*)$', installed.read_text('WHEEL'), re.MULTILINE)[1]
+    wheel = folder / f'{info.removesuffix(".dist-info")}-{tag}.whl'
+    data = info.replace('.dist-info', '.data')
+    records = []
+    with zipfile.ZipFile(wheel, 'w') as archive:
+        for file in installed.files:
+            source = Path(installed.locate_file(file))
+            if file.suffix == '.pyc' or file.name in ('RECORD', 'INSTALLER', 'REQUESTED'):
+                continue
+            inside = str(file) if file.parts[0] != '..' else f'{data}/scripts/{file.name}'
+            archive.write(source, inside)
+            digest = base64.urlsafe_b64encode(hashlib.sha256(source.read_bytes()).digest())
+            records.append(f'{inside},sha256={digest.decode().rstrip("=")},')
+        records.append(f'{info}/RECORD,,')
+        archive.writestr(f'{info}/RECORD', '\n'.join(records) + '\n')
+    digest = hashlib.sha256(wheel.read_bytes()).hexdigest()
+    return f'{name}=={installed.version} \\\n    --hash=sha256:{digest}\n'
+
+
+class Checkout:
+    """A copy of this project whose lock holds three packages, which pip finds in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.wheels = folder / 'wheels'
+        self.wheels.mkdir()
+        self.pins = {
+            name: wheel_of(name, self.wheels) for name in ('iniconfig', 'setuptools', 'uv')
+        }
+        self.root = folder / 'élève one'
+        self.root.mkdir()
+        for name in ('tools', 'helpers'):
+            shutil.copytree(ROOT / name, self.root / name)
+        for name in ('pyproject.toml', 'LICENSE', 'Makefile'):
+            shutil.copy(ROOT / name, self.root)
+        self.lock(self.pins.values())
+
+    def lock(self, pins) -> None:
+        header = f'# Every wheel exists for Python {HERE}\n'
+        (self.root / 'requirements.lock').write_text(header + ''.join(pins))
+
+    def set_up(self, **environment: str) -> subprocess.CompletedProcess:
+        """Run the script offline. As a user may have it: settings of pip only, none of uv."""
+        kept = {k: v for k, v in os.environ.items() if not k.startswith(('PIP_', 'UV_'))}
+        kept |= {'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': self.wheels.as_uri()}
+        kept |= {'UV_CACHE_DIR': str(self.wheels / 'cache'), 'PIP_CONFIG_FILE': os.devnull}
+        kept |= {'PATH': f'{BASE_PYTHON.parent}{os.pathsep}{kept["PATH"]}'}
+        return subprocess.run(
+            [self.root / 'tools/set_up.sh'],
+            env=kept | environment,
+            cwd='/',
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+        )
+
+    def installed(self) -> list[str]:
+        code = 'from importlib.metadata import distributions as d; print(*(i.name for i in d()))'
+        answer = subprocess.run(
+            [self.root / '.venv/bin/python', '-I', '-c', code], capture_output=True, text=True
+        )
+        return sorted(answer.stdout.split())
+
+    def stamp(self) -> str:
+        stamp = self.root / '.venv/set_up.stamp'
+        return f'{stamp.stat().st_mtime_ns} {stamp.read_text()}' if stamp.exists() else ''
+
+
+@pytest.fixture(scope='module')
+def checkout(tmp_path_factory):
+    return Checkout(tmp_path_factory.mktemp('set_up'))
+
+
+ALL = ['iniconfig', 'pip', 'ros2-notebooks', 'setuptools', 'uv']
+
+
+def test_set_up_from_nothing_then_only_what_changed(checkout):
+    # Variables that would put the packages elsewhere, or others in.
+    hostile = {'PIP_USER': '1', 'PIP_TARGET': '/nowhere', 'UV_PYTHON': '3.9', 'PYTHONPATH': '/no'}
+    first = checkout.set_up(**hostile)
+    assert first.returncode == 0, first.stderr
+    assert checkout.installed() == ALL
+    settings = checkout.root / '.venv/share/jupyter/lab/settings/overrides.json'
+    assert '"fetchNews": "false"' in settings.read_text()
+    imported = subprocess.run(
+        [checkout.root / '.venv/bin/python', '-I', '-c', 'import helpers; print(helpers.__file__)'],
+        cwd='/',
+        capture_output=True,
+        text=True,
+    )
+    assert imported.stdout.strip() == str(checkout.root / 'helpers/__init__.py')
+
+    done = checkout.stamp()
+    second = checkout.set_up()
+    assert (second.returncode, second.stdout, second.stderr) == (0, '', '')
+    assert checkout.stamp() == done, 'it did the work twice'
+
+    checkout.lock(pin for name, pin in checkout.pins.items() if name != 'iniconfig')
+    third = checkout.set_up()
+    assert third.returncode == 0, third.stderr
+    assert 'Making' not in third.stderr
+    assert checkout.installed() == [name for name in ALL if name != 'iniconfig']
+
+
+def test_a_wrong_hash_installs_nothing_and_the_next_call_repairs(checkout):
+    wrong = re.sub(r'sha256:\w+', f'sha256:{"0" * 64}', checkout.pins['iniconfig'])
+    checkout.lock({**checkout.pins, 'iniconfig': wrong}.values())
+    answer = checkout.set_up()
+    assert answer.returncode == 1
+    assert last_line(answer.stderr).startswith('uv could not install requirements.lock:')
+    assert 'iniconfig' not in checkout.installed()
+    assert checkout.stamp() == ''
+
+    # Without its stamp an environment may hold anything: it is made anew.
+    checkout.lock(checkout.pins.values())
+    (checkout.root / '.venv/lib/damage').write_text('')
+    again = checkout.set_up()
+    assert again.returncode == 0, again.stderr
+    assert again.stderr.startswith('Making .venv')
+    assert not (checkout.root / '.venv/lib/damage').exists()
+    assert checkout.installed() == ALL
+
+
+def test_a_moved_checkout_is_noticed(checkout, path):
+    assert checkout.set_up().stderr == ''
+    before = checkout.root
+    checkout.root = before.rename(before.with_name('two'))
+    # Without a Python it ends where it would make .venv anew, and touches nothing.
+    answer = checkout.set_up(PATH=str(path))
+    assert answer.returncode == 1
+    assert last_line(answer.stderr).startswith('No usable Python')
+    checkout.root = checkout.root.rename(before)
+    assert checkout.set_up().stderr == ''
+
+
+# --- make ----------------------------------------------------------------------------------------
+
+
+def test_another_ros_and_other_settings_stay_out(tmp_path):
+    """What the recipes of the Makefile get from an environment in which ROS 2 is sourced."""
+    show = tmp_path / 'show.mk'
+    show.write_text(f'include {ROOT}/Makefile\nshow_environment:\n\t@env\n')
+    foreign = {
+        'AMENT_PREFIX_PATH': '/opt/ros/humble',
+        'LD_LIBRARY_PATH': '/opt/ros/humble/lib',
+        'PYTHONPATH': '/opt/ros/humble/lib/python3.10/site-packages',
+        'RMW_IMPLEMENTATION': 'rmw_cyclonedds_cpp',
+        'ROS_LOCALHOST_ONLY': '0',
+        '_ROS_WHEELS_BOOTSTRAP_COMPLETE': '1',
+        'JUPYTER_PATH': '/home/somebody/share/jupyter',
+        'MPLBACKEND': 'TkAgg',
+    }
+    mine = {'PATH': os.environ['PATH'], 'PIP_INDEX_URL': 'mirror', 'HTTPS_PROXY': 'proxy'}
+    answer = subprocess.run(
+        ['make', '--no-print-directory', '-f', show, 'show_environment'],
+        cwd=tmp_path,
+        env=foreign | mine,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    seen = dict(line.split('=', 1) for line in answer.stdout.splitlines())
+    assert not foreign.keys() & seen.keys()
+    assert mine.items() <= seen.items()
+    for name in ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR', 'IPYTHONDIR'):
+        assert seen[name].startswith(f'{tmp_path}/.jupyter')

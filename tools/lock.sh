@@ -1,0 +1,38 @@
+#!/bin/sh
+# Write requirements.lock: every dependency of pyproject.toml, pinned, with the hashes of its files.
+# usage: tools/lock.sh UV [--upgrade]
+# Without --upgrade a version that still fits stays as it is.
+set -eu
+cd "$(dirname "$0")/.."
+uv=$1
+shift
+
+new=.requirements.lock.new
+[ ! -f requirements.lock ] || cp requirements.lock "$new" # uv keeps the versions it finds here
+trap 'rm -f "$new" "$new.checked"' EXIT
+"$uv" pip compile pyproject.toml --all-extras --universal --python-version 3.11 \
+    --only-binary :all: --generate-hashes --no-annotate --no-header --no-emit-index-url \
+    --no-emit-find-links --quiet --output-file "$new" "$@" > /dev/null
+
+# The lock fits several Pythons, but a package may lack the wheel of one. tools/set_up.sh reads the
+# result in the second line, and need not ask the package index.
+pythons=
+for python in 3.14 3.13 3.12 3.11; do
+    if "$uv" pip compile "$new" --python-version "$python" --no-deps --only-binary :all: \
+        --python-platform x86_64-manylinux_2_28 --quiet --output-file "$new.checked" > /dev/null; then
+        pythons="$pythons $python"
+    else
+        echo "Python $python lacks a wheel: left out." >&2
+    fi
+    rm -f "$new.checked"
+done
+if [ -z "$pythons" ]; then
+    echo 'No Python has a wheel of every package: requirements.lock stays as it was.' >&2
+    exit 1
+fi
+{
+    echo '# Made by `make lock` from pyproject.toml. Do not edit.'
+    echo "# Every wheel exists for Python$pythons"
+    cat "$new"
+} > requirements.lock
+echo "requirements.lock: $(grep -c '^[a-z].*==' requirements.lock) pins, Python$pythons"
