@@ -1,0 +1,282 @@
+"""What a KEEP_LAST queue must do: predict a run before it happens, explain one that did.
+
+A subscription keeps the last `depth` messages that no callback has taken yet. A message that
+arrives at a full queue pushes the oldest one out. Free threads ("workers") take the oldest message
+and run the callback. In one process a message has arrived when `publish()` returns.
+
+Source: history policies of the DDS specification (OMG DDS 1.4, 2.2.3.18), and rclpy's executors,
+where the thread that runs the callback takes the message itself.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+import numbers
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from helpers.recording import COLUMNS, check_table
+
+# A worker may be late, on a busy machine; it may not rest for this part of a callback.
+REST = 0.4
+
+
+def predict(
+    period_s: float, callback_s: float, depth: int, threads: int, messages: int
+) -> pd.DataFrame:
+    """Return the table of a run that has not happened: `messages` rows, as `Recording.table`.
+
+    A message is published every `period_s` seconds; its callback takes `callback_s` seconds on one
+    of `threads` workers; the queue is KEEP_LAST(`depth`). A message that arrives at the very
+    moment when a worker becomes free arrives first. Times are exact to the nanosecond.
+
+    Raises ValueError or TypeError for a value that is no number, zero or negative (`callback_s`
+    may be zero).
+    """
+    period = _nanoseconds('period_s', period_s)
+    callback = _nanoseconds('callback_s', callback_s, zero_allowed=True)
+    depth, threads, messages = (
+        _count(name, value)
+        for name, value in (('depth', depth), ('threads', threads), ('messages', messages))
+    )
+    taken, started = [], []
+    oldest = 0
+    while oldest < messages:
+        now = oldest * period
+        if len(taken) >= threads:  # all callbacks take the same time: workers take turns
+            now = max(now, started[-threads] + callback)
+        arrived = min(now // period + 1, messages)
+        taken.append(max(oldest, arrived - depth))
+        started.append(now)
+        oldest = taken[-1] + 1
+    table = pd.DataFrame({'seq': np.arange(messages)}, columns=COLUMNS)
+    table['published_s'] = table['seq'] * period / 1e9
+    table[['started_s', 'finished_s']] = np.nan
+    start = np.array(started)
+    workers = np.array([f'worker {i}' for i in range(1, min(threads, len(taken)) + 1)], object)
+    thread = np.full(messages, None, object)
+    thread[taken] = workers[np.arange(len(taken)) % len(workers)]
+    table.loc[taken, 'started_s'] = start / 1e9
+    table.loc[taken, 'finished_s'] = (start + callback) / 1e9
+    table['thread'] = thread
+    return table
+
+
+@dataclass
+class Explanation:
+    """Why each lost message was lost. See `explain`.
+
+    `losses` has one row a lost message: `seq`, `pushed_out_by` (the message whose arrival pushed it
+    out, or NA) and `waiting` (the messages that then filled the queue). `contradictions` are
+    sentences about what such a queue cannot have done.
+    """
+
+    messages: int
+    losses: pd.DataFrame
+    contradictions: list[str] = field(default_factory=list)
+
+    @property
+    def lost(self) -> int:
+        """How many messages were lost."""
+        return len(self.losses)
+
+    @property
+    def explained(self) -> int:
+        """How many of the lost messages were pushed out by newer ones."""
+        return int(self.losses['pushed_out_by'].notna().sum())
+
+    @property
+    def complete(self) -> bool:
+        """Whether every loss and every delivery is what the queue must do."""
+        return not self.contradictions and self.explained == self.lost
+
+    def __str__(self) -> str:
+        lines = [
+            f'{self.lost} of {self.messages} messages were lost, {self.explained} losses explained.'
+        ]
+        if self.complete:
+            lines.append('Everything is as a KEEP_LAST queue must do it.')
+        return '\n'.join(lines + self.contradictions)
+
+
+def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
+    """Explain a recorded table with a KEEP_LAST(`depth`) queue and `threads` workers.
+
+    `threads` is the number of callbacks that may run at the same time: 1 for a
+    SingleThreadedExecutor and for a mutually exclusive group, else the executor's threads.
+
+    The instant at which a worker took a message is not in the table, but it lies between known
+    ones. It comes after the publish call of the message, after the previous take, and after the
+    previous callback of the worker; and it comes before the start of the callback. How many
+    messages had arrived then is given by the gap in front of the message. The table is explained
+    when such instants exist for all messages and no worker rested while the queue overflowed.
+    Times on a busy machine move, and these rules do not.
+
+    Raises ValueError or TypeError for a table or a number that cannot be used.
+    """
+    check_table(table)
+    depth, threads = _count('depth', depth), _count('threads', threads)
+    table = table.sort_values('seq', ignore_index=True)
+    heard = table[table['started_s'].notna()]
+    contradictions = _impossible_rows(table)
+    contradictions += _impossible_takes(table, heard, depth, threads)
+    contradictions += _too_many_at_once(heard, threads)
+    contradictions += _rests(table, heard, depth, threads)
+    losses = _losses(table, depth)
+    for seq in losses.loc[losses['pushed_out_by'].isna(), 'seq']:
+        contradictions.append(
+            f'Message {seq} was never heard, and fewer than {depth} newer ones came to push it out.'
+        )
+    return Explanation(len(table), losses, contradictions)
+
+
+def _losses(table: pd.DataFrame, depth: int) -> pd.DataFrame:
+    seq = table['seq']
+    losses = pd.DataFrame(
+        {
+            'seq': seq,
+            'pushed_out_by': seq.shift(-depth).astype('Int64'),
+            'waiting': seq.shift(-1).astype('Int64').astype(str)
+            + ' to '
+            + seq.shift(-depth).astype('Int64').astype(str),
+        }
+    )[table['started_s'].isna()].reset_index(drop=True)
+    losses['waiting'] = losses['waiting'].where(losses['pushed_out_by'].notna(), None)
+    return losses
+
+
+def _impossible_rows(table: pd.DataFrame) -> list[str]:
+    """What no queue at all can do."""
+    return (
+        [
+            f'Message {seq} was published before the message in front of it.'
+            for seq in table.loc[table['published_s'].diff() < 0, 'seq']
+        ]
+        + [
+            f'Message {seq} was heard before it was published.'
+            for seq in table.loc[table['started_s'] < table['published_s'], 'seq']
+        ]
+        + [
+            f'The callback of message {seq} finished before it started.'
+            for seq in table.loc[table['finished_s'] < table['started_s'], 'seq']
+        ]
+        + [
+            f'The callback of message {seq} finished but never started.'
+            for seq in table.loc[table['started_s'].isna() & table['finished_s'].notna(), 'seq']
+        ]
+    )
+
+
+def _impossible_takes(
+    table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int
+) -> list[str]:
+    """Go through the takes in order, each as early as possible: is it then too late for one?"""
+    published = [*table['published_s'], *[math.inf] * (depth + 1)]
+    worker_free = _previous_finish(heard)
+    busy_until = [-math.inf] * threads  # the latest finishes of earlier messages, as a heap
+    found = []
+    expected, previous_take = 0, -math.inf
+    for index, seq, start, finish, free in zip(
+        heard.index, heard['seq'], heard['started_s'], _finish(heard), worker_free, strict=True
+    ):
+        # `arrived` messages were published when this one was the oldest in the queue. Without a
+        # gap the queue may have been anywhere between one message and full; behind a gap, full.
+        full = index + depth
+        arrived = full if index > expected else index + 1
+        earliest = max(previous_take, published[arrived - 1], busy_until[0], free)
+        latest = min(start, published[full + 1])
+        if earliest > latest:
+            found.append(
+                f'Message {seq} cannot have been the oldest in the queue for a free worker '
+                'when its callback started.'
+            )
+            earliest = start  # go on from what was recorded
+        heapq.heappushpop(busy_until, finish)
+        expected, previous_take = index + 1, earliest
+    return found
+
+
+def _too_many_at_once(heard: pd.DataFrame, threads: int) -> list[str]:
+    running: list[float] = []
+    found = []
+    ordered = heard.assign(finish=_finish(heard)).sort_values(['started_s', 'finish'])
+    for seq, start, finish in zip(
+        ordered['seq'], ordered['started_s'], ordered['finish'], strict=True
+    ):
+        while running and running[0] <= start:
+            heapq.heappop(running)
+        heapq.heappush(running, finish)
+        if len(running) > threads:
+            found.append(f'More than {threads} callback(s) ran when message {seq} started.')
+    overlap = ordered.loc[ordered['started_s'] < _previous_finish(heard)[ordered.index], 'seq']
+    return found + [f'The thread of message {seq} was busy when it started.' for seq in overlap]
+
+
+def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -> list[str]:
+    """Where a worker was free for long while messages waited that were then pushed out."""
+    published = table['published_s'].to_numpy()
+    lost = np.flatnonzero(table['started_s'].isna())
+    lost = lost[lost + depth < len(table)]
+    callbacks, periods = heard['finished_s'] - heard['started_s'], pd.Series(np.diff(published))
+    if not (len(lost) and _regular(callbacks) and _regular(periods)):
+        return []
+    # For how long, up to a time, was a message waiting that would be lost?
+    pushed_out = published[lost + depth]
+    arrived = np.maximum(published[lost], np.concatenate([[-math.inf], pushed_out[:-1]]))
+    total = np.cumsum(pushed_out - arrived)
+    edges = np.column_stack([arrived, pushed_out]).ravel()
+    waited = np.column_stack([total - (pushed_out - arrived), total]).ravel()
+    # From when to when was a worker free? Before the first callback nothing is known.
+    times = np.concatenate([heard['started_s'], _finish(heard)])
+    change = np.repeat([1, -1], len(heard))
+    order = np.lexsort([change, times])
+    free = np.cumsum(change[order]) < threads
+    flips = times[order][np.flatnonzero(np.diff(free, prepend=False))]
+    starts, ends = flips[::2], flips[1::2]
+    starts = starts[: len(ends)]  # after the last callback nothing is asked
+    rested = np.interp(ends, edges, waited) - np.interp(starts, edges, waited)
+    return [
+        f'Message {table["seq"].iloc[lost[np.searchsorted(pushed_out, starts[i], "right")]]} was '
+        f'pushed out although a worker was free for {ends[i] - starts[i]:.3g} s.'
+        for i in np.flatnonzero(rested > REST * callbacks.median())
+    ]
+
+
+def _regular(durations: pd.Series) -> bool:
+    """Whether all durations are alike. If not, a late worker proves nothing."""
+    return len(durations) > 0 and durations.max() <= 2 * durations.median()
+
+
+def _finish(heard: pd.DataFrame) -> pd.Series:
+    """When each callback finished; a callback that was still running never did."""
+    return heard['finished_s'].fillna(math.inf)
+
+
+def _previous_finish(heard: pd.DataFrame) -> pd.Series:
+    """When the previous callback of the same thread finished."""
+    ordered = heard.assign(finish=_finish(heard)).sort_values(['started_s', 'finish'])
+    previous = ordered.groupby('thread', sort=False)['finish'].shift(fill_value=-math.inf)
+    return previous.reindex(heard.index).fillna(-math.inf)
+
+
+def _count(name: str, value: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        raise TypeError(f'{name} must be a whole number from 1 up, not {value!r}.')
+    if value < 1:
+        raise ValueError(f'{name} must be a whole number from 1 up, not {value!r}.')
+    return int(value)
+
+
+def _nanoseconds(name: str, value: float, zero_allowed: bool = False) -> int:
+    least = 'zero or more' if zero_allowed else 'more than zero'
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise TypeError(f'{name} must be a number of seconds, {least}, not {value!r}.')
+    if not math.isfinite(value) or value < 0 or (value == 0 and not zero_allowed):
+        raise ValueError(f'{name} must be a number of seconds, {least}, not {value!r}.')
+    nanoseconds = round(value * 1e9)
+    if nanoseconds == 0 and value > 0:
+        raise ValueError(f'{name} must be at least one nanosecond, not {value!r}.')
+    return nanoseconds

@@ -1,0 +1,169 @@
+"""What happened to every message: when it was published, and when and where its callback ran."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import re
+import threading
+import time
+from collections.abc import Callable
+
+import pandas as pd
+
+COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']
+
+
+def last_number(message) -> int:
+    """Return the number at the end of `message.data`: 7 for `Hello World: 7`, or 7 itself."""
+    if isinstance(message.data, str):
+        return int(re.search(r'(\d+)\s*$', message.data).group(1))
+    return int(message.data)
+
+
+class Recording:
+    """Records the messages from one publisher to one subscription, from now on.
+
+    The two are plain rclpy objects, and stay what they are. `sequence` reads the sequence number
+    out of a message; the default takes the number at the end of `message.data`.
+    """
+
+    def __init__(
+        self, publisher, subscription, sequence: Callable[[object], int] = last_number
+    ) -> None:
+        self._published: list[tuple[int, float]] = []
+        # [seq, started, finished, thread id]; finished is NaN while the callback runs
+        self._heard: list[list] = []
+        self._sequence = sequence
+        self._watch_publisher(publisher)
+        self._watch_subscription(subscription)
+
+    def _watch_publisher(self, publisher) -> None:
+        publish, sequence, clock = publisher.publish, self._sequence, time.monotonic
+        append = self._published.append
+
+        @functools.wraps(publish)
+        def recorded_publish(message):
+            append((sequence(message), clock()))
+            publish(message)
+
+        publisher.publish = recorded_publish
+
+    def _watch_subscription(self, subscription) -> None:
+        callback, sequence, clock = subscription.callback, self._sequence, time.monotonic
+        append, thread_id, nan = self._heard.append, threading.get_ident, float('nan')
+
+        def start(message) -> list:
+            row = [sequence(message), clock(), nan, thread_id()]
+            append(row)
+            return row
+
+        if inspect.iscoroutinefunction(callback):
+
+            @functools.wraps(callback)
+            async def recorded_callback(message, *info):
+                row = start(message)
+                try:
+                    return await callback(message, *info)
+                finally:
+                    row[2] = clock()
+
+        else:
+
+            @functools.wraps(callback)
+            def recorded_callback(message, *info):
+                row = start(message)
+                try:
+                    return callback(message, *info)
+                finally:
+                    row[2] = clock()
+
+        subscription.callback = recorded_callback
+
+    @property
+    def published(self) -> int:
+        """How many messages were published."""
+        return len(self._published)
+
+    @property
+    def heard(self) -> int:
+        """How many callbacks were started."""
+        return len(self._heard)
+
+    @property
+    def in_flight(self) -> int:
+        """How many callbacks have started and not yet finished."""
+        return sum(row[2] != row[2] for row in list(self._heard))
+
+    def wait_until_complete(self, messages: int, timeout_s: float = 60.0) -> None:
+        """Wait until `messages` messages are published and the subscription has worked them off.
+
+        The newest message is never pushed out of a queue: when its callback and all others have
+        finished, nothing is waiting any more.
+
+        Raises ValueError for a count that is not a whole number from 1 up, TimeoutError after
+        `timeout_s` seconds, and the exception of a callback that failed.
+        """
+        from helpers.session import current_session
+
+        if isinstance(messages, bool) or not isinstance(messages, int) or messages < 1:
+            raise ValueError(f'messages must be a whole number from 1 up, not {messages!r}.')
+
+        def complete() -> bool:
+            if len(self._published) < messages:
+                return False
+            newest = self._published[-1][0]
+            return self.in_flight == 0 and any(row[0] == newest for row in self._heard)
+
+        current_session().wait_until(
+            complete, timeout_s, progress=lambda: len(self._published) / messages
+        )
+
+    def table(self) -> pd.DataFrame:
+        """Return one row a message, in the order of their sequence numbers.
+
+        Columns: `seq` (int), `published_s`, `started_s`, `finished_s` (seconds since the first
+        publish call; NaN where it did not happen), `thread` ('worker 1', 'worker 2', ... in the
+        order of their first callback; None where the message was never heard).
+
+        Raises ValueError where two messages have the same sequence number.
+        """
+        published = pd.DataFrame(list(self._published), columns=['seq', 'published_s'])
+        heard = pd.DataFrame(
+            [list(row) for row in self._heard], columns=['seq', 'started_s', 'finished_s', 'thread']
+        )
+        for name, part in (('published', published), ('heard', heard)):
+            twice = part.loc[part['seq'].duplicated(), 'seq']
+            if len(twice):
+                raise ValueError(
+                    f'The number {twice.iloc[0]} was {name} twice: give every message its own '
+                    'sequence number.'
+                )
+        workers = {ident: f'worker {i}' for i, ident in enumerate(heard['thread'].unique(), 1)}
+        heard['thread'] = heard['thread'].map(workers)
+        table = published.merge(heard, on='seq', how='outer').sort_values('seq', ignore_index=True)
+        times = ['published_s', 'started_s', 'finished_s']
+        table[times] -= table['published_s'].min()
+        table['thread'] = table['thread'].astype(object).where(table['thread'].notna(), None)
+        return table.astype({'seq': int})[COLUMNS]
+
+
+def check_table(table: pd.DataFrame) -> None:
+    """Raise one clear sentence where `table` is not a recording: TypeError or ValueError."""
+    if not isinstance(table, pd.DataFrame):
+        raise TypeError(f'A table of messages is needed (a DataFrame), not {type(table).__name__}.')
+    columns = list(table.columns)
+    missing = [name for name in COLUMNS if name not in columns]
+    if missing:
+        raise ValueError(f'The table lacks the column(s) {", ".join(missing)}.')
+    duplicate = [name for name in COLUMNS if columns.count(name) > 1]
+    if duplicate:
+        raise ValueError(f'The table has the column(s) {", ".join(duplicate)} more than once.')
+    if table.empty:
+        raise ValueError('The table is empty: record at least one message.')
+    twice = table.loc[table['seq'].duplicated(), 'seq']
+    if len(twice):
+        raise ValueError(f'The message {twice.iloc[0]} has more than one row.')
+    if table['published_s'].isna().any():
+        unknown = table.loc[table['published_s'].isna(), 'seq'].iloc[0]
+        raise ValueError(f'It is not known when message {unknown} was published.')

@@ -1,0 +1,324 @@
+"""A ROS session for a notebook cell: it opens rclpy, spins executors in threads, and cleans up.
+
+A terminal has one process per node and Ctrl+C to end it. A notebook has one process for everything,
+and cells that run twice or are interrupted. `ros_session` makes this safe and adds nothing else:
+nodes, executors and callback groups are plain rclpy.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import gc
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from helpers.progress import ProgressBar
+
+try:
+    import rclpy
+    from rcl_interfaces.msg import Log
+    from rclpy.executors import Executor
+    from rclpy.node import Node
+    from rclpy.qos import DurabilityPolicy, QoSProfile
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.task import Future
+except ImportError as error:
+    raise ImportError(
+        f'rclpy cannot be imported in this Python ({error}): start JupyterLab with `make lab`, '
+        'or see environment.md for the other ways to get ROS 2.'
+    ) from error
+
+CLOSE_TIMEOUT_S = 5.0
+POLL_S = 0.01
+LOG_LEVELS = {10: 'DEBUG', 20: 'INFO', 30: 'WARN', 40: 'ERROR', 50: 'FATAL'}
+
+_reserved = contextlib.ExitStack()
+_domain_id: int | None = None
+_open_session: Session | None = None
+
+
+def reserve_domain_id() -> int:
+    """Return a domain id (1 to 100) that belongs to this process until it ends.
+
+    Raises RuntimeError where all of them are taken.
+    """
+    global _domain_id
+    if _domain_id is None:
+        from domain_coordinator import domain_id
+
+        try:
+            _domain_id = _reserved.enter_context(domain_id())
+        except RuntimeError as error:
+            raise RuntimeError(
+                'All 100 ROS domain ids of this machine are in use: '
+                'shut down the kernels that you no longer need, then run this cell again.'
+            ) from error
+    return _domain_id
+
+
+def configure_discovery() -> None:
+    """Let the nodes of this process be discovered on this machine only."""
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+    # Both would widen or replace the range.
+    os.environ.pop('ROS_LOCALHOST_ONLY', None)
+    os.environ.pop('ROS_STATIC_PEERS', None)
+
+
+@dataclass
+class LogRecord:
+    """One message of `/rosout`."""
+
+    level: str
+    node: str
+    text: str
+    printed: bool = False
+
+    def __str__(self) -> str:
+        return f'[{self.level}] [{self.node}]: {self.text}'
+
+
+class Session:
+    """An open ROS graph: the context, the threads that spin, and the log. See `ros_session`."""
+
+    def __init__(self) -> None:
+        self._context = None
+        self._closed = False
+        self._executors: list[Executor] = []
+        self._spin_threads: list[threading.Thread] = []
+        self._failures: list[BaseException] = []
+        self._log: list[LogRecord] = []
+
+    def open(self) -> Session:
+        """Initialise rclpy in this kernel's own domain. A session that is still open is closed."""
+        global _open_session
+        if self._closed or self._context is not None:
+            raise RuntimeError('A session opens once: make a new one with `ros_session()`.')
+        if _open_session is not None:
+            _open_session._clean_up()
+        if rclpy.ok():  # a bare rclpy.init() of the notebook
+            rclpy.shutdown()
+        configure_discovery()
+        rclpy.init(
+            # The log goes to /rosout only: the console would show it again, and a file would need
+            # a home that can be written.
+            args=['--ros-args', '--disable-stdout-logs', '--disable-external-lib-logs'],
+            domain_id=reserve_domain_id(),
+            # rclpy's own handlers would shut the context down when the notebook is interrupted.
+            signal_handler_options=SignalHandlerOptions.NO,
+        )
+        self._context = rclpy.get_default_context()
+        _open_session = self
+        self._stop = Future()
+        self._log_node = Node('_session_log', enable_rosout=False, start_parameter_services=False)
+        self._log_subscription = self._log_node.create_subscription(
+            Log,
+            '/rosout',
+            lambda record: None,  # never spun: the session takes the records itself
+            QoSProfile(depth=100_000, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+        )
+        # The first log call of a process looks at every imported module, for 0.1 s: not in a
+        # callback that is being measured.
+        self._log_node.get_logger().info('The session is open.')
+        return self
+
+    def __enter__(self) -> Session:
+        return self.open()
+
+    def __exit__(self, exception_type, exception, traceback) -> None:
+        try:
+            self.close()
+        except BaseException as failure:
+            if exception is None:
+                raise
+            if failure is not exception:
+                exception.add_note(f'While the session closed: {failure!r}')
+
+    def spin(self, executor: Executor) -> None:
+        """Spin an executor in a background thread, until the session closes.
+
+        Raises TypeError for anything but an rclpy executor, ValueError for one that spins already,
+        and RuntimeError where the session is closed.
+        """
+        if not isinstance(executor, Executor):
+            raise TypeError(
+                'session.spin needs an executor, for example SingleThreadedExecutor() or '
+                f'MultiThreadedExecutor(num_threads=4), not {executor!r}.'
+            )
+        if self._context is None or self._closed:
+            raise RuntimeError(
+                'This session is not open: call session.spin inside its `with` block.'
+            )
+        if executor.context is not self._context:
+            raise ValueError(
+                'This executor belongs to another session: make it inside '
+                '`with ros_session() as session:`.'
+            )
+        if executor in self._executors:
+            raise ValueError('This executor spins already: call session.spin once per executor.')
+        self._executors.append(executor)
+        thread = threading.Thread(
+            target=self._spin, args=(executor,), name=f'spin {len(self._executors)}', daemon=True
+        )
+        self._spin_threads.append(thread)
+        thread.start()
+
+    def _spin(self, executor: Executor) -> None:
+        try:
+            # Ends when the session stops, without Executor.shutdown() under a running spin.
+            executor.spin_until_future_complete(self._stop)
+        except BaseException as failure:
+            if not self._stop.done():
+                self._failures.append(failure)
+
+    def wait_until(
+        self,
+        predicate: Callable[[], bool],
+        timeout_s: float = 30.0,
+        progress: Callable[[], float] | None = None,
+    ) -> None:
+        """Wait until the predicate holds.
+
+        `progress` returns the part that is done, 0 to 1. It is shown as a bar once the wait has
+        taken 2 s; the bar disappears at the end.
+
+        Raises TimeoutError when `timeout_s` seconds are over, and the exception of a callback as
+        soon as one has failed.
+        """
+        started = time.monotonic()
+        # Nobody sets it: an interruptible pause between two looks at the predicate.
+        pause = threading.Event()
+        with ProgressBar(progress) as bar:
+            while not predicate():
+                self.raise_if_failed()
+                waited_s = time.monotonic() - started
+                if waited_s > timeout_s:
+                    raise TimeoutError(
+                        f'Waited {timeout_s:g} s in vain: is every executor spinning, and is every '
+                        'node added to one?'
+                    )
+                bar.update(waited_s)
+                pause.wait(POLL_S)
+
+    def raise_if_failed(self) -> None:
+        """Raise the first exception that left a callback, with its own traceback."""
+        self._collect_failures()
+        if self._failures:
+            raise self._failures[0]
+
+    def _collect_failures(self) -> None:
+        # A MultiThreadedExecutor raises a callback's exception at a later spin, or never.
+        for executor in self._executors:
+            for task in list(getattr(executor, '_futures', ())):
+                failure = task.exception() if task.done() else None
+                if failure is not None and failure not in self._failures:
+                    self._failures.append(failure)
+
+    def log(self, node: str | None = None) -> list[LogRecord]:
+        """Return the records of `/rosout` so far, oldest first, of one node or of all."""
+        if not self._closed:
+            handle = self._log_subscription.handle
+            with handle:
+                while (taken := handle.take_message(Log, False)) is not None:
+                    message = taken[0]
+                    level = LOG_LEVELS.get(message.level, str(message.level))
+                    self._log.append(LogRecord(level, message.name, message.msg))
+        return [record for record in self._log if node in (None, record.node)]
+
+    def print_log(self, node: str | None = None) -> None:
+        """Print the records of `/rosout` that were not printed yet, of one node or of all."""
+        for record in self.log(node):
+            if not record.printed:
+                record.printed = True
+                print(record)
+
+    def close(self) -> None:
+        """Stop and destroy everything that this session opened.
+
+        Raises the first exception that left a callback, or RuntimeError where a callback does not
+        end within `CLOSE_TIMEOUT_S`.
+        """
+        if self._context is None or self._closed:
+            return
+        deadline = time.monotonic() + CLOSE_TIMEOUT_S
+        interrupt = None
+        while not self._closed:
+            try:
+                self._clean_up(deadline)
+            except KeyboardInterrupt as error:  # clean up first
+                interrupt = error
+        for record in self._log:
+            if record.level in ('WARN', 'ERROR', 'FATAL') and not record.printed:
+                record.printed = True
+                print(record)
+        if interrupt is not None:
+            raise interrupt
+        if self._failures:
+            raise self._failures[0]
+        stuck = [thread.name for thread in self._threads() if thread.is_alive()]
+        if stuck:
+            raise RuntimeError(
+                f'{len(stuck)} callback(s) did not end within {CLOSE_TIMEOUT_S:g} s: let every '
+                'callback end, or restart the kernel.'
+            )
+
+    def _clean_up(self, deadline: float | None = None) -> None:
+        """Do the steps of `close`; every step can be repeated after an interrupt."""
+        global _open_session
+        if self._closed:
+            return
+        deadline = deadline or time.monotonic() + CLOSE_TIMEOUT_S
+        if not self._stop.done():
+            self._stop.set_result(None)
+        for thread in self._spin_threads:
+            thread.join(max(0.0, deadline - time.monotonic()))
+        for executor in self._executors:
+            # rclpy leaves the threads of the pool to the garbage collector.
+            pool = getattr(executor, '_executor', None)
+            if pool is not None:
+                pool.shutdown(wait=False, cancel_futures=True)
+        for thread in self._threads():
+            thread.join(max(0.0, deadline - time.monotonic()))
+        self._collect_failures()
+        for executor in self._executors:
+            executor.shutdown(timeout_sec=0)
+        self.log()
+        for thing in gc.get_objects():
+            if issubclass(type(thing), Node) and thing.context is self._context:
+                thing.destroy_node()
+        rclpy.try_shutdown()
+        self._closed = True
+        if _open_session is self:
+            _open_session = None
+
+    def _threads(self) -> list[threading.Thread]:
+        pools = [getattr(executor, '_executor', None) for executor in self._executors]
+        return self._spin_threads + [
+            thread for pool in pools if pool is not None for thread in list(pool._threads)
+        ]
+
+
+def ros_session() -> Session:
+    """Return a ROS session, to be used as `with ros_session() as session:`.
+
+    Inside it, rclpy is initialised, in a domain that no other kernel of this machine hears. At its
+    end, and also when a cell is interrupted or run again, all executors, threads, nodes and the
+    context are gone. The first exception of a callback is raised at the end of the `with`.
+    """
+    return Session()
+
+
+def current_session() -> Session:
+    """Return the open session. Raises RuntimeError where there is none."""
+    if _open_session is None:
+        raise RuntimeError('No session is open: do this inside `with ros_session() as session:`.')
+    return _open_session
+
+
+@atexit.register
+def _close_at_exit() -> None:
+    if _open_session is not None:
+        _open_session._clean_up()
