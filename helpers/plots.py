@@ -1,0 +1,398 @@
+"""Pictures of recorded and of predicted runs, all in one style.
+
+Every function takes tables as `recording` and `queue_model` make them: one row a message, columns
+`seq`, `published_s`, `started_s`, `finished_s`, `thread`. A table describes a finished run: a
+message that was never heard counts as lost. Bad input raises before anything is drawn.
+
+The colours are those of Okabe and Ito ("Color Universal Design", 2008), which people with any kind
+of colour vision can tell apart. No meaning hangs on a colour alone: the shape differs too.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from numbers import Integral, Real
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator
+
+from helpers.recording import check_table
+
+PUBLISHED, HEARD, LOST = '#9aa5ae', '#0072B2', '#D55E00'
+LOST_TEXT = '#9c4300'  # a darker vermillion: letters need more contrast than marks
+LIMIT = '#222222'
+# One colour and one hatch a callback group. Light enough for black numbers on top.
+GROUP_COLOURS = ('#56B4E9', '#E69F00', '#009E73', '#CC79A7', '#F0E442')
+GROUP_HATCHES = ('', '//', '..', '\\\\', 'xx')
+
+SMALL, NORMAL, LARGE = 12, 13, 15  # font sizes in points, readable from the last row of a room
+SIZE, WIDE = (9, 4), (11, 4.4)  # inches
+DPI = 110
+MOST_SEQ_LABELS, MOST_GAP_LABELS, MOST_BAR_LABELS = 25, 15, 300
+TIME_LABEL = 'time since the first publish (s)'
+
+
+def sequence_gaps(table: pd.DataFrame, title: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draw what was published and what was heard: sequence number over time.
+
+    A small dot is a message at the time it was published, a large dot the start of its callback,
+    a cross a message that was lost, at the time it was published. The line from a small dot to its
+    large one is the time that the message waited. Draws into `ax`, or into a new figure.
+
+    Raises TypeError or ValueError for a bad table.
+    """
+    table = _checked(table)
+    ax = _axes(ax)
+    handles = _draw_gaps(ax, table)
+    _dress(ax, title or f'Messages: {_loss(table)}', TIME_LABEL, 'sequence number', handles)
+    _label_gaps(ax, table)
+    return ax
+
+
+def before_and_after(
+    before: pd.DataFrame, after: pd.DataFrame, labels: tuple[str, str] = ('before', 'after')
+) -> Figure:
+    """Draw the sequence gaps of two runs beside each other, on the same axes.
+
+    Each title says how many messages the run lost. Returns the Figure, since it has two Axes.
+
+    Raises TypeError or ValueError for a bad table, and ValueError unless there are two labels.
+    """
+    tables = [_checked(before), _checked(after)]
+    if isinstance(labels, str) or len(labels) != 2:
+        raise ValueError(f'labels must be two names, such as ("before", "after"), not {labels!r}.')
+    figure = plt.figure(figsize=WIDE, dpi=DPI, layout='constrained')
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    for ax, table, label in zip(panels, tables, labels, strict=True):
+        handles = _draw_gaps(ax, table, scale=0.5)
+        _dress(ax, f'{label}: {_loss(table)}', TIME_LABEL, 'sequence number', handles)
+    panels[1].set_ylabel('')
+    return figure
+
+
+def timeline(
+    table: pd.DataFrame | Mapping[str, pd.DataFrame],
+    span_s: tuple[float, float] | None = None,
+    title: str | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw one lane a thread and one bar a callback, with its sequence number where it fits.
+
+    `table` is one table, or one for each callback group: `{'group name': table, ...}`. Then each
+    group has a colour and a hatch of its own. `span_s` shows only the time from `span_s[0]` to
+    `span_s[1]`, in seconds.
+
+    Raises TypeError or ValueError for a bad table, no or too many groups, or a bad span.
+    """
+    groups = _checked_groups(table)
+    span_s = None if span_s is None else _checked_span(span_s)
+    bars = pd.concat([t[t.started_s.notna()].assign(group=name) for name, t in groups.items()])
+    # A callback that had not finished when the recording ended runs to the end of the picture.
+    bars['finished_s'] = bars.finished_s.fillna(bars[['started_s', 'finished_s']].max().max())
+    threads = sorted(bars.thread.astype(str).unique(), key=_natural)
+    lane = {thread: number for number, thread in enumerate(threads)}
+
+    ax = _axes(ax, height=min(max(2.6, 1.7 + 0.55 * len(lane)), 6.0))
+    handles = []
+    for number, name in enumerate(groups):
+        own = bars[bars.group == name]
+        look = {
+            'facecolor': GROUP_COLOURS[number],
+            'hatch': GROUP_HATCHES[number],
+            'edgecolor': '#555555',
+            'linewidth': 0.8,
+            'label': name,
+        }
+        ax.barh(
+            own.thread.astype(str).map(lane).to_numpy(dtype=float),
+            (own.finished_s - own.started_s).to_numpy(),
+            left=own.started_s.to_numpy(),
+            height=0.72,
+            **look,
+        )
+        handles.append(Patch(**look))
+    ax.set_yticks(range(len(lane)), threads)
+    ax.set_ylim(max(len(lane), 1) - 0.5, -0.5)  # the first thread on top
+    if span_s is not None:
+        ax.set_xlim(*span_s)
+    default = 'One bar for each callback, with its sequence number'
+    legend = handles if isinstance(table, Mapping) else None
+    _dress(ax, title or default, TIME_LABEL, 'thread', legend, grid='x')
+    if bars.empty:
+        _say(ax, 'no callback was called')
+    _label_bars(ax, bars, lane)
+    return ax
+
+
+def queue_length(
+    table: pd.DataFrame, depth: int, title: str | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw how many messages wait in the subscription's queue, KEEP_LAST with history `depth`.
+
+    A message enters when it is published. It leaves when its callback starts, or when the
+    `depth`-th newer message arrives: that one pushes it out, and a cross marks the loss. Therefore
+    the length never exceeds `depth`.
+
+    Raises TypeError or ValueError for a bad table, and ValueError unless `depth` is a whole number
+    of at least 1.
+    """
+    table = _checked(table)
+    if isinstance(depth, bool) or not isinstance(depth, Integral) or depth < 1:
+        raise ValueError(f'depth must be a whole number of at least 1, not {depth!r}.')
+    entered, started = table.published_s.to_numpy(float), table.started_s.to_numpy(float)
+    pushed_out = table.published_s.shift(-depth).to_numpy(float)
+    # A message is taken a little before its callback starts, so a newer one may come in between.
+    left = np.fmax(entered, np.fmin(started, pushed_out))
+    left = left[~(np.isnan(started) & np.isnan(pushed_out))]  # the others still wait at the end
+    lost_at = pushed_out[np.isnan(started) & ~np.isnan(pushed_out)]
+    # What enters and leaves in the same nanosecond did not wait: add up before drawing.
+    times, place = np.unique(np.round(np.concatenate([entered, left]), 9), return_inverse=True)
+    change = np.concatenate([np.ones(len(entered)), -np.ones(len(left))])
+    waiting = np.cumsum(np.bincount(place, weights=change))
+
+    ax = _axes(ax)
+    (line,) = ax.step(times, waiting, where='post', color=HEARD, lw=2, label='messages waiting')
+    ax.fill_between(times, waiting, step='post', color=HEARD, alpha=0.18, lw=0)
+    limit = ax.axhline(depth, color=LIMIT, ls='--', lw=1.8, label=f'history depth {depth}')
+    handles = [line, limit]
+    if len(lost_at):
+        label = f'pushed out: {len(lost_at)}'
+        handles.append(_crosses(ax, lost_at, np.full(len(lost_at), depth), label))
+    ax.set_ylim(-0.04 * depth, 1.12 * depth)  # a line at zero must be seen, too
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    _dress(ax, title or 'How full is the queue?', TIME_LABEL, 'messages waiting', handles)
+    return ax
+
+
+def latency(
+    table: pd.DataFrame,
+    period_s: float | None = None,
+    title: str | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw for each heard message the time from publishing to the start of its callback, in ms.
+
+    With `period_s`, the publisher's period in seconds, a second axis on the right counts in
+    periods. Crosses at the bottom are lost messages, which have no latency.
+
+    Raises TypeError or ValueError for a bad table, and ValueError unless `period_s` is above 0.
+    """
+    table = _checked(table)
+    if period_s is not None and not (_is_finite(period_s) and period_s > 0):
+        raise ValueError(f'period_s must be a number of seconds above 0, not {period_s!r}.')
+    heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
+
+    ax = _axes(ax)
+    delay_ms = 1000 * (heard.started_s - heard.published_s)
+    handles = ax.plot(
+        heard.published_s, delay_ms, 'o-', color=HEARD, ms=7, lw=1.5, label=f'heard {len(heard)}'
+    )
+    highest = max(delay_ms.max(), 1.0) if len(heard) else 1.0
+    if len(lost):
+        below = np.full(len(lost), -0.05 * highest)
+        handles.append(_crosses(ax, lost.published_s, below, f'lost {len(lost)}'))
+    ax.set_ylim(-0.09 * highest, 1.1 * highest)
+    _dress(
+        ax,
+        title or 'How long each message waited for its callback',
+        'time of publishing, since the first publish (s)',
+        'latency (ms)',
+        handles,
+    )
+    if period_s is not None:
+        per_period = 1000 * period_s
+        right = ax.secondary_yaxis(
+            'right', functions=(lambda ms: ms / per_period, lambda periods: periods * per_period)
+        )
+        right.set_ylabel('latency (periods)', fontsize=NORMAL)
+        right.tick_params(labelsize=SMALL)
+        right.spines['right'].set_visible(True)
+    if heard.empty:
+        _say(ax, 'no message was heard')
+    return ax
+
+
+def _checked(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the table in the order of publishing, or raise."""
+    check_table(table)
+    return table.sort_values('seq', ignore_index=True)
+
+
+def _checked_groups(table: pd.DataFrame | Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
+    if not isinstance(table, Mapping):
+        return {'callbacks': _checked(table)}
+    if not 1 <= len(table) <= len(GROUP_COLOURS):
+        raise ValueError(
+            f'The timeline can show 1 to {len(GROUP_COLOURS)} callback groups, not {len(table)}.'
+        )
+    return {str(name): _checked(one) for name, one in table.items()}
+
+
+def _checked_span(span_s: tuple[float, float]) -> tuple[float, float]:
+    try:
+        first, last = span_s
+    except (TypeError, ValueError):
+        first = last = None
+    if not (_is_finite(first) and _is_finite(last) and first < last):
+        raise ValueError(
+            f'span_s must be two times in seconds, the earlier one first, not {span_s!r}.'
+        )
+    return first, last
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _natural(name: str) -> list:
+    """Sort key that puts 'worker 2' before 'worker 10'."""
+    return [(0, int(s), '') if s.isdecimal() else (1, 0, s) for s in re.split(r'(\d+)', name) if s]
+
+
+def _loss(table: pd.DataFrame) -> str:
+    lost = int(table.started_s.isna().sum())
+    return f'{lost} of {len(table)} lost' if lost else 'none lost'
+
+
+def _axes(ax: Axes | None, height: float = SIZE[1]) -> Axes:
+    if ax is not None:
+        return ax
+    figure = plt.figure(figsize=(SIZE[0], height), dpi=DPI, layout='constrained')
+    return figure.add_subplot()
+
+
+def _dress(
+    ax: Axes, title: str, xlabel: str, ylabel: str, handles: list | None, grid: str = 'both'
+) -> None:
+    """Give the axes the common style.
+
+    All sizes are set here and not through rcParams, because the axes may be the caller's own.
+    The legend stands above the axes, where it cannot hide data.
+    """
+    ax.set_title(title, fontsize=LARGE, loc='left', pad=34 if handles else 10)
+    ax.set_xlabel(xlabel, fontsize=NORMAL)
+    ax.set_ylabel(ylabel, fontsize=NORMAL)
+    ax.tick_params(labelsize=SMALL)
+    ax.spines[['top', 'right']].set_visible(False)
+    ax.grid(True, axis=grid, color='#e4e7ea', linewidth=0.8)
+    ax.set_axisbelow(True)
+    if handles:
+        ax.legend(
+            handles=handles,
+            loc='lower left',
+            bbox_to_anchor=(0, 1),
+            ncols=len(handles),
+            fontsize=SMALL,
+            frameon=False,
+            borderaxespad=0.3,
+            borderpad=0.2,
+            handletextpad=0.5,
+            handlelength=1.6,
+            columnspacing=1.6,
+        )
+
+
+def _crosses(ax: Axes, x, y, label: str, scale: float = 1.0):
+    """Mark lost messages: the same cross in every picture."""
+    return ax.scatter(
+        x, y, marker='x', s=40 * scale, linewidths=2 * scale**0.5, color=LOST, label=label,
+        zorder=4, clip_on=False,
+    )  # fmt: skip
+
+
+def _draw_gaps(ax: Axes, table: pd.DataFrame, scale: float = 1.0) -> list:
+    """Draw the marks and return them for the legend. `scale` is the area of a mark."""
+    heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
+    scale *= min(1.0, max(0.2, 60 / len(table)))  # many marks must be smaller to stay apart
+    ax.hlines(heard.seq, heard.published_s, heard.started_s, color='#cfd6db', lw=1.2, zorder=1)
+    ax.margins(x=0.04, y=0.09)
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    return [
+        ax.scatter(
+            table.published_s, table.seq, s=14 * scale, color=PUBLISHED, zorder=2,
+            label=f'published {len(table)}',
+        ),
+        ax.scatter(
+            heard.started_s, heard.seq, s=52 * scale, color=HEARD, zorder=3,
+            label=f'heard {len(heard)}',
+        ),
+        _crosses(ax, lost.published_s, lost.seq, f'lost {len(lost)}', scale=scale),
+    ]  # fmt: skip
+
+
+def _label_gaps(ax: Axes, table: pd.DataFrame) -> None:
+    """Write the sequence number at each heard message, and at each gap how many were lost."""
+    heard = table[table.started_s.notna()]
+    lost = table[table.started_s.isna()]
+    texts = []
+    if len(heard) <= MOST_SEQ_LABELS:
+        # Below and to the right of a heard message nothing else can be: no message with a
+        # smaller number comes later, unless several threads overlap.
+        for message in heard.itertuples():
+            texts.append(_label(ax, message.seq, message.started_s, message.seq, (3, -4), 'left'))
+    # Consecutive rows share a gap: within one, row number minus rank among the lost is constant.
+    gaps = [gap for _, gap in lost.groupby(lost.index - np.arange(len(lost)))]
+    if len(gaps) <= MOST_GAP_LABELS:
+        for gap in gaps:
+            x, y, text = gap.published_s.mean(), gap.seq.mean(), f'{len(gap)} lost'
+            texts.append(_label(ax, text, x, y, (-4, 1), 'right', LOST_TEXT, 'bottom'))
+    _settle(ax, texts, heard[['started_s', 'seq']].to_numpy(float))
+
+
+def _label(
+    ax: Axes, text, x: float, y: float, offset: tuple[float, float], ha: str,
+    colour: str = 'black', va: str = 'top',
+) -> Text:  # fmt: skip
+    return ax.annotate(
+        str(text), (x, y), xytext=offset, textcoords='offset points', ha=ha, va=va,
+        fontsize=SMALL, color=colour, zorder=5,
+    )  # fmt: skip
+
+
+def _settle(ax: Axes, texts: list[Text], marks: np.ndarray) -> None:
+    """Remove each text that covers an earlier one, or one of the `marks`, rows of (x, y).
+
+    A text that leaves the axes on the left is first turned to the right side of its point.
+    """
+    ax.figure.draw_without_rendering()  # the layout must be final before sizes mean anything
+    marks = ax.transData.transform(marks)
+    kept = []
+    for text in texts:
+        if text.get_window_extent().x0 < ax.bbox.x0:
+            text.set(ha='left', position=(8, 0))
+        box = text.get_window_extent()
+        if box.count_overlaps(kept) or box.count_contains(marks):
+            text.remove()
+        else:
+            kept.append(box)
+
+
+def _label_bars(ax: Axes, bars: pd.DataFrame, lane: Mapping[str, int]) -> None:
+    """Write the sequence number on each bar that is wide enough for it."""
+    first, last = ax.get_xlim()
+    shown = bars[(bars.started_s < last) & (bars.finished_s > first)]
+    if len(shown) > MOST_BAR_LABELS:
+        return
+    ax.figure.draw_without_rendering()
+    for bar in shown.itertuples():
+        left, right = max(bar.started_s, first), min(bar.finished_s, last)
+        text = ax.text(
+            (left + right) / 2, lane[str(bar.thread)], str(bar.seq), fontsize=SMALL, ha='center',
+            va='center', path_effects=[withStroke(linewidth=3, foreground=(1, 1, 1, 0.7))],
+        )  # fmt: skip
+        (left, _), (right, _) = ax.transData.transform([(left, 0), (right, 0)])
+        if text.get_window_extent().width > 0.95 * (right - left):
+            text.remove()
+
+
+def _say(ax: Axes, text: str) -> None:
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha='center', va='center', fontsize=LARGE)
