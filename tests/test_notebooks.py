@@ -1,0 +1,30 @@
+"""Every lesson keeps the rules of notebook_rules.py. nbval runs the lessons."""
+
+import nbformat
+import notebook_rules as rules
+import pytest
+
+from tools.notebooks import FOLDER
+
+PATHS = sorted(FOLDER.glob('*.ipynb'))
+NAMES = [path.name for path in PATHS]
+
+
+def test_lessons_are_in_teaching_order():
+    assert rules.teaching_order(NAMES) == []
+
+
+@pytest.mark.parametrize('group', rules.GROUPS)
+@pytest.mark.parametrize('path', PATHS, ids=NAMES)
+def test_lesson(path, group):
+    assert rules.problems(nbformat.read(path, as_version=4), group) == []
+
+
+@pytest.mark.parametrize('path', PATHS, ids=NAMES)
+def test_lesson_in_its_folder(path):
+    text = path.read_text(encoding='utf-8')
+    notebook = nbformat.reads(text, as_version=4)
+    assert rules.saved_as_jupyter_does(text, notebook) == []
+    assert rules.title_matches(path.name, notebook) == []
+    assert rules.links_lead_somewhere(notebook, FOLDER) == []
+    assert rules.maps_every_lesson(notebook, NAMES) == []
