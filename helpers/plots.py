@@ -101,7 +101,7 @@ def timeline(
     threads = sorted(bars.thread.astype(str).unique(), key=_natural)
     lane = {thread: number for number, thread in enumerate(threads)}
 
-    ax = _axes(ax, height=min(max(2.6, 1.7 + 0.55 * len(lane)), 6.0))
+    ax = _axes(ax)
     handles = []
     for number, name in enumerate(groups):
         own = bars[bars.group == name]
@@ -218,6 +218,103 @@ def latency(
         right.spines['right'].set_visible(True)
     if heard.empty:
         _say(ax, 'no message was heard')
+    return ax
+
+
+def sweep(
+    results: pd.DataFrame, limit: float | None = None, limit_label: str = '', title: str = ''
+) -> Figure:
+    """Draw one panel a column of `results` over its index, for a quantity that was varied.
+
+    Names are the axis labels: that of the index below, those of the columns (with their unit) above
+    each panel. `limit` marks a value of the index with a line, `limit_label` says what it is.
+
+    Raises ValueError where `results` has no row or no column.
+    """
+    if results.empty:
+        raise ValueError('The results of a sweep need at least one row and one column.')
+    figure = plt.figure(figsize=WIDE, dpi=DPI, layout='constrained')
+    figure.suptitle(title, fontsize=LARGE, x=0.01, ha='left')
+    panels = figure.subplots(1, results.shape[1], squeeze=False)[0]
+    for ax, (name, values) in zip(panels, results.items(), strict=True):
+        ax.plot(results.index, values, 'o-', color=HEARD, lw=2, ms=8)
+        ax.set_ylim(bottom=0, top=1.15 * max(values.max(), 1e-9))
+        ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+        _dress(ax, name, results.index.name or '', '', None)
+        ax.title.set_fontsize(NORMAL)
+        if limit is not None:
+            line = ax.axvline(limit, color=LIMIT, ls='--', lw=1.8, label=limit_label)
+    if limit is not None:
+        figure.legend(handles=[line], loc='upper right', fontsize=SMALL, frameon=False)
+    return figure
+
+
+def bars(values: pd.Series, xlabel: str, title: str | None = None) -> Axes:
+    """Draw one horizontal bar a row of `values`, from the top, each with its value.
+
+    Raises ValueError where there is nothing to draw.
+    """
+    if values.empty:
+        raise ValueError('There are no values to draw.')
+    ax = _axes(None, height=1.3 + 0.6 * len(values))
+    drawn = ax.barh(values.index.astype(str), values.to_numpy(), color=HEARD, height=0.6)
+    ax.bar_label(drawn, fmt='%.3g', padding=5, fontsize=NORMAL)
+    ax.invert_yaxis()
+    ax.margins(x=0.12)
+    _dress(ax, title or '', xlabel, '', None, grid='x')
+    return ax
+
+
+def topic_graph(endpoints: pd.DataFrame, title: str | None = None) -> Axes:
+    """Draw which nodes publish and subscribe to which topics, and with which quality of service.
+
+    `endpoints` has one row a publisher or subscription, with the columns `node`, `role`
+    ('publisher' or 'subscription'), `topic`, `type` and `qos` (all text). An arrow is dashed where
+    a topic lacks the other side.
+
+    Raises ValueError for a missing column, an empty table or an unknown role.
+    """
+    missing = {'node', 'role', 'topic', 'type', 'qos'} - set(endpoints.columns)
+    if missing or endpoints.empty:
+        raise ValueError('endpoints needs rows with the columns node, role, topic, type and qos.')
+    if not endpoints['role'].isin(['publisher', 'subscription']).all():
+        raise ValueError("The role of an endpoint is 'publisher' or 'subscription'.")
+    publishers = endpoints[endpoints['role'] == 'publisher']
+    subscriptions = endpoints[endpoints['role'] == 'subscription']
+    topics = list(dict.fromkeys(endpoints['topic']))
+    rows = max(len(publishers), len(subscriptions), len(topics))
+    ax = _axes(None, height=0.9 + 1.25 * rows)
+    ax.set(xlim=(0, 10), ylim=(-0.5 * rows, 0.5 * rows))
+    ax.set_axis_off()
+    ax.set_title(title or 'Nodes and topics', fontsize=LARGE, loc='left')
+
+    def spread(count: int) -> np.ndarray:
+        return (np.arange(count)[::-1] - (count - 1) / 2) * rows / max(count, 1)
+
+    def box(x: float, y: float, first: str, second: str, style: str, colour: str) -> None:
+        ax.text(
+            x, y, f'{first}\n{second}', ha='center', va='center', fontsize=NORMAL, linespacing=1.5,
+            bbox={'boxstyle': style, 'facecolor': colour, 'edgecolor': LIMIT, 'linewidth': 1.4},
+        )  # fmt: skip
+
+    heights = dict(zip(topics, spread(len(topics)), strict=True))
+    for topic, y in heights.items():
+        name = endpoints.loc[endpoints['topic'] == topic, 'type'].iloc[0]
+        box(5, y, topic, name, 'round,pad=0.7,rounding_size=1.2', '#FFFFFF')
+    for side, x, edges in ((publishers, 1.4, (2.6, 3.7)), (subscriptions, 8.6, (6.3, 7.2))):
+        for (_, end), y in zip(side.iterrows(), spread(len(side)), strict=True):
+            colour = GROUP_COLOURS[1] if end['role'] == 'publisher' else GROUP_COLOURS[0]
+            box(x, y, end['node'], end['qos'], 'square,pad=0.7', colour)
+            topic_y = heights[end['topic']]
+            tail, head = (y, topic_y) if end['role'] == 'publisher' else (topic_y, y)
+            both = {'publisher', 'subscription'} <= set(
+                endpoints.loc[endpoints['topic'] == end['topic'], 'role']
+            )
+            ax.annotate(
+                '', xy=(edges[1], head), xytext=(edges[0], tail),
+                arrowprops={'arrowstyle': '-|>', 'lw': 2, 'ls': '-' if both else '--',
+                            'color': LIMIT, 'mutation_scale': 18},
+            )  # fmt: skip
     return ax
 
 

@@ -70,8 +70,8 @@ class Explanation:
     """Why each lost message was lost. See `explain`.
 
     `losses` has one row a lost message: `seq`, `pushed_out_by` (the message whose arrival pushed it
-    out, or NA) and `waiting` (the messages that then filled the queue). `contradictions` are
-    sentences about what such a queue cannot have done.
+    out, or NA) and `queue_after` (the newer messages that then fill the queue).
+    `contradictions` are sentences about what such a queue cannot have done.
     """
 
     messages: int
@@ -139,12 +139,12 @@ def _losses(table: pd.DataFrame, depth: int) -> pd.DataFrame:
         {
             'seq': seq,
             'pushed_out_by': seq.shift(-depth).astype('Int64'),
-            'waiting': seq.shift(-1).astype('Int64').astype(str)
+            'queue_after': seq.shift(-1).astype('Int64').astype(str)
             + ' to '
             + seq.shift(-depth).astype('Int64').astype(str),
         }
     )[table['started_s'].isna()].reset_index(drop=True)
-    losses['waiting'] = losses['waiting'].where(losses['pushed_out_by'].notna(), None)
+    losses['queue_after'] = losses['queue_after'].where(losses['pushed_out_by'].notna(), None)
     return losses
 
 

@@ -15,10 +15,20 @@ COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']
 
 
 def last_number(message) -> int:
-    """Return the number at the end of `message.data`: 7 for `Hello World: 7`, or 7 itself."""
-    if isinstance(message.data, str):
-        return int(re.search(r'(\d+)\s*$', message.data).group(1))
-    return int(message.data)
+    """Return the number at the end of `message.data`: 7 for `Hello World: 7`, or 7 itself.
+
+    Raises ValueError where there is none.
+    """
+    data = getattr(message, 'data', None)
+    if isinstance(data, int | float):
+        return int(data)
+    found = re.search(r'(\d+)\s*$', data) if isinstance(data, str) else None
+    if found is None:
+        raise ValueError(
+            f'There is no number at the end of {message!r}: give Recording a `sequence` function '
+            'that returns the number of a message.'
+        )
+    return int(found.group(1))
 
 
 class Recording:
@@ -43,9 +53,9 @@ class Recording:
         append = self._published.append
 
         @functools.wraps(publish)
-        def recorded_publish(message):
-            append((sequence(message), clock()))
-            publish(message)
+        def recorded_publish(msg):
+            append((sequence(msg), clock()))
+            publish(msg)
 
         publisher.publish = recorded_publish
 
@@ -143,9 +153,10 @@ class Recording:
         heard['thread'] = heard['thread'].map(workers)
         table = published.merge(heard, on='seq', how='outer').sort_values('seq', ignore_index=True)
         times = ['published_s', 'started_s', 'finished_s']
+        table = table.astype({'seq': int} | dict.fromkeys(times, float))
         table[times] -= table['published_s'].min()
         table['thread'] = table['thread'].astype(object).where(table['thread'].notna(), None)
-        return table.astype({'seq': int})[COLUMNS]
+        return table[COLUMNS]
 
 
 def check_table(table: pd.DataFrame) -> None:

@@ -21,7 +21,7 @@ from helpers.progress import ProgressBar
 try:
     import rclpy
     from rcl_interfaces.msg import Log
-    from rclpy.executors import Executor
+    from rclpy.executors import Executor, ExternalShutdownException
     from rclpy.node import Node
     from rclpy.qos import DurabilityPolicy, QoSProfile
     from rclpy.signals import SignalHandlerOptions
@@ -90,7 +90,9 @@ class Session:
         self._executors: list[Executor] = []
         self._spin_threads: list[threading.Thread] = []
         self._failures: list[BaseException] = []
+        self._stop = Future()
         self._log: list[LogRecord] = []
+        self._log_subscription = None
 
     def open(self) -> Session:
         """Initialise rclpy in this kernel's own domain. A session that is still open is closed."""
@@ -112,7 +114,6 @@ class Session:
         )
         self._context = rclpy.get_default_context()
         _open_session = self
-        self._stop = Future()
         self._log_node = Node('_session_log', enable_rosout=False, start_parameter_services=False)
         self._log_subscription = self._log_node.create_subscription(
             Log,
@@ -170,9 +171,10 @@ class Session:
         try:
             # Ends when the session stops, without Executor.shutdown() under a running spin.
             executor.spin_until_future_complete(self._stop)
+        except ExternalShutdownException:
+            pass  # the cell itself called rclpy.shutdown()
         except BaseException as failure:
-            if not self._stop.done():
-                self._failures.append(failure)
+            self._failures.append(failure)
 
     def wait_until(
         self,
@@ -219,7 +221,7 @@ class Session:
 
     def log(self, node: str | None = None) -> list[LogRecord]:
         """Return the records of `/rosout` so far, oldest first, of one node or of all."""
-        if not self._closed:
+        if self._log_subscription is not None:
             handle = self._log_subscription.handle
             with handle:
                 while (taken := handle.take_message(Log, False)) is not None:
@@ -250,7 +252,8 @@ class Session:
                 self._clean_up(deadline)
             except KeyboardInterrupt as error:  # clean up first
                 interrupt = error
-        for record in self._log:
+        # By node, because the executor's order of nodes is chance.
+        for record in sorted(self._log, key=lambda record: record.node):
             if record.level in ('WARN', 'ERROR', 'FATAL') and not record.printed:
                 record.printed = True
                 print(record)
@@ -284,11 +287,18 @@ class Session:
             thread.join(max(0.0, deadline - time.monotonic()))
         self._collect_failures()
         for executor in self._executors:
+            # A coroutine that was never started would warn when it is collected.
+            for task, *_ in list(getattr(executor, '_tasks', ())):
+                if not task.executing():
+                    task.cancel()
             executor.shutdown(timeout_sec=0)
         self.log()
+        self._log_subscription = None
         for thing in gc.get_objects():
-            if issubclass(type(thing), Node) and thing.context is self._context:
-                thing.destroy_node()
+            if issubclass(type(thing), Node) and getattr(thing, 'context', None) is self._context:
+                # A node whose __init__ failed has only some of its parts.
+                with contextlib.suppress(Exception):
+                    thing.destroy_node()
         rclpy.try_shutdown()
         self._closed = True
         if _open_session is self:

@@ -4,7 +4,7 @@ import nbformat
 import notebook_rules as rules
 import pytest
 
-from tools.notebooks import FOLDER
+from tools.notebooks import FOLDER, PICTURES, pictures
 
 PATHS = sorted(FOLDER.glob('*.ipynb'))
 NAMES = [path.name for path in PATHS]
@@ -28,3 +28,12 @@ def test_lesson_in_its_folder(path):
     assert rules.title_matches(path.name, notebook) == []
     assert rules.links_lead_somewhere(notebook, FOLDER) == []
     assert rules.maps_every_lesson(notebook, NAMES) == []
+
+
+def test_pictures_are_those_of_the_notebooks():
+    found = {}
+    for path in PATHS:
+        found |= pictures(nbformat.read(path, as_version=4))
+    assert sorted(found) == sorted(PICTURES.values())
+    for name, picture in found.items():
+        assert (FOLDER / name).read_bytes() == picture, f'run `make notebooks` for {name}'

@@ -17,6 +17,7 @@ import re
 import subprocess
 import sys
 import time
+from base64 import b64decode
 from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
@@ -32,6 +33,8 @@ from traitlets import default
 
 FOLDER = Path(__file__).resolve().parent.parent / 'notebooks'
 CELL_TIMEOUT_S = 60
+# The README and lesson 00 show these: the id of a cell, and the file for its picture.
+PICTURES = {'lost-before-none-after': 'images/lost_before_none_after.png'}
 NOTEBOOK_METADATA = {
     'kernelspec': {
         'display_name': 'Python 3 (ipykernel)',
@@ -156,13 +159,28 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     raise RuntimeError(f'code cell {running} failed: {what}')
 
 
+def pictures(notebook: NotebookNode) -> dict[str, bytes]:
+    """Return the PNG files of `PICTURES` that come from this notebook, by their name."""
+    return {
+        PICTURES[cell.id]: b64decode(output.data['image/png'])
+        for cell in notebook.cells
+        if cell.get('id') in PICTURES
+        for output in cell.outputs
+        if 'image/png' in output.get('data', {})
+    }
+
+
 def update(path: Path) -> bool:
     """Execute a notebook's file in place; return True where that changed the file.
 
     Raises RuntimeError as `execute` does; the file is then as it was before.
     """
     before = path.read_text(encoding='utf-8')
-    after = text_of(execute(nbformat.reads(before, as_version=4), path.parent))
+    notebook = execute(nbformat.reads(before, as_version=4), path.parent)
+    after = text_of(notebook)
+    for name, picture in pictures(notebook).items():
+        (path.parent / name).parent.mkdir(exist_ok=True)
+        (path.parent / name).write_bytes(picture)
     if after == before:
         return False
     unfinished = path.with_suffix('.tmp')
