@@ -122,8 +122,7 @@ def timeline(
         handles.append(Patch(**look))
     ax.set_yticks(range(len(lane)), threads)
     ax.set_ylim(max(len(lane), 1) - 0.5, -0.5)  # the first thread on top
-    if span_s is not None:
-        ax.set_xlim(*span_s)
+    ax.set_xlim(*(span_s or (0, None)))
     default = 'One bar for each callback, with its sequence number'
     legend = handles if isinstance(table, Mapping) else None
     _dress(ax, title or default, TIME_LABEL, 'thread', legend, grid='x')
