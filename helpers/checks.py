@@ -1,8 +1,8 @@
 """Predictions and exercises: what is right, what is still missing, and a hint.
 
 Both functions print and return None, so that a cell shows their text and nothing else. The text
-holds no measured number. It is the same in every run from top to bottom, and also in a second
-run in the same kernel.
+holds no measured number, and is the same in every fresh run from top to bottom. Where an exercise
+is still wrong in a second run of the same kernel, its hints appear.
 """
 
 from __future__ import annotations

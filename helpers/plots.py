@@ -128,8 +128,7 @@ def timeline(
         handles.append(Patch(**look))
     ax.set_yticks(range(len(lane)), threads)
     ax.set_ylim(max(len(lane), 1) - 0.5, -0.5)  # the first thread on top
-    if span_s is not None:
-        ax.set_xlim(*span_s)
+    ax.set_xlim(*(span_s or (0, None)))
     default = 'One bar for each callback, with its sequence number'
     legend = handles if isinstance(table, Mapping) else None
     _dress(ax, title or default, TIME_LABEL, 'thread', legend, grid='x')
@@ -168,7 +167,7 @@ def queue_length(
     ax = _axes(ax)
     (line,) = ax.step(times, waiting, where='post', color=HEARD, lw=2, label='messages waiting')
     ax.fill_between(times, waiting, step='post', color=HEARD, alpha=0.18, lw=0)
-    limit = ax.axhline(depth, color=LIMIT, ls='--', lw=1.8, label=f'history depth {depth}')
+    limit = ax.axhline(depth, color=LIMIT, ls='--', lw=1.8, label=f'depth {depth}')
     handles = [line, limit]
     if len(lost_at):
         label = f'pushed out: {len(lost_at)}'
@@ -264,7 +263,8 @@ def bars(values: pd.Series, xlabel: str, title: str | None = None) -> Axes:
         raise ValueError('There are no values to draw.')
     ax = _axes(None, height=1.3 + 0.6 * len(values))
     drawn = ax.barh(values.index.astype(str), values.to_numpy(), color=HEARD, height=0.6)
-    ax.bar_label(drawn, fmt='%.3g', padding=5, fontsize=NORMAL)
+    texts = [f'{value:.0f}' if value >= 10 else f'{value:.2g}' for value in values]
+    ax.bar_label(drawn, texts, padding=5, fontsize=NORMAL)
     ax.invert_yaxis()
     ax.margins(x=0.12)
     _dress(ax, title or '', xlabel, '', None, grid='x')

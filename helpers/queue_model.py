@@ -122,6 +122,13 @@ def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
     table = table.sort_values('seq', ignore_index=True)
     heard = table[table['started_s'].notna()]
     contradictions = _impossible_rows(table)
+    # A callback that was still running when the record ended has not finished.
+    heard = heard.assign(finished_s=heard['finished_s'].fillna(math.inf))
+    heard['worker_free_s'] = (
+        heard.sort_values(['started_s', 'finished_s'])
+        .groupby('thread', sort=False)['finished_s']
+        .shift(fill_value=-math.inf)
+    )
     contradictions += _impossible_takes(table, heard, depth, threads)
     contradictions += _too_many_at_once(heard, threads)
     contradictions += _rests(table, heard, depth, threads)
@@ -175,13 +182,11 @@ def _impossible_takes(
 ) -> list[str]:
     """Go through the takes in order, each as early as possible: is it then too late for one?"""
     published = [*table['published_s'], *[math.inf] * (depth + 1)]
-    worker_free = _previous_finish(heard)
     busy_until = [-math.inf] * threads  # the latest finishes of earlier messages, as a heap
     found = []
     expected, previous_take = 0, -math.inf
-    for index, seq, start, finish, free in zip(
-        heard.index, heard['seq'], heard['started_s'], _finish(heard), worker_free, strict=True
-    ):
+    columns = heard[['seq', 'started_s', 'finished_s', 'worker_free_s']]
+    for index, seq, start, finish, free in columns.itertuples(name=None):
         # `arrived` messages were published when this one was the oldest in the queue. Without a
         # gap the queue may have been anywhere between one message and full; behind a gap, full.
         full = index + depth
@@ -200,19 +205,16 @@ def _impossible_takes(
 
 
 def _too_many_at_once(heard: pd.DataFrame, threads: int) -> list[str]:
-    running: list[float] = []
-    found = []
-    ordered = heard.assign(finish=_finish(heard)).sort_values(['started_s', 'finish'])
-    for seq, start, finish in zip(
-        ordered['seq'], ordered['started_s'], ordered['finish'], strict=True
-    ):
-        while running and running[0] <= start:
-            heapq.heappop(running)
-        heapq.heappush(running, finish)
-        if len(running) > threads:
-            found.append(f'More than {threads} callback(s) ran when message {seq} started.')
-    overlap = ordered.loc[ordered['started_s'] < _previous_finish(heard)[ordered.index], 'seq']
-    return found + [f'The thread of message {seq} was busy when it started.' for seq in overlap]
+    ordered = heard.sort_values(['started_s', 'finished_s'])
+    finished = np.searchsorted(np.sort(heard['finished_s']), ordered['started_s'], side='right')
+    running = np.arange(1, len(heard) + 1) - finished
+    return [
+        f'More than {threads} callback(s) ran when message {seq} started.'
+        for seq in ordered.loc[running > threads, 'seq']
+    ] + [
+        f'The thread of message {seq} was busy when it started.'
+        for seq in heard.loc[heard['started_s'] < heard['worker_free_s'], 'seq']
+    ]
 
 
 def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -> list[str]:
@@ -230,13 +232,14 @@ def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -
     edges = np.column_stack([arrived, pushed_out]).ravel()
     waited = np.column_stack([total - (pushed_out - arrived), total]).ravel()
     # From when to when was a worker free? Before the first callback nothing is known.
-    times = np.concatenate([heard['started_s'], _finish(heard)])
+    times = np.concatenate([heard['started_s'], heard['finished_s']])
     change = np.repeat([1, -1], len(heard))
     order = np.lexsort([change, times])
     free = np.cumsum(change[order]) < threads
     flips = times[order][np.flatnonzero(np.diff(free, prepend=False))]
     starts, ends = flips[::2], flips[1::2]
-    starts = starts[: len(ends)]  # after the last callback nothing is asked
+    # A worker that stays free to the end, perhaps one that never worked at all.
+    ends = np.append(ends, times[order][-1])[: len(starts)]
     rested = np.interp(ends, edges, waited) - np.interp(starts, edges, waited)
     return [
         f'Message {table["seq"].iloc[lost[np.searchsorted(pushed_out, starts[i], "right")]]} was '
@@ -248,18 +251,6 @@ def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -
 def _regular(durations: pd.Series) -> bool:
     """Whether all durations are alike. If not, a late worker proves nothing."""
     return len(durations) > 0 and durations.max() <= 2 * durations.median()
-
-
-def _finish(heard: pd.DataFrame) -> pd.Series:
-    """When each callback finished; a callback that was still running never did."""
-    return heard['finished_s'].fillna(math.inf)
-
-
-def _previous_finish(heard: pd.DataFrame) -> pd.Series:
-    """When the previous callback of the same thread finished."""
-    ordered = heard.assign(finish=_finish(heard)).sort_values(['started_s', 'finish'])
-    previous = ordered.groupby('thread', sort=False)['finish'].shift(fill_value=-math.inf)
-    return previous.reindex(heard.index).fillna(-math.inf)
 
 
 def _count(name: str, value: int) -> int:

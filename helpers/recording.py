@@ -44,6 +44,7 @@ class Recording:
         self._published: list[tuple[int, float]] = []
         # [seq, started, finished, thread id]; finished is NaN while the callback runs
         self._heard: list[list] = []
+        self._finished: list[list] = []  # the same rows, in the order in which they finished
         self._sequence = sequence
         self._watch_publisher(publisher)
         self._watch_subscription(subscription)
@@ -62,11 +63,16 @@ class Recording:
     def _watch_subscription(self, subscription) -> None:
         callback, sequence, clock = subscription.callback, self._sequence, time.monotonic
         append, thread_id, nan = self._heard.append, threading.get_ident, float('nan')
+        append_finished = self._finished.append
 
         def start(message) -> list:
             row = [sequence(message), clock(), nan, thread_id()]
             append(row)
             return row
+
+        def finish(row: list) -> None:
+            row[2] = clock()
+            append_finished(row)
 
         if inspect.iscoroutinefunction(callback):
 
@@ -76,7 +82,7 @@ class Recording:
                 try:
                     return await callback(message, *info)
                 finally:
-                    row[2] = clock()
+                    finish(row)
 
         else:
 
@@ -86,7 +92,7 @@ class Recording:
                 try:
                     return callback(message, *info)
                 finally:
-                    row[2] = clock()
+                    finish(row)
 
         subscription.callback = recorded_callback
 
@@ -103,7 +109,7 @@ class Recording:
     @property
     def in_flight(self) -> int:
         """How many callbacks have started and not yet finished."""
-        return sum(row[2] != row[2] for row in list(self._heard))
+        return len(self._heard) - len(self._finished)
 
     def wait_until_complete(self, messages: int, timeout_s: float = 60.0) -> None:
         """Wait until `messages` messages are published and the subscription has worked them off.
@@ -116,6 +122,7 @@ class Recording:
         """
         from helpers.session import current_session
 
+        __tracebackhide__ = True
         if isinstance(messages, bool) or not isinstance(messages, int) or messages < 1:
             raise ValueError(f'messages must be a whole number from 1 up, not {messages!r}.')
 
@@ -125,9 +132,12 @@ class Recording:
             newest = self._published[-1][0]
             return self.in_flight == 0 and any(row[0] == newest for row in self._heard)
 
-        current_session().wait_until(
-            complete, timeout_s, progress=lambda: len(self._published) / messages
-        )
+        def progress() -> float:
+            if not self._finished:
+                return 0.0
+            return (self._finished[-1][0] - self._published[0][0] + 1) / messages
+
+        current_session().wait_until(complete, timeout_s, progress)
 
     def table(self) -> pd.DataFrame:
         """Return one row a message, in the order of their sequence numbers.

@@ -130,6 +130,7 @@ class Session:
         return self.open()
 
     def __exit__(self, exception_type, exception, traceback) -> None:
+        __tracebackhide__ = True
         try:
             self.close()
         except BaseException as failure:
@@ -190,6 +191,7 @@ class Session:
         Raises TimeoutError when `timeout_s` seconds are over, and the exception of a callback as
         soon as one has failed.
         """
+        __tracebackhide__ = True  # IPython shows the cell, and the callback that failed
         started = time.monotonic()
         # Nobody sets it: an interruptible pause between two looks at the predicate.
         pause = threading.Event()
@@ -207,6 +209,7 @@ class Session:
 
     def raise_if_failed(self) -> None:
         """Raise the first exception that left a callback, with its own traceback."""
+        __tracebackhide__ = True
         self._collect_failures()
         if self._failures:
             raise self._failures[0]
@@ -243,6 +246,7 @@ class Session:
         Raises the first exception that left a callback, or RuntimeError where a callback does not
         end within `CLOSE_TIMEOUT_S`.
         """
+        __tracebackhide__ = True
         if self._context is None or self._closed:
             return
         deadline = time.monotonic() + CLOSE_TIMEOUT_S

@@ -261,6 +261,15 @@ def hides_solutions_only(notebook: NotebookNode) -> list[str]:
     ]
 
 
+def folded_solutions_keep_their_secret(notebook: NotebookNode) -> list[str]:
+    """JupyterLab shows the first line of a folded cell."""
+    return [
+        f'{name} is a solution: begin it with `# Solution of exercise N`.'
+        for name, cell in code_cells(notebook)
+        if 'solution' in tags(cell) and not re.match(r'# Solution of exercise \d', cell.source)
+    ]
+
+
 # The spine
 
 
@@ -428,7 +437,7 @@ GROUPS: dict[str, list[Rule]] = {
         no_changed_outputs,
     ],
     'compared': [nothing_ignored, known_tags],
-    'file': [saved_clean, hides_solutions_only],
+    'file': [saved_clean, hides_solutions_only, folded_solutions_keep_their_secret],
     'spine': [has_title, has_labels, has_steps, headings_in_order, recap_answers_opening, predicts],
     'exercises': [enough_exercises, exercises_complete, exercises_checked],
     'slides': [fits_a_slide],

@@ -36,6 +36,7 @@ RANDOM_LOG = """\
 import random
 for number in random.sample(range(1000), k=random.randint(5, 15)):
     print(f'[INFO] [slow_subscriber]: I heard: "Hello World: {number}"')"""
+SOLUTION = '# Solution of exercise 1\ndepth = 20\ncheck_depth(depth)'
 PASSED = '[ok] depth is 20\n[ok] none is lost\nExercise 1: 2 of 2. All done.\n'
 FAILED = '[missing] depth is 20\n[ok] none is lost\nExercise 1: 1 of 2.\n'
 
@@ -62,7 +63,7 @@ def exercise(count):
         new_markdown_cell(f'### Exercise {count}: choose the depth\n\nChange the depth.'),
         code('depth = 10', 'exercise'),
         code('check_depth(depth)', 'check', outputs=printed(FAILED)),
-        code('depth = 20\ncheck_depth(depth)', 'solution', outputs=printed(PASSED)),
+        code(SOLUTION, 'solution', outputs=printed(PASSED)),
     ]
 
 
@@ -214,6 +215,7 @@ BROKEN = [
     (rules.saved_clean, old_format()),
     (rules.hides_solutions_only, with_metadata(1, jupyter={'source_hidden': True})),
     (rules.hides_solutions_only, lesson(new_code_cell('x', metadata={'tags': ['solution']}))),
+    (rules.folded_solutions_keep_their_secret, lesson(code('depth = 20', 'solution'))),
     (rules.has_title, with_source(0, '# 02 Lose', '# Lose')),
     (rules.has_title, without(0)),
     (rules.has_title, new_notebook()),

@@ -400,7 +400,7 @@ class TestQueueLength:
         ax = plots.queue_length(slow, 10)
         assert set(ax.lines[1].get_ydata()) == {10}
         assert ax.lines[1].get_linestyle() != ax.lines[0].get_linestyle()
-        assert legend_of(ax) == ['messages waiting', 'history depth 10', 'pushed out: 21']
+        assert legend_of(ax) == ['messages waiting', 'depth 10', 'pushed out: 21']
         assert legend_of(plots.queue_length(parallel, 10)) == legend_of(ax)[:2]
 
     @pytest.mark.parametrize('depth', [0, -1, 2.5, True, '10', None])

@@ -1,0 +1,331 @@
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+from rclpy.callback_groups import ReentrantCallbackGroup
+from ros_nodes import LIMIT_S, Gate, Listener, Talker, spin
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Int64, String
+
+from helpers.recording import COLUMNS, Recording, check_table
+from helpers.session import ros_session
+
+TIMES = ['published_s', 'started_s', 'finished_s']
+
+
+def record(messages, work=None, threads=1, **options):
+    with ros_session() as session:
+        talker, listener = Talker(messages), Listener(work, **options)
+        recording = Recording(talker.publisher, listener.subscription)
+        spin(session, listener, threads=threads)
+        spin(session, talker)
+        recording.wait_until_complete(messages, LIMIT_S)
+    return recording
+
+
+def test_table():
+    recording = record(6)
+    table = recording.table()
+    assert list(table.columns) == COLUMNS
+    assert table['seq'].tolist() == list(range(6))
+    assert table['seq'].dtype == int
+    assert [table[name].dtype for name in TIMES] == [float] * 3
+    assert table['published_s'][0] == 0.0
+    assert table['published_s'].is_monotonic_increasing
+    assert (table['published_s'] <= table['started_s']).all()
+    assert (table['started_s'] <= table['finished_s']).all()
+    assert table['published_s'][5] > 0.01  # seconds: the timer's period is 5 ms
+    assert set(table['thread']) == {'worker 1'}
+    assert (recording.published, recording.heard, recording.in_flight) == (6, 6, 0)
+    check_table(table)
+
+
+def test_lost_messages():
+    gate = Gate()
+    with ros_session() as session:
+        talker, listener = Talker(5), Listener(gate, depth=1)
+        recording = Recording(talker.publisher, listener.subscription)
+        for _ in range(2):
+            talker.publish()
+        spin(session, listener)
+        session.wait_until(lambda: gate.inside == 1, LIMIT_S)
+        assert recording.in_flight == 1
+        held = recording.table()
+        assert held['started_s'].notna().tolist() == [False, True]
+        assert held['finished_s'].isna().all()
+        for _ in range(3):
+            talker.publish()
+        gate.open()
+        recording.wait_until_complete(5, LIMIT_S)
+    table = recording.table()
+    lost = [0, 2, 3]
+    assert table.index[table['started_s'].isna()].tolist() == lost
+    assert table.index[table['finished_s'].isna()].tolist() == lost
+    assert [table['thread'][seq] for seq in lost] == [None] * 3
+    assert table['published_s'].notna().all()
+
+
+@pytest.mark.parametrize('messages', [0, 3])
+def test_nothing_heard(messages):
+    with ros_session():
+        talker, listener = Talker(3), Listener()
+        recording = Recording(talker.publisher, listener.subscription)
+        for _ in range(messages):
+            talker.publish()
+    table = recording.table()
+    assert len(table) == messages
+    assert list(table.columns) == COLUMNS
+    assert [table[name].dtype for name in COLUMNS[:4]] == [int, float, float, float]
+    assert table['thread'].tolist() == [None] * messages
+
+
+def test_threads():
+    gate = Gate()
+    with ros_session() as session:
+        talker = Talker(3)
+        listener = Listener(gate, callback_group=ReentrantCallbackGroup())
+        recording = Recording(talker.publisher, listener.subscription)
+        spin(session, listener, threads=3)
+        for i in range(3):
+            talker.publish()
+            session.wait_until(lambda expected=i + 1: gate.inside == expected, LIMIT_S)
+        gate.open()
+        recording.wait_until_complete(3, LIMIT_S)
+    assert recording.table()['thread'].tolist() == ['worker 1', 'worker 2', 'worker 3']
+
+
+def test_wait_for_callbacks_that_still_run():
+    gate = Gate()
+
+    def hold_the_first(message):
+        if message.data.endswith(' 0'):
+            gate()
+
+    with ros_session() as session:
+        talker = Talker(2)
+        listener = Listener(hold_the_first, callback_group=ReentrantCallbackGroup())
+        recording = Recording(talker.publisher, listener.subscription)
+        spin(session, listener, threads=2)
+        for _ in range(2):
+            talker.publish()
+        with pytest.raises(TimeoutError):
+            recording.wait_until_complete(2, timeout_s=0.3)
+        assert (recording.heard, recording.in_flight) == (2, 1)
+        gate.open()
+        recording.wait_until_complete(2, LIMIT_S)
+    assert recording.table()['finished_s'].notna().all()
+
+
+def test_takes_that_overtake_are_sorted():
+    recording = Recording(publisher := Publisher(), subscription := Subscription(lambda message: 0))
+    for number in (3, 1, 2):
+        publisher.publish(Int64(data=number))
+    for number in (2, 3):
+        subscription.callback(Int64(data=number))
+    table = recording.table()
+    assert table['seq'].tolist() == [1, 2, 3]
+    assert table['published_s'].tolist()[2] == 0.0
+    assert table['started_s'].notna().tolist() == [False, True, True]
+
+
+@pytest.mark.parametrize('kind', ['message', 'message and info', 'async', 'object'])
+def test_kinds_of_callbacks(kind):
+    seen = []
+
+    def with_message(message):
+        seen.append(message)
+
+    def with_info(message, info):
+        assert info['source_timestamp'] > 0
+        seen.append(message)
+
+    async def as_coroutine(message):
+        seen.append(message)
+
+    class Callable:
+        def __call__(self, message):
+            seen.append(message)
+
+    with ros_session() as session:
+        talker, listener = Talker(3), Listener()
+        listener.subscription.callback = {
+            'message': with_message,
+            'message and info': with_info,
+            'async': as_coroutine,
+            'object': Callable(),
+        }[kind]
+        recording = Recording(talker.publisher, listener.subscription)
+        spin(session, talker, listener)
+        recording.wait_until_complete(3, LIMIT_S)
+    assert [message.data for message in seen] == [f'Hello World: {i}' for i in range(3)]
+    assert recording.table()[TIMES].notna().all(axis=None)
+
+
+def test_publish_by_keyword():
+    with ros_session():
+        talker, listener = Talker(1), Listener()
+        recording = Recording(talker.publisher, listener.subscription)
+        talker.publisher.publish(msg=String(data='0'))
+    assert recording.published == 1
+
+
+def test_sequence_of_other_messages():
+    with ros_session() as session:
+        talker, listener = Talker(1), Listener()
+        publisher = talker.create_publisher(Imu, 'imu', 10)
+        subscription = listener.create_subscription(Imu, 'imu', lambda message: None, 10)
+        recording = Recording(
+            publisher, subscription, sequence=lambda message: message.header.stamp.sec
+        )
+        spin(session, listener)
+        for second in (40, 41):
+            message = Imu()
+            message.header.stamp.sec = second
+            publisher.publish(message)
+        recording.wait_until_complete(2, LIMIT_S)
+    assert recording.table()['seq'].tolist() == [40, 41]
+
+
+@pytest.mark.parametrize('message', [String(data='Hello World'), Imu()], ids=['text', 'no data'])
+def test_message_without_a_number(message):
+    recording = Recording(publisher := Publisher(), Subscription(lambda message: 0))
+    with pytest.raises(ValueError, match='sequence'):
+        publisher.publish(message)
+    assert recording.published == 0
+
+
+@pytest.mark.parametrize('what', ['published', 'heard'])
+def test_same_number_twice(what):
+    recording = Recording(publisher := Publisher(), subscription := Subscription(lambda message: 0))
+    for _ in range(2):
+        publisher.publish(Int64(data=7)) if what == 'published' else None
+        subscription.callback(Int64(data=7)) if what == 'heard' else None
+    with pytest.raises(ValueError, match=f'^The number 7 was {what} twice: give every message'):
+        recording.table()
+
+
+@pytest.mark.parametrize('threads', [1, 2])
+def test_failure_in_a_callback(threads):
+    def fail(message):
+        raise ZeroDivisionError('in the callback')
+
+    recordings = []
+    with pytest.raises(ZeroDivisionError), ros_session() as session:
+        talker, listener = Talker(1), Listener(fail)
+        recordings.append(Recording(talker.publisher, listener.subscription))
+        spin(session, listener, threads=threads)
+        spin(session, talker)
+        started = time.monotonic()
+        recordings[0].wait_until_complete(2, timeout_s=LIMIT_S)
+    assert time.monotonic() - started < LIMIT_S / 2
+    assert recordings[0].table()['finished_s'].notna().all()
+
+
+@pytest.mark.parametrize('messages', [0, -1, 1.0, True, '3', None])
+def test_bad_count(messages):
+    with ros_session():
+        talker, listener = Talker(1), Listener()
+        recording = Recording(talker.publisher, listener.subscription)
+        with pytest.raises((TypeError, ValueError), match='messages must be a whole number from 1'):
+            recording.wait_until_complete(messages)
+
+
+@pytest.mark.parametrize('spun', [True, False])
+def test_messages_that_do_not_come(spun):
+    with ros_session() as session:
+        talker, listener = Talker(2), Listener()
+        recording = Recording(talker.publisher, listener.subscription)
+        if spun:
+            spin(session, talker, listener)  # publishes only 2
+        else:
+            for _ in range(3):
+                talker.publish()
+        with pytest.raises(TimeoutError, match=r'Waited 0\.3 s in vain'):
+            recording.wait_until_complete(3, timeout_s=0.3)
+
+
+def test_wait_outside_a_session():
+    with ros_session():
+        talker, listener = Talker(1), Listener()
+        recording = Recording(talker.publisher, listener.subscription)
+    with pytest.raises(RuntimeError, match='No session is open'):
+        recording.wait_until_complete(1)
+
+
+class Publisher:
+    """Costs nothing, so that the cost of the record is what is measured."""
+
+    def publish(self, msg):
+        pass
+
+
+class Subscription(SimpleNamespace):
+    def __init__(self, callback):
+        super().__init__(callback=callback)
+
+
+def cost_s(function, argument, calls=500):
+    """The cheapest of many batches: what the function itself costs on a busy machine too."""
+    batches = []
+    for _ in range(40):
+        started = time.perf_counter()
+        for _ in range(calls):
+            function(argument)
+        batches.append((time.perf_counter() - started) / calls)
+    return min(batches)
+
+
+@pytest.mark.parametrize('message', [String(data='Hello World: 1234'), Int64(data=1234)])
+def test_cost_of_a_record(message):
+    publisher, subscription = Publisher(), Subscription(lambda message: None)
+    plain = cost_s(publisher.publish, message), cost_s(subscription.callback, message)
+    Recording(publisher, subscription)
+    recorded = cost_s(publisher.publish, message), cost_s(subscription.callback, message)
+    costs = np.subtract(recorded, plain)
+    assert (costs > 0).all()
+    assert (costs <= 5e-6).all()
+
+
+# check_table
+
+GOOD = pd.DataFrame(
+    {'seq': [0, 1], 'published_s': [0.0, 1.0], 'started_s': [0.1, np.nan]}
+    | {'finished_s': [0.2, np.nan], 'thread': ['worker 1', None]}
+)
+
+
+@pytest.mark.parametrize(
+    ('table', 'error', 'said'),
+    [
+        (None, TypeError, 'A table of messages is needed (a DataFrame), not NoneType.'),
+        ([1, 2], TypeError, 'A table of messages is needed (a DataFrame), not list.'),
+        (GOOD.drop(columns=['seq']), ValueError, 'The table lacks the column(s) seq.'),
+        (
+            GOOD.drop(columns=['started_s', 'thread']),
+            ValueError,
+            'The table lacks the column(s) started_s, thread.',
+        ),
+        (
+            pd.concat([GOOD, GOOD[['seq']]], axis=1),
+            ValueError,
+            'The table has the column(s) seq more than once.',
+        ),
+        (GOOD.iloc[:0], ValueError, 'The table is empty: record at least one message.'),
+        (pd.concat([GOOD, GOOD]), ValueError, 'The message 0 has more than one row.'),
+        (
+            GOOD.assign(published_s=[0.0, np.nan]),
+            ValueError,
+            'It is not known when message 1 was published.',
+        ),
+    ],
+)
+def test_bad_table(table, error, said):
+    with pytest.raises(error) as failure:
+        check_table(table)
+    assert str(failure.value) == said
+
+
+def test_good_table_with_more_columns():
+    check_table(GOOD.assign(note='more is no harm'))

@@ -1,0 +1,720 @@
+import contextlib
+import gc
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+import traceback
+import warnings
+
+import pytest
+import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.exceptions import InvalidHandle, InvalidNodeNameException
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.node import Node
+from ros_nodes import LIMIT_S, Gate, Listener, Talker, spin
+from std_msgs.msg import String
+
+from helpers import session as module
+from helpers.session import configure_discovery, current_session, reserve_domain_id, ros_session
+
+EXECUTORS = pytest.mark.parametrize('threads', [1, 3], ids=['single', 'multi'])
+
+
+def start_python(script, **environment):
+    """Start a Python process. A variable whose value is None is removed from its environment."""
+    here = os.path.dirname(__file__)  # ros_nodes
+    variables = {**os.environ, 'PYTHONPATH': here, **environment}
+    return subprocess.Popen(
+        [sys.executable, '-c', textwrap.dedent(script)],
+        env={name: value for name, value in variables.items() if value is not None},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@contextlib.contextmanager
+def running(*arguments, **environment):
+    process = start_python(*arguments, **environment)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def run_python(script, **environment):
+    """Run a script that must succeed without a word on stderr, and return its stdout."""
+    with running(script, **environment) as process:
+        out, err = process.communicate(timeout=3 * LIMIT_S)
+    assert (process.returncode, err) == (0, '')
+    return out
+
+
+def wait_for(predicate):
+    limit = time.monotonic() + LIMIT_S
+    pause = threading.Event()
+    while not predicate():
+        assert time.monotonic() < limit
+        pause.wait(0.01)
+
+
+def python_threads():
+    return set(threading.enumerate())
+
+
+def os_threads():
+    return len(os.listdir('/proc/self/task'))
+
+
+def destroyed(node):
+    try:
+        with node.handle:
+            return False
+    except InvalidHandle:
+        return True
+
+
+def talk():
+    """Open a session in which one message arrives: sessions work in this process."""
+    with ros_session() as session:
+        talker, listener = Talker(1), Listener()
+        spin(session, talker, listener)
+        session.wait_until(lambda: listener.heard, LIMIT_S)
+    assert listener.heard == ['Hello World: 0']
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind():
+    """Every test here must leave no session, no context and no thread."""
+    before = python_threads()
+    yield
+    assert module._open_session is None
+    assert not rclpy.ok()
+    assert python_threads() <= before
+
+
+# Opening
+
+
+def test_domain_of_its_own():
+    domains = []
+    for _ in range(2):
+        with ros_session():
+            domains.append(rclpy.get_default_context().get_domain_id())
+    assert domains == [reserve_domain_id()] * 2
+    assert 1 <= domains[0] <= 100
+    elsewhere = run_python("""
+        import rclpy
+        from helpers.session import ros_session
+        with ros_session():
+            print(rclpy.get_default_context().get_domain_id())
+    """)
+    assert 1 <= int(elsewhere) <= 100
+    assert int(elsewhere) != domains[0]
+
+
+def test_no_domain_left():
+    # The real reservation, in a range of ports that no other process of this machine needs.
+    said = run_python("""
+        import contextlib, socket
+        import domain_coordinator.impl
+        domain_coordinator.impl.PORT_BASE = 21000
+        sockets = [socket.socket() for _ in range(100)]
+        for number, taken in enumerate(sockets, 1):
+            with contextlib.suppress(OSError):
+                taken.bind(('', 21000 + number))
+        from helpers.session import ros_session
+        try:
+            ros_session().open()
+        except RuntimeError as error:
+            print(error)
+        sockets[41].close()
+        with ros_session():
+            print('open')
+    """)
+    assert said.splitlines() == [
+        'All 100 ROS domain ids of this machine are in use: '
+        'shut down the kernels that you no longer need, then run this cell again.',
+        'open',
+    ]
+
+
+def test_discovery_stays_on_this_machine(monkeypatch):
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
+    monkeypatch.setenv('ROS_LOCALHOST_ONLY', '0')
+    monkeypatch.setenv('ROS_STATIC_PEERS', '192.0.2.1')
+    with ros_session():
+        assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+        assert not {'ROS_LOCALHOST_ONLY', 'ROS_STATIC_PEERS'} & os.environ.keys()
+    configure_discovery()  # also where nothing is to be removed
+
+
+def test_processes_do_not_hear_each_other():
+    other = """
+        import sys, rclpy
+        from helpers.session import configure_discovery, ros_session
+        from rclpy.node import Node
+        from std_msgs.msg import String
+        name, domain = {name!r}, {domain}
+        session = ros_session().open() if domain is None else None
+        if session is None:
+            configure_discovery()
+            rclpy.init(domain_id=domain)
+        node = Node(name)
+        publisher = node.create_publisher(String, 'topic', 10)
+        node.create_timer(0.02, lambda: publisher.publish(String(data=name)))
+        print('talking', flush=True)
+        rclpy.spin(node)
+    """
+    with ros_session() as session:
+        listener = Listener()
+        spin(session, listener)
+        domain = rclpy.get_default_context().get_domain_id()
+        with running(other.format(name='stranger', domain=None)) as stranger:
+            assert stranger.stdout.readline() == 'talking\n'
+            # The guest, who talks in our domain, is heard although it began later.
+            with running(other.format(name='guest', domain=domain)):
+                session.wait_until(lambda: len(listener.heard) >= 25, LIMIT_S)
+            assert stranger.poll() is None
+        assert set(listener.heard) == {'guest'}
+
+
+def test_open_twice():
+    with ros_session() as session, pytest.raises(RuntimeError, match='A session opens once'):
+        session.open()
+    with pytest.raises(RuntimeError, match='A session opens once'):
+        session.open()
+
+
+def test_current_session():
+    with pytest.raises(RuntimeError, match='No session is open'):
+        current_session()
+    with ros_session() as session:
+        assert current_session() is session
+
+
+def test_bare_init_of_the_notebook_is_replaced():
+    configure_discovery()
+    rclpy.init(domain_id=reserve_domain_id())
+    talk()
+
+
+def test_no_rclpy():
+    said = run_python("""
+        import sys
+        sys.modules['rclpy'] = None  # as if it were not installed
+        try:
+            import helpers.session
+        except ImportError as error:
+            print(error)
+    """)
+    assert said.startswith('rclpy cannot be imported in this Python')
+    assert 'make lab' in said
+    assert said.count('\n') == 1
+
+
+# Spinning
+
+
+@EXECUTORS
+def test_spin(threads):
+    with ros_session() as session:
+        talker, listener = Talker(5), Listener()
+        executor = spin(session, talker, listener, threads=threads)
+        assert executor.context is rclpy.get_default_context()
+        session.wait_until(lambda: len(listener.heard) == 5, LIMIT_S)
+    assert listener.heard == [f'Hello World: {i}' for i in range(5)]
+
+
+@pytest.mark.parametrize('wrong', ['x', None, SingleThreadedExecutor, 4])
+def test_spin_no_executor(wrong):
+    with ros_session() as session, pytest.raises(TypeError, match='session.spin needs an executor'):
+        session.spin(wrong)
+
+
+def test_spin_twice():
+    with ros_session() as session:
+        executor = spin(session)
+        with pytest.raises(ValueError, match='This executor spins already'):
+            session.spin(executor)
+
+
+def test_spin_executor_of_another_session():
+    with ros_session():
+        executor = SingleThreadedExecutor()
+    with ros_session() as session, pytest.raises(ValueError, match='belongs to another session'):
+        session.spin(executor)
+
+
+def test_spin_outside():
+    session = ros_session()
+    with ros_session():
+        executor = SingleThreadedExecutor()
+        with pytest.raises(RuntimeError, match='This session is not open'):
+            session.spin(executor)
+    with session:
+        executor = SingleThreadedExecutor()
+    with pytest.raises(RuntimeError, match='This session is not open'):
+        session.spin(executor)
+
+
+def test_wait_until_gives_up():
+    with ros_session() as session:
+        started = time.monotonic()
+        with pytest.raises(TimeoutError, match=r'Waited 0\.2 s in vain'):
+            session.wait_until(lambda: False, timeout_s=0.2)
+        assert time.monotonic() - started >= 0.2
+
+
+# Leaving
+
+
+@EXECUTORS
+@pytest.mark.parametrize('body_fails', [False, True])
+def test_nothing_is_left(threads, body_fails):
+    talk()  # what a process starts only once has been started
+    before, os_before = python_threads(), os_threads()
+    with (
+        pytest.raises(KeyError) if body_fails else contextlib.nullcontext(),
+        ros_session() as session,
+    ):
+        talker, listener, never_added = Talker(3), Listener(), Node('never_added')
+        already_destroyed = Node('already_destroyed')
+        already_destroyed.destroy_node()
+        context = rclpy.get_default_context()
+        spin(session, talker)
+        spin(session, listener, threads=threads)
+        session.wait_until(lambda: len(listener.heard) == 3, LIMIT_S)
+        assert python_threads() > before
+        assert os_threads() > os_before
+        assert not destroyed(never_added)
+        if body_fails:
+            raise KeyError('a mistake in the cell')
+    assert python_threads() == before
+    assert [node for node in (talker, listener, never_added) if not destroyed(node)] == []
+    assert not context.ok()
+    wait_for(lambda: os_threads() <= os_before)
+    talk()
+
+
+@EXECUTORS
+def test_session_that_was_never_closed(threads):
+    before = python_threads()
+    forgotten = ros_session().open()
+    context, talker = rclpy.get_default_context(), Talker(10**6)
+    spin(forgotten, talker, threads=threads)
+    talk()
+    assert destroyed(talker)
+    assert not context.ok()
+    assert python_threads() == before
+    forgotten.close()  # has nothing to do
+
+
+@EXECUTORS
+def test_session_that_is_open_when_python_ends(threads):
+    started = time.monotonic()
+    said = run_python(f"""
+        from ros_nodes import Listener, Talker, spin
+        from helpers.session import ros_session
+        session = ros_session().open()
+        talker, listener = Talker(10**6, period_s=0.001), Listener()
+        spin(session, talker, listener, threads={threads})
+        session.wait_until(lambda: listener.heard)
+        talker.get_logger().warning('printed by nobody')
+        print('end')
+    """)
+    assert said == 'end\n'
+    assert time.monotonic() - started < LIMIT_S
+
+
+def test_held_callback_does_not_keep_python_from_ending():
+    run_python("""
+        import threading
+        from ros_nodes import Listener, Talker, spin
+        from helpers import session as module
+        module.CLOSE_TIMEOUT_S = 0.2
+        session = module.ros_session().open()
+        listener = Listener(lambda message: threading.Event().wait())
+        spin(session, Talker(1), listener)
+        session.wait_until(lambda: listener.heard)
+    """)
+
+
+@pytest.mark.parametrize('threads', [2, 4])
+@pytest.mark.parametrize('default_event_callbacks', [True, False])
+def test_saturated_reentrant_group(threads, default_event_callbacks):
+    def saturate():
+        inside = []
+
+        def callback(message):
+            inside.append(message)
+            wait_for(lambda: session._executors[0]._executor._shutdown)  # the session closes
+
+        with ros_session() as session:
+            listener = Listener(
+                callback,
+                callback_group=ReentrantCallbackGroup(),
+                event_callbacks=SubscriptionEventCallbacks(
+                    use_default_callbacks=default_event_callbacks
+                ),
+            )
+            # Published beforehand: such a group takes the CPU away from a talker that spins.
+            talker = Talker(20)
+            for _ in range(20):
+                talker.publish()
+            executor = spin(session, listener, threads=threads)
+            session.wait_until(lambda: len(inside) == threads, LIMIT_S)
+            session.wait_until(lambda: executor._executor._work_queue.qsize(), LIMIT_S)
+        assert destroyed(listener)
+        assert len(inside) == threads
+
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter('always')
+        saturate()
+        gc.collect()
+    # A handler that rclpy had made and that never ran would warn here.
+    assert [str(warning.message) for warning in warned] == []
+
+
+@EXECUTORS
+def test_callback_that_does_not_end(threads, monkeypatch):
+    monkeypatch.setattr(module, 'CLOSE_TIMEOUT_S', 0.3)
+    gate, before = Gate(), python_threads()
+    started = None
+    with (
+        pytest.raises(RuntimeError, match=r'1 callback\(s\) did not end within 0\.3 s'),
+        ros_session() as session,
+    ):
+        context, listener, talker = rclpy.get_default_context(), Listener(gate), Talker(1)
+        spin(session, talker)
+        spin(session, listener, threads=threads)
+        session.wait_until(lambda: gate.inside == 1, LIMIT_S)
+        started = time.monotonic()
+    assert 0.3 <= time.monotonic() - started < 0.3 + 2.0
+    assert not context.ok()
+    assert destroyed(talker)
+    talk()
+    gate.open()
+    wait_for(lambda: python_threads() == before)
+
+
+# Failures
+
+
+def failing_callback(message):
+    raise ZeroDivisionError('in the callback')
+
+
+def frames(failure):
+    return [frame.name for frame in traceback.extract_tb(failure.__traceback__)]
+
+
+@EXECUTORS
+def test_callback_failure_is_raised_at_the_end(threads):
+    # One message, then nothing: a MultiThreadedExecutor alone would never raise.
+    done = threading.Event()
+
+    def callback(message):
+        done.set()
+        failing_callback(message)
+
+    with pytest.raises(ZeroDivisionError) as failure, ros_session() as session:
+        spin(session, Listener(callback), threads=threads)
+        talker = Talker(1)
+        spin(session, talker)
+        assert done.wait(LIMIT_S)
+    assert 'failing_callback' in frames(failure.value)
+    assert destroyed(talker)
+    talk()
+
+
+@EXECUTORS
+def test_callback_failure_while_the_session_closes(threads):
+    begun = threading.Event()
+
+    def callback(message):
+        begun.set()
+        wait_for(session._stop.done)
+        failing_callback(message)
+
+    with pytest.raises(ZeroDivisionError) as failure, ros_session() as session:
+        spin(session, Listener(callback), threads=threads)
+        spin(session, Talker(1))
+        assert begun.wait(LIMIT_S)
+    assert 'failing_callback' in frames(failure.value)
+
+
+@EXECUTORS
+def test_first_callback_failure_is_raised(threads):
+    def callback(message):
+        raise ValueError(message.data)
+
+    with (
+        pytest.raises(ValueError, match='^Hello World: 0$'),
+        ros_session() as session,
+    ):
+        talker, listener = Talker(20), Listener(callback, depth=20)
+        spin(session, listener, threads=threads)
+        spin(session, talker)
+        wait_for(lambda: talker.next_number == 20)
+
+
+@EXECUTORS
+def test_wait_until_raises_a_callback_failure_at_once(threads):
+    with pytest.raises(ZeroDivisionError) as failure, ros_session() as session:
+        spin(session, Listener(failing_callback), threads=threads)
+        spin(session, Talker(1))
+        started = time.monotonic()
+        try:
+            session.wait_until(lambda: False, timeout_s=LIMIT_S)
+        finally:
+            assert time.monotonic() - started < LIMIT_S / 2
+    assert 'failing_callback' in frames(failure.value)
+    assert not hasattr(failure.value, '__notes__')
+
+
+@EXECUTORS
+def test_failure_of_the_body_comes_first(threads):
+    done = threading.Event()
+
+    def callback(message):
+        done.set()
+        failing_callback(message)
+
+    with pytest.raises(KeyError) as failure, ros_session() as session:
+        spin(session, Listener(callback), threads=threads)
+        spin(session, Talker(1))
+        assert done.wait(LIMIT_S)
+        raise KeyError('a mistake in the cell')
+    assert failure.value.__notes__ == [
+        "While the session closed: ZeroDivisionError('in the callback')"
+    ]
+
+
+@EXECUTORS
+def test_shutdown_by_the_cell_is_no_failure(threads):
+    with ros_session() as session:
+        spin(session, Listener(), threads=threads)
+        rclpy.shutdown()
+        wait_for(lambda: not session._spin_threads[0].is_alive())
+
+
+class HalfMade(Node):
+    def __init__(self):
+        self.publisher = self.create_publisher(String, 'topic', 10)  # before super().__init__()
+
+
+class Undestroyable(Node):
+    def destroy_node(self):
+        raise ValueError('a mistake in destroy_node')
+
+
+@pytest.mark.parametrize(
+    ('make', 'error'),
+    [
+        (lambda: Node('not a name'), InvalidNodeNameException),
+        (HalfMade, AttributeError),
+        (lambda: Node('node', parameter_overrides='wrong'), AttributeError),
+    ],
+    ids=['bad name', 'no super', 'bad parameters'],
+)
+@pytest.mark.filterwarnings('ignore:Failed to fini rosout publisher')  # rclpy's own
+def test_node_that_could_not_be_made(make, error):
+    with pytest.raises(error) as failure, ros_session():
+        complete = Node('complete')
+        make()
+    # `failure` keeps the half-made node alive, as the notebook does that shows the traceback.
+    assert not hasattr(failure.value, '__notes__')
+    assert destroyed(complete)
+    talk()
+
+
+def test_node_that_cannot_be_destroyed():
+    with ros_session():
+        nodes = [Node('one'), Undestroyable('two'), Node('three')]
+        context = rclpy.get_default_context()
+    assert not context.ok()
+    assert [destroyed(node) for node in nodes] == [True, False, True]
+    Node.destroy_node(nodes[1])
+    talk()
+
+
+# Interrupts
+
+
+@pytest.mark.parametrize('wait', ['session.wait_until(lambda: False)', 'threading.Event().wait()'])
+def test_interrupt(wait):
+    with running(f"""
+        import threading
+        import rclpy
+        from ros_nodes import Listener, Talker, spin
+        from helpers.session import ros_session
+
+        for turn in ('first', 'second'):
+            try:
+                with ros_session() as session:
+                    talker, listener = Talker(10**6), Listener()
+                    spin(session, talker, listener)
+                    session.wait_until(lambda: listener.heard)
+                    print(turn, 'ready', flush=True)
+                    try:
+                        {wait}
+                    except KeyboardInterrupt:
+                        # Nothing but the cell was interrupted: the nodes go on.
+                        heard = len(listener.heard)
+                        session.wait_until(lambda: len(listener.heard) > heard + 20)
+                        raise
+            except KeyboardInterrupt:
+                print(turn, rclpy.ok(), threading.active_count(), flush=True)
+    """) as process:
+        for turn in ('first', 'second'):
+            assert process.stdout.readline() == f'{turn} ready\n'
+            process.send_signal(signal.SIGINT)
+            assert process.stdout.readline() == f'{turn} False 1\n'
+        out, err = process.communicate(timeout=LIMIT_S)
+    assert (process.returncode, out, err) == (0, '', '')
+
+
+def interrupt_once(monkeypatch, thing, name):
+    """Replace a function by one that is interrupted when it is called first."""
+    original = getattr(thing, name)
+
+    def interrupted(*arguments, **options):
+        monkeypatch.setattr(thing, name, original)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(thing, name, interrupted)
+
+
+@pytest.mark.parametrize(
+    ('thing', 'name'),
+    [
+        (threading.Thread, 'join'),
+        (MultiThreadedExecutor, 'shutdown'),
+        (module.Session, 'log'),
+        (Node, 'destroy_node'),
+        (rclpy, 'try_shutdown'),
+    ],
+)
+def test_interrupt_of_close(thing, name, monkeypatch):
+    before = python_threads()
+    with pytest.raises(KeyboardInterrupt), ros_session() as session:
+        context, talker, listener = rclpy.get_default_context(), Talker(10**6), Listener()
+        spin(session, talker, listener, threads=2)
+        session.wait_until(lambda: listener.heard, LIMIT_S)
+        interrupt_once(monkeypatch, thing, name)
+    assert not context.ok()
+    assert destroyed(talker)
+    assert destroyed(listener)
+    assert python_threads() == before
+    talk()
+
+
+@pytest.mark.parametrize(
+    ('thing', 'name'),
+    [
+        (module, 'reserve_domain_id'),
+        (rclpy, 'get_default_context'),
+        (module, 'Node'),
+        (module, 'QoSProfile'),
+        (Node, 'get_logger'),
+    ],
+)
+def test_interrupt_of_open(thing, name, monkeypatch):
+    with pytest.raises(KeyboardInterrupt):
+        interrupt_once(monkeypatch, thing, name)
+        ros_session().open()
+    talk()
+
+
+# The log
+
+
+def test_log(capsys):
+    with ros_session() as session:
+        talker, listener = Node('minimal_publisher'), Node('minimal_subscriber')
+        for i in range(3):
+            talker.get_logger().info(f'Publishing: "{i}"')
+        listener.get_logger().info('I heard: "Hello World: 7"')
+        session.print_log('minimal_subscriber')
+        session.print_log()
+        session.print_log()
+        talker.get_logger().error('late')
+        talker.get_logger().debug('not shown by default')
+        talker.destroy_node()
+        session.print_log('minimal_publisher')
+    session.print_log()
+    assert capsys.readouterr() == (
+        '[INFO] [minimal_subscriber]: I heard: "Hello World: 7"\n'
+        '[INFO] [minimal_publisher]: Publishing: "0"\n'
+        '[INFO] [minimal_publisher]: Publishing: "1"\n'
+        '[INFO] [minimal_publisher]: Publishing: "2"\n'
+        '[ERROR] [minimal_publisher]: late\n',
+        '',
+    )
+    assert [record.text for record in session.log('minimal_publisher')] == [
+        'Publishing: "0"',
+        'Publishing: "1"',
+        'Publishing: "2"',
+        'late',
+    ]
+    assert len(session.log()) == 5
+
+
+def test_warnings_are_printed_at_the_end(capsys):
+    with ros_session() as session:
+        node = Node('node')
+        logger = node.get_logger()
+        logger.info('an info')
+        logger.warning('printed by the cell')
+        session.print_log()
+        logger.info('another info')
+        logger.warning('a warning')
+        logger.fatal('the end')
+        assert capsys.readouterr().out == (
+            '[INFO] [node]: an info\n[WARN] [node]: printed by the cell\n'
+        )
+    assert capsys.readouterr() == ('[WARN] [node]: a warning\n[FATAL] [node]: the end\n', '')
+    session.print_log()
+    assert capsys.readouterr().out == '[INFO] [node]: another info\n'
+
+
+def test_log_keeps_a_long_run():
+    # More than the 1000 records that a publisher of /rosout keeps.
+    with ros_session() as session:
+        node = Node('node')
+        logger = node.get_logger()
+        for i in range(3000):
+            logger.info(str(i))
+    assert [record.text for record in session.log('node')] == [str(i) for i in range(3000)]
+
+
+def test_log_of_a_process(tmp_path):
+    """Nothing but what the cell prints arrives at the pipes, and no home is needed."""
+    said = run_python(
+        """
+        from ros_nodes import Listener, Talker, spin
+        from helpers.session import ros_session
+        with ros_session() as session:
+            talker = Talker(3)
+            listener = Listener(lambda message: talker.get_logger().info(message.data))
+            spin(session, talker, listener)
+            session.wait_until(lambda: len(listener.heard) == 3)
+        session.print_log()
+        """,
+        HOME='/proc/nobody',
+        ROS_HOME=None,
+        ROS_LOG_DIR=None,
+        RCUTILS_LOGGING_USE_STDOUT=None,
+        RCUTILS_COLORIZED_OUTPUT=None,
+        RCUTILS_CONSOLE_OUTPUT_FORMAT=None,
+    )
+    assert said.splitlines() == [f'[INFO] [minimal_publisher]: Hello World: {i}' for i in range(3)]
