@@ -18,8 +18,8 @@ lint: set_up ## ruff: style and format of modules and notebooks
 lock: set_up ## write requirements.lock from pyproject.toml; UPGRADE=yes takes newer versions
 	@tools/lock.sh .venv/bin/uv $(if $(filter yes,$(UPGRADE)),--upgrade)
 
-clean: ## remove the environment, JupyterLab's state and caches
-	rm -rf .venv .jupyter .hypothesis .pytest_cache .ruff_cache
+clean: ## remove the environment, JupyterLab's state, caches and what lessons built
+	rm -rf .venv .jupyter scratch .hypothesis .pytest_cache .ruff_cache
 	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
 set_up:

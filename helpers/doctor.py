@@ -7,6 +7,7 @@ It runs on any Python and with any installation of ROS 2, also with none.
 from __future__ import annotations
 
 import importlib.metadata
+import importlib.util
 import os
 import platform
 import re
@@ -241,6 +242,14 @@ def check_python_headers() -> Check:
     return Check('Python headers', f'none for Python {version}', to_do, required=False)
 
 
+def check_colcon() -> Check:
+    """Check that colcon is installed in this environment."""
+    if importlib.util.find_spec('colcon_core'):
+        return Check('colcon', _version('colcon-core'), required=False)
+    to_do = 'for lessons 06 to 09 run `python -m pip install colcon-common-extensions`'
+    return Check('colcon', 'none', to_do, required=False)
+
+
 def check_browser() -> Check:
     """Look for a web browser on this machine."""
     for name in BROWSERS:
@@ -268,6 +277,7 @@ def checks() -> list[Check]:
         *on_ros,
         check_shared_memory(),
         check_stale_segments(),
+        check_colcon(),
         check_compiler(),
         check_cmake(),
         check_python_headers(),

@@ -2,7 +2,8 @@
 
 Every function takes tables as `recording` and `queue_model` make them: one row a message, columns
 `seq`, `published_s`, `started_s`, `finished_s`, `thread`. A table describes a finished run: a
-message that was never heard counts as lost. Bad input raises before anything is drawn.
+message that was never heard counts as lost. `interface_tree` takes the tables of `interfaces`. Bad
+input raises before anything is drawn.
 
 The colours are those of Okabe and Ito ("Color Universal Design", 2008), which people with any kind
 of colour vision can tell apart. No meaning hangs on a colour alone: the shape differs too.
@@ -13,6 +14,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from itertools import cycle
 from numbers import Integral, Real
 
 import matplotlib.pyplot as plt
@@ -20,6 +22,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
@@ -33,9 +36,12 @@ LIMIT = '#222222'
 # One colour and one hatch a callback group. Light enough for black numbers on top.
 GROUP_COLOURS = ('#56B4E9', '#E69F00', '#009E73', '#CC79A7', '#F0E442')
 GROUP_HATCHES = ('', '//', '..', '\\\\', 'xx')
+# The shapes of the packages. They are four and the colours five: the pairs repeat after twenty.
+TREE_MARKERS = 'osD^'
 
 SMALL, NORMAL, LARGE = 12, 13, 15  # font sizes in points, readable from the last row of a room
 SIZE, WIDE = (9, 4), (11, 4.4)  # inches
+CHARACTER = 0.1 / SIZE[0]  # the width of one in SMALL, a part of the figure's
 DPI = 110
 MOST_SEQ_LABELS, MOST_GAP_LABELS, MOST_BAR_LABELS = 25, 15, 300
 TIME_LABEL = 'time since the first publish (s)'
@@ -318,6 +324,62 @@ def topic_graph(endpoints: pd.DataFrame, title: str | None = None) -> Axes:
     return ax
 
 
+def interface_tree(table: pd.DataFrame, title: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the tree of an interface's fields: one line a field, its type, one mark a package.
+
+    `table` is what `interfaces.dependencies` returns: columns `depth`, `field`, `type`, `package`
+    and `array`, one row a field, each followed by the fields of its type. The first row is the
+    interface itself. A new figure is as high as the tree needs.
+
+    Raises TypeError or ValueError for a bad table.
+    """
+    table = _checked_tree(table)
+    # Inches: a line of text with some space for each row, and room for the title and the legend.
+    ax = _axes(ax, height=0.27 * len(table) + 1.0)
+    packages = dict.fromkeys(p for p in table.package if p)
+    styles = {
+        package: {'color': colour, 'marker': marker}
+        for package, colour, marker in zip(
+            packages, cycle(GROUP_COLOURS), cycle(TREE_MARKERS), strict=False
+        )
+    }
+    styles[''] = {'color': PUBLISHED, 'marker': '.'}
+    parents = []  # the row number of the open branch at each depth
+    # The width in steps of the depth: each name must end before the column of the types.
+    types = (table.type + table.array).str.len().max() * CHARACTER
+    names = table.field.str.len() * CHARACTER
+    width = max(8, ((table.depth + 1) / (1 - types - names).clip(lower=0.2)).max())
+    column = (table.depth + 1 + names * width).max()
+    for number, row in enumerate(table.itertuples()):
+        parents[row.depth :] = [number]
+        if row.depth:
+            parent = row.depth - 1
+            x, y = (parent, parent, row.depth), (parents[parent], number, number)
+            ax.plot(x, y, color='#cfd6db', lw=1.2, zorder=1)
+        ax.plot(
+            row.depth, number, ls='none', ms=9, markeredgecolor='#555555', **styles[row.package]
+        )
+        ax.text(row.depth + 0.3, number, row.field, fontsize=SMALL, va='center')
+        ax.text(
+            column, number, row.type + row.array, fontsize=SMALL, va='center',
+            color='black' if row.package else '#555555',
+        )  # fmt: skip
+    ax.set_xlim(-0.4, width)
+    ax.set_ylim(len(table) - 0.4, -0.6)
+    ax.set_axis_off()
+    ax.set_title(title or f'{table.type[0]}: fields and their types', fontsize=LARGE, loc='left')
+    handles = [
+        Line2D([], [], ls='none', ms=9, markeredgecolor='#555555', label=package or 'primitive',
+               **styles[package])
+        for package in [*packages, *({''} & {*table.package})]
+    ]  # fmt: skip
+    ax.legend(
+        handles=handles, fontsize=SMALL, ncols=3, loc='upper left', bbox_to_anchor=(0, 0),
+        frameon=False,
+    )  # fmt: skip
+    return ax
+
+
 def _checked(table: pd.DataFrame) -> pd.DataFrame:
     """Return the table in the order of publishing, or raise."""
     check_table(table)
@@ -489,6 +551,25 @@ def _label_bars(ax: Axes, bars: pd.DataFrame, lane: Mapping[str, int]) -> None:
         (left, _), (right, _) = ax.transData.transform([(left, 0), (right, 0)])
         if text.get_window_extent().width > 0.95 * (right - left):
             text.remove()
+
+
+def _checked_tree(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the tree as it is meant, or raise."""
+    columns = ['depth', 'field', 'type', 'package', 'array']
+    if not isinstance(table, pd.DataFrame):
+        raise TypeError(f'The tree must be a DataFrame, not {type(table).__name__}.')
+    if list(table.columns) != columns:
+        raise ValueError(
+            f'The tree must have the columns {", ".join(columns)}, as interfaces.dependencies '
+            f'returns them, not {", ".join(map(str, table.columns))}.'
+        )
+    depth = table.depth.to_numpy()
+    if not len(depth) or depth[0] != 0 or (depth[1:] < 1).any() or (np.diff(depth) > 1).any():
+        raise ValueError(
+            'The tree must start with the interface at depth 0, and each row may be at most one '
+            'deeper than the row above it.'
+        )
+    return table.reset_index(drop=True)
 
 
 def _say(ax: Axes, text: str) -> None:

@@ -464,3 +464,73 @@ def test_import_changes_no_setting_and_needs_no_rclpy():
         '== {k: v for k, v in before.items() if k != "backend"}\n'
     )
     subprocess.run([sys.executable, '-c', code], check=True, timeout=60)
+
+
+# --- interface_tree ---
+
+TREE = pd.DataFrame(
+    [
+        (0, 'Shot', 'camera/msg/Shot', 'camera', ''),
+        (1, 'header', 'std_msgs/msg/Header', 'std_msgs', ''),
+        (2, 'frame_id', 'string', '', ''),
+        (1, 'data', 'uint8', '', '[<=9]'),
+    ],
+    columns=['depth', 'field', 'type', 'package', 'array'],
+)
+
+
+def test_interface_tree():
+    ax = plots.interface_tree(TREE)
+    texts = [text.get_text() for text in ax.texts]
+    assert texts == [
+        'Shot', 'camera/msg/Shot', 'header', 'std_msgs/msg/Header', 'frame_id', 'string', 'data',
+        'uint8[<=9]',
+    ]  # fmt: skip
+    # A mark a row at its depth, and from each but the first a line to the row it belongs to.
+    marks = [line.get_xydata().tolist() for line in ax.lines if len(line.get_xdata()) == 1]
+    assert marks == [[[0, 0]], [[1, 1]], [[2, 2]], [[1, 3]]]
+    branches = [line.get_xydata().tolist() for line in ax.lines if len(line.get_xdata()) == 3]
+    assert branches == [
+        [[0, 0], [0, 1], [1, 1]],
+        [[1, 1], [1, 2], [2, 2]],
+        [[0, 0], [0, 3], [1, 3]],
+    ]
+    legend = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert legend == ['camera', 'std_msgs', 'primitive']
+    looks = {
+        (line.get_marker(), line.get_color()) for line in ax.lines if len(line.get_xdata()) == 1
+    }
+    assert len({marker for marker, _ in looks}) == len(looks) == 3  # told by shape, not by colour
+
+
+def test_interface_tree_fits_its_figure():
+    names = [f'a_field_with_a_long_name_{n}' for n in range(30)]
+    types = [f'a_long_package_name_{n}/msg/ALongMessageName' for n in range(30)]
+    deep = pd.DataFrame(
+        {'depth': [0, *[1, 2, 3] * 9, 1, 2], 'field': names, 'type': types,
+         'package': [t.split('/')[0] for t in types], 'array': ''}
+    )  # fmt: skip
+    for table in (TREE, deep):
+        ax = plots.interface_tree(table)
+        ax.figure.draw_without_rendering()
+        rows = {round(text.get_window_extent().y0) for text in ax.texts}
+        assert len(rows) == len(table)
+        names = [text.get_window_extent() for text in ax.texts[::2]]
+        assert (
+            max(box.y1 - box.y0 for box in names) < 1.2 * np.diff(sorted(b.y0 for b in names)).min()
+        )
+
+
+@pytest.mark.parametrize(
+    ('tree', 'error', 'words'),
+    [
+        (None, TypeError, 'must be a DataFrame'),
+        (TREE.drop(columns='array'), ValueError, 'must have the columns depth, field'),
+        (TREE.iloc[:0], ValueError, 'must start with the interface'),
+        (TREE.iloc[1:], ValueError, 'must start with the interface'),
+        (TREE.assign(depth=[0, 2, 1, 1]), ValueError, 'at most one deeper'),
+    ],
+)
+def test_bad_trees(tree, error, words):
+    with pytest.raises(error, match=words):
+        plots.interface_tree(tree)

@@ -279,6 +279,17 @@ def test_set_up_from_nothing_then_only_what_changed(checkout):
     assert (second.returncode, second.stdout, second.stderr) == (0, '', '')
     assert checkout.stamp() == done, 'it did the work twice'
 
+    # What each ROS 2 wheel also holds: the metadata of another package with the same module.
+    folder = next((checkout.root / '.venv/lib').glob('python*/site-packages'))
+    old_format = folder / f'old_name-1.0-py{HERE}.egg-info'
+    old_format.mkdir()
+    (old_format / 'PKG-INFO').write_text('Metadata-Version: 2.1\nName: old-name\nVersion: 1.0\n')
+    (old_format / 'top_level.txt').write_text('iniconfig\n')
+    checkout.lock([*checkout.pins.values(), '# changed\n'])
+    changed = checkout.set_up()
+    assert changed.returncode == 0, changed.stderr
+    assert (folder / 'iniconfig/__init__.py').exists()
+
     checkout.lock(pin for name, pin in checkout.pins.items() if name != 'iniconfig')
     third = checkout.set_up()
     assert third.returncode == 0, third.stderr

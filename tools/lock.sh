@@ -10,16 +10,17 @@ shift
 new=.requirements.lock.new
 [ ! -f requirements.lock ] || cp requirements.lock "$new" # uv keeps the versions it finds here
 trap 'rm -f "$new" "$new.checked"' EXIT
+# empy has no wheel: tools/set_up.sh builds its one module.
 "$uv" pip compile pyproject.toml --all-extras --universal --python-version 3.11 \
-    --only-binary :all: --generate-hashes --no-annotate --no-header --no-emit-index-url \
-    --no-emit-find-links --quiet --output-file "$new" "$@" > /dev/null
+    --only-binary :all: --no-binary empy --generate-hashes --no-annotate --no-header \
+    --no-emit-index-url --no-emit-find-links --quiet --output-file "$new" "$@" > /dev/null
 
 # The lock fits several Pythons, but a package may lack the wheel of one. tools/set_up.sh reads the
 # result in the second line, and need not ask the package index.
 pythons=
 for python in 3.14 3.13 3.12 3.11; do
     if "$uv" pip compile "$new" --python-version "$python" --no-deps --only-binary :all: \
-        --python-platform x86_64-manylinux_2_28 --quiet --output-file "$new.checked" > /dev/null; then
+        --no-binary empy --python-platform x86_64-manylinux_2_28 --quiet --output-file "$new.checked" > /dev/null; then
         pythons="$pythons $python"
     else
         echo "Python $python lacks a wheel: left out." >&2

@@ -82,14 +82,15 @@ if [ ! -f "$stamp" ] || [ "$(head -n 2 "$stamp")" != "$have" ] || [ -z "$usable"
 fi
 rm -f "$stamp"
 
-# uv comes with its pinned hash from the same lock. pip is only there to fetch it.
-sed -n '/^uv==/,/[^\\]$/p' requirements.lock > .venv/uv.lock
-uv_version=$(sed -n 's/^uv==\([^ ]*\).*/\1/p' .venv/uv.lock)
+# uv comes with its pinned hash from the same lock, and setuptools, with which it builds empy. pip is
+# only there to fetch them.
+sed -n '/^uv==/,/[^\\]$/p; /^setuptools==/,/[^\\]$/p' requirements.lock > .venv/first.lock
+uv_version=$(sed -n 's/^uv==\([^ ]*\).*/\1/p' .venv/first.lock)
 case $(.venv/bin/uv --version 2> /dev/null) in
     "uv $uv_version" | "uv $uv_version "*) ;;
     *)
         .venv/bin/python -I -m pip install --quiet --disable-pip-version-check --no-user --no-deps \
-            --only-binary :all: --require-hashes --requirement .venv/uv.lock ||
+            --only-binary :all: --require-hashes --requirement .venv/first.lock ||
             fail 'pip could not install uv: check the network, or name your package index with PIP_INDEX_URL, then try again.'
         ;;
 esac
@@ -97,8 +98,14 @@ esac
 uv_reads_pip_settings
 quiet=
 [ -t 2 ] || quiet=--quiet
-say "Installing $(grep -c '^[a-z].*==' requirements.lock) packages, about 160 MB the first time"
-.venv/bin/uv pip sync $quiet $no_index --python .venv/bin/python --require-hashes --only-binary :all: requirements.lock ||
+# A ROS 2 wheel `ros-rclpy` also holds the metadata of an older format, of a package `rclpy`. uv would
+# take that for a package that is not in the lock, and remove rclpy.
+rm -rf .venv/lib/python*/site-packages/*.egg-info
+# Wheels only, except empy, which has none: one module, from its pinned source. Without isolation uv
+# builds it with the setuptools above, and fetches nothing that is not in the lock.
+say "Installing $(grep -c '^[a-z].*==' requirements.lock) packages, about 190 MB the first time"
+.venv/bin/uv pip sync $quiet $no_index --python .venv/bin/python --require-hashes \
+    --only-binary :all: --no-binary empy --no-build-isolation requirements.lock ||
     fail 'uv could not install requirements.lock: check the network, or name your package index with UV_DEFAULT_INDEX, then try again.'
 .venv/bin/uv pip install --quiet --offline --python .venv/bin/python --no-deps --no-build-isolation --editable .
 
