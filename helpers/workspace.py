@@ -102,7 +102,9 @@ def _environment() -> dict[str, str]:
         r'COLCON_|CMAKE_(?!PREFIX_PATH$)|MAKE|MFLAGS|DESTDIR|VERBOSE$|C?(PP|XX)?FLAGS$|CFLAGS$'
         r'|LDFLAGS$|(C|CPLUS|C_INCLUDE|CPLUS_INCLUDE|LIBRARY|PKG_CONFIG)_?PATH$|NINJA|CCACHE_'
         # The language of messages, and what pytest and Python tell their children.
-        r'|LC_|LANG|PYTEST|PYTHON(?!PATH$)|RCUTILS_|ROS_DOMAIN_ID|ROS_STATIC_PEERS'
+        # ipykernel asks for colours: then no line of CMake starts with "CMake Error".
+        r'|LC_|LANG|CLICOLOR|FORCE_COLOR|PYTEST|PYTHON(?!PATH$)|RCUTILS_|ROS_DOMAIN_ID'
+        r'|ROS_STATIC_PEERS'
         r'|ROS_LOCALHOST_ONLY|ROS_AUTOMATIC_DISCOVERY_RANGE'
     )
     environment = {k: v for k, v in os.environ.items() if not re.match(unwanted, k)}

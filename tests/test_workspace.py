@@ -133,6 +133,8 @@ def write_talker(workspace: Workspace, setup=SETUP_PY, talker=TALKER) -> None:
 
 # What a student's terminal may have set. It must not reach a build or a node.
 HOSTILE = {
+    'CLICOLOR_FORCE': '1',
+    'FORCE_COLOR': '1',
     'AMENT_PREFIX_PATH': '/opt/ros/humble',
     'CMAKE_PREFIX_PATH': '/opt/ros/humble',
     'COLCON_DEFAULTS_FILE': '/nowhere/defaults.yaml',
