@@ -534,3 +534,66 @@ def test_interface_tree_fits_its_figure():
 def test_bad_trees(tree, error, words):
     with pytest.raises(error, match=words):
         plots.interface_tree(tree)
+
+
+def test_bars_have_the_values():
+    ax = plots.bars(pd.Series({'default': 104.6, 'cured': 0.123}), 'CPU (%)')
+    assert [patch.get_width() for patch in ax.patches] == [104.6, 0.123]
+    assert [label.get_text() for label in ax.get_yticklabels()] == ['default', 'cured']
+    assert [text.get_text() for text in ax.texts] == ['105', '0.12']
+    assert ax.get_xlabel() == 'CPU (%)'
+    assert ax.yaxis_inverted()  # the first one on top
+
+
+def test_sweep_has_a_panel_for_each_column():
+    threads = pd.Index([1, 2, 4], name='threads')
+    results = pd.DataFrame({'lost (%)': [50, 25, 0], 'CPU (%)': [3, 4, 5]}, index=threads)
+    figure = plots.sweep(results, 3, 'the limit', title='A sweep')
+    assert [ax.get_title(loc='left') for ax in figure.axes] == ['lost (%)', 'CPU (%)']
+    for ax, (_, values) in zip(figure.axes, results.items(), strict=True):
+        measured, limit = ax.lines
+        assert measured.get_xdata().tolist() == [1, 2, 4]
+        assert measured.get_ydata().tolist() == values.tolist()
+        assert list(limit.get_xdata()) == [3, 3]
+        assert ax.get_xlabel() == 'threads'
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ['the limit']
+
+
+ENDPOINTS = pd.DataFrame(
+    [
+        ('talker', 'publisher', '/topic', 'std_msgs/msg/String', 'RELIABLE, depth 10'),
+        ('listener', 'subscription', '/topic', 'std_msgs/msg/String', 'BEST_EFFORT, depth 5'),
+        ('doubler', 'publisher', '/doubled', 'std_msgs/msg/Int32', 'RELIABLE, depth 1'),
+    ],
+    columns=['node', 'role', 'topic', 'type', 'qos'],
+)
+
+
+def test_topic_graph_has_boxes_and_arrows():
+    ax = plots.topic_graph(ENDPOINTS)
+    boxes = {text.get_text() for text in ax.texts if text.get_text()}
+    assert boxes == {
+        '/topic\nstd_msgs/msg/String',
+        '/doubled\nstd_msgs/msg/Int32',
+        'talker\nRELIABLE, depth 10',
+        'listener\nBEST_EFFORT, depth 5',
+        'doubler\nRELIABLE, depth 1',
+    }
+    arrows = [text.arrow_patch for text in ax.texts if getattr(text, 'arrow_patch', None)]
+    assert [arrow.get_linestyle() for arrow in arrows] == ['-', '--', '-']  # nobody hears doubler
+
+
+@pytest.mark.parametrize(
+    'draw',
+    [
+        lambda: plots.bars(pd.Series(dtype=float), 'count'),
+        lambda: plots.sweep(pd.DataFrame()),
+        lambda: plots.topic_graph(ENDPOINTS.drop(columns='qos')),
+        lambda: plots.topic_graph(ENDPOINTS.assign(role='server')),
+    ],
+)
+def test_nothing_to_draw_is_one_sentence(draw):
+    before = plt.get_fignums()
+    with pytest.raises(ValueError, match=r'^[^\n]+\.$'):
+        draw()
+    assert plt.get_fignums() == before
