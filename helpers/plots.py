@@ -56,7 +56,7 @@ def sequence_gaps(table: pd.DataFrame, title: str | None = None, ax: Axes | None
 
     Raises TypeError or ValueError for a bad table.
     """
-    table = _checked(table)
+    table = check_table(table)
     ax = _axes(ax)
     handles = _draw_gaps(ax, table)
     _dress(ax, title or f'Messages: {_loss(table)}', TIME_LABEL, 'sequence number', handles)
@@ -73,7 +73,7 @@ def before_and_after(
 
     Raises TypeError or ValueError for a bad table, and ValueError unless there are two labels.
     """
-    tables = [_checked(before), _checked(after)]
+    tables = [check_table(before), check_table(after)]
     if isinstance(labels, str) or len(labels) != 2:
         raise ValueError(f'labels must be two names, such as ("before", "after"), not {labels!r}.')
     figure = plt.figure(figsize=WIDE, dpi=DPI, layout='constrained')
@@ -150,7 +150,7 @@ def queue_length(
     Raises TypeError or ValueError for a bad table, and ValueError unless `depth` is a whole number
     of at least 1.
     """
-    table = _checked(table)
+    table = check_table(table)
     if isinstance(depth, bool) or not isinstance(depth, Integral) or depth < 1:
         raise ValueError(f'depth must be a whole number of at least 1, not {depth!r}.')
     entered, started = table.published_s.to_numpy(float), table.started_s.to_numpy(float)
@@ -191,7 +191,7 @@ def latency(
 
     Raises TypeError or ValueError for a bad table, and ValueError unless `period_s` is above 0.
     """
-    table = _checked(table)
+    table = check_table(table)
     if period_s is not None and not (_is_finite(period_s) and period_s > 0):
         raise ValueError(f'period_s must be a number of seconds above 0, not {period_s!r}.')
     heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
@@ -380,20 +380,14 @@ def interface_tree(table: pd.DataFrame, title: str | None = None, ax: Axes | Non
     return ax
 
 
-def _checked(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the table in the order of publishing, or raise."""
-    check_table(table)
-    return table.sort_values('seq', ignore_index=True)
-
-
 def _checked_groups(table: pd.DataFrame | Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
     if not isinstance(table, Mapping):
-        return {'callbacks': _checked(table)}
+        return {'callbacks': check_table(table)}
     if not 1 <= len(table) <= len(GROUP_COLOURS):
         raise ValueError(
             f'The timeline can show 1 to {len(GROUP_COLOURS)} callback groups, not {len(table)}.'
         )
-    return {str(name): _checked(one) for name, one in table.items()}
+    return {str(name): check_table(one) for name, one in table.items()}
 
 
 def _checked_span(span_s: tuple[float, float]) -> tuple[float, float]:

@@ -117,9 +117,8 @@ def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
 
     Raises ValueError or TypeError for a table or a number that cannot be used.
     """
-    check_table(table)
+    table = check_table(table)
     depth, threads = _count('depth', depth), _count('threads', threads)
-    table = table.sort_values('seq', ignore_index=True)
     heard = table[table['started_s'].notna()]
     contradictions = _impossible_rows(table)
     # A callback that was still running when the record ended has not finished.

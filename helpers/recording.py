@@ -161,7 +161,7 @@ class Recording:
                 )
         workers = {ident: f'worker {i}' for i, ident in enumerate(heard['thread'].unique(), 1)}
         heard['thread'] = heard['thread'].map(workers)
-        table = published.merge(heard, on='seq', how='outer').sort_values('seq', ignore_index=True)
+        table = published.merge(heard, on='seq', how='outer')  # sorted by seq
         times = ['published_s', 'started_s', 'finished_s']
         table = table.astype({'seq': int} | dict.fromkeys(times, float))
         table[times] -= table['published_s'].min()
@@ -169,8 +169,11 @@ class Recording:
         return table[COLUMNS]
 
 
-def check_table(table: pd.DataFrame) -> None:
-    """Raise one clear sentence where `table` is not a recording: TypeError or ValueError."""
+def check_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of a recording in the order of their sequence numbers.
+
+    Raises TypeError or ValueError, with one clear sentence, where `table` is not a recording.
+    """
     if not isinstance(table, pd.DataFrame):
         raise TypeError(f'A table of messages is needed (a DataFrame), not {type(table).__name__}.')
     columns = list(table.columns)
@@ -188,3 +191,4 @@ def check_table(table: pd.DataFrame) -> None:
     if table['published_s'].isna().any():
         unknown = table.loc[table['published_s'].isna(), 'seq'].iloc[0]
         raise ValueError(f'It is not known when message {unknown} was published.')
+    return table.sort_values('seq', ignore_index=True)

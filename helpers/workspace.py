@@ -332,6 +332,33 @@ if os.getppid() == parent:
 """
 
 
+def _start(
+    name: str, command: list[str], environment: dict[str, str], folder: Path, lines: list[str]
+) -> tuple[subprocess.Popen, threading.Thread]:
+    """Start a command, and a thread that adds each line it prints to `lines`."""
+    process = subprocess.Popen(
+        command,
+        env=environment,
+        cwd=folder,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        encoding='utf-8',
+        errors='replace',
+        # Interrupting the kernel must not reach it: its owner ends it in order.
+        start_new_session=True,
+    )
+
+    def read() -> None:
+        for line in process.stdout:
+            lines.append(line.rstrip('\n'))
+
+    reader = threading.Thread(target=read, name=f'read {name}', daemon=True)
+    reader.start()
+    return process, reader
+
+
 class Process:
     """A running executable and what it has printed. See `Workspace.run`."""
 
@@ -344,25 +371,8 @@ class Process:
         self._process: subprocess.Popen | None = None
         if not command:
             return
-        self._process = subprocess.Popen(
-            [sys.executable, '-I', '-S', '-c', _WITH_KERNEL, str(os.getpid()), *command],
-            env=environment,
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            encoding='utf-8',
-            errors='replace',
-            # Interrupting the kernel must not reach it before this class ends it in order.
-            start_new_session=True,
-        )
-        self._reader = threading.Thread(target=self._read, name=f'read {name}', daemon=True)
-        self._reader.start()
-
-    def _read(self) -> None:
-        for line in self._process.stdout:
-            self._lines.append(line.rstrip('\n'))
+        command = [sys.executable, '-I', '-S', '-c', _WITH_KERNEL, str(os.getpid()), *command]
+        self._process, self._reader = _start(name, command, environment, folder, self._lines)
 
     @property
     def lines(self) -> list[str]:
@@ -567,31 +577,10 @@ class Workspace:
     def _colcon(self, arguments: list[str], environment: dict[str, str], packages) -> list[str]:
         """Run colcon in the workspace with a progress bar, and return the lines it printed."""
         lines: list[str] = []
-        process = subprocess.Popen(
-            # The entry point, because the script `colcon` may be of another environment.
-            [
-                sys.executable,
-                '-c',
-                'import sys; from colcon_core.command import main; sys.exit(main())',
-                '--log-base',
-                'log',
-                *arguments,
-            ],
-            cwd=self.path,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            encoding='utf-8',
-            errors='replace',
-            start_new_session=True,
-        )
-
-        def read() -> None:
-            for line in process.stdout:
-                lines.append(line.rstrip('\n'))
-
+        # The entry point, because the script `colcon` may be of another environment.
+        main = 'import sys; from colcon_core.command import main; sys.exit(main())'
+        command = [sys.executable, '-c', main, '--log-base', 'log', *arguments]
+        process, reader = _start('colcon', command, environment, self.path, lines)
         total = max(1, len(packages) or len(list(self.path.glob('src/**/package.xml'))))
 
         def progress() -> float:
@@ -600,8 +589,6 @@ class Workspace:
             part = next((m for x in reversed(lines) if (m := re.match(r'\[ *(\d+)%\]', x))), None)
             return (done + (int(part[1]) / 100 if part else 0)) / total
 
-        reader = threading.Thread(target=read, name='read colcon', daemon=True)
-        reader.start()
         started = time.monotonic()
         try:
             with ProgressBar(progress) as bar:

@@ -328,4 +328,5 @@ def test_bad_table(table, error, said):
 
 
 def test_good_table_with_more_columns():
-    check_table(GOOD.assign(note='more is no harm'))
+    table = GOOD.assign(note='more is no harm')
+    assert check_table(table[::-1]).equals(table)
