@@ -26,6 +26,8 @@ import pandas as pd
 from catkin_pkg.package import InvalidPackage, Package, parse_package_string
 from rosidl_adapter import parser
 
+from helpers.cmake_lists import GENERATE, CMakeLists, CMakeListsError
+
 KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
 COMMENTS = ('default', 'all', 'none')
 SEPARATOR = parser.SERVICE_REQUEST_RESPONSE_SEPARATOR  # an action uses the same one
@@ -321,8 +323,12 @@ def _rows(fields: list[parser.Field], depth: int) -> Iterator[tuple]:
 GENERATORS = ('rosidl_default_generators', 'rosidl_core_generators')
 RUNTIMES = ('rosidl_default_runtime', 'rosidl_core_runtime')
 GROUP = 'rosidl_interface_packages'
-GENERATE = 'rosidl_generate_interfaces'
-PARSE_ERROR = 'CMake stops with "Parse error.'
+FIRST_PART = {
+    'msg': '',
+    'srv': parser.SERVICE_REQUEST_MESSAGE_SUFFIX,
+    'action': parser.ACTION_GOAL_SUFFIX,
+}
+AUTO_FIND = 'ament_auto_find_build_dependencies'
 
 
 class _Check:
@@ -331,7 +337,7 @@ class _Check:
     def __init__(self, folder: Path):
         self.folder = folder
         self.manifest: Package | None = None
-        self.cmake: _CMake | None = None
+        self.cmake: CMakeLists | None = None
         self.uses: dict[str, str] = {}  # package of a field's type -> the file that uses it first
         files = (self._relative(f) for f in folder.glob('*/*') if f.parent.name in KINDS)
         self.on_disk = sorted(f for f in files if Path(f).suffix == f'.{Path(f).parent}')
@@ -437,11 +443,11 @@ class _Check:
             yield Finding(name, 'the file itself', error)
             return
         try:
-            self.cmake = _CMake(text)
-        except _CMakeError as error:
+            self.cmake = CMakeLists(text)
+        except CMakeListsError as error:
             yield Finding(name, *error.args)
 
-    def _check_cmake(self, cmake: _CMake) -> Iterator[Finding]:
+    def _check_cmake(self, cmake: CMakeLists) -> Iterator[Finding]:
         name = 'CMakeLists.txt'
         package = self.manifest.name if self.manifest else None
         if 'cmake_minimum_required' not in cmake.lines:
@@ -490,7 +496,7 @@ class _Check:
             )  # fmt: skip
 
     def _check_generate(
-        self, cmake: _CMake, found: dict[str, int], unsure: bool
+        self, cmake: CMakeLists, found: dict[str, int], unsure: bool
     ) -> Iterator[Finding]:
         name = 'CMakeLists.txt'
         if not cmake.generate:
@@ -581,7 +587,7 @@ class _Check:
         if not parser.is_valid_message_name(short):
             yield Finding(
                 file, 'a name in CamelCase, of letters and digits, such as TurnCamera',
-                f"InvalidResourceName: '{short}' is an invalid message name",
+                f"InvalidResourceName: '{short}{FIRST_PART[kind]}' is an invalid message name",
             )  # fmt: skip
             return
         own = self.manifest.name if self.manifest else self.cmake and self.cmake.project
@@ -614,8 +620,7 @@ class _Check:
             hint = f', for example {others[0].replace("/msg/", "/")}' if others else ''
             yield Finding(
                 file, f'the package of the type {short} of {field.name!r}{hint}',
-                f"FileNotFoundError: [Errno 2] No such file or directory: "
-                f"'.../{own}/{message}.json'",
+                _no_file(f'{own}/{message}.json'),
             )  # fmt: skip
             return
         self.uses.setdefault(package, file)
@@ -627,8 +632,7 @@ class _Check:
             hint = f'. The nearest is {near[0].replace("/msg/", "/")}' if near else ''
             yield Finding(
                 file, f'a message that exists: {package} has no {short}{hint}',
-                f"FileNotFoundError: [Errno 2] No such file or directory: "
-                f"'.../{package}/{message}.json'",
+                _no_file(f'{package}/{message}.json'),
             )  # fmt: skip
 
     # other packages
@@ -672,6 +676,10 @@ class _Check:
 
 def _unknown(file: str) -> bool:
     return '$' in file or os.path.isabs(file)
+
+
+def _no_file(name: str) -> str:
+    return f"FileNotFoundError: [Errno 2] No such file or directory: '.../{name}'"
 
 
 def _described(error: Exception) -> str:
@@ -722,150 +730,3 @@ def _missing_tag(text: str) -> str:
         else:
             opened.pop()
     return f'</{opened[-1]}>' if opened else 'text that is XML'
-
-
-AUTO_FIND = 'ament_auto_find_build_dependencies'
-BLOCKS = ('if', 'foreach', 'while', 'function', 'macro', 'block')
-TOKEN = re.compile(
-    r"""
-      (?P<space> \s+ | \#\[(=*)\[ .*? \]\2\] | \#[^\n]* )
-    | (?P<bracket> \[(?P<equals>=*)\[ .*? \](?P=equals)\] )
-    | (?P<quoted> "(?: \\. | [^"\\] )*" )
-    | (?P<paren> [()] )
-    | (?P<word> (?: \\. | \$\{[^}\s]*\} | "(?:\\.|[^"\\\s])*" | [^\s()\#"\\] )+ )
-    """,
-    re.VERBOSE | re.DOTALL,
-)
-
-
-class _CMakeError(Exception):
-    """CMake cannot read the file. Arguments: what is missing, and the error."""
-
-
-class _Generate(NamedTuple):
-    """One call of rosidl_generate_interfaces(). A name with `$` is one that only a build knows."""
-
-    line: int
-    files: list[str]
-    dependencies: list[str]
-
-
-class _CMake:
-    """What a CMakeLists.txt says about its package, if each of its commands is executed once."""
-
-    def __init__(self, text: str):
-        self.project: str | None = None
-        self.generate: list[_Generate] = []
-        self.lines: dict[str, int] = {}  # command -> line of its first call
-        self.found: dict[str, int] = {}  # package -> line of its first find_package()
-        self._variables: dict[str, list[str]] = {}
-        for line, command, arguments in _commands(text):
-            self.lines.setdefault(command, line)
-            self._execute(line, command, [a for pair in arguments for a in self._expand(*pair)])
-
-    @property
-    def dependencies(self) -> list[str]:
-        return [d for call in self.generate for d in call.dependencies]
-
-    def _execute(self, line: int, command: str, arguments: list[str]) -> None:
-        first, *rest = arguments or ['']
-        if command == 'project':
-            self.project = first
-            self._variables['PROJECT_NAME'] = self._variables['CMAKE_PROJECT_NAME'] = [first]
-        elif command == 'set':
-            self._variables[first] = [a for a in rest if a not in ('PARENT_SCOPE', 'CACHE')]
-        elif command == 'list' and first == 'APPEND' and rest:
-            self._variables[rest[0]] = [*self._variables.get(rest[0], []), *rest[1:]]
-        elif command == 'find_package':
-            self.found.setdefault(first, line)
-        elif command == GENERATE:
-            part = {'files': [], 'DEPENDENCIES': [], 'LIBRARY_NAME': []}
-            into = 'files'
-            for argument in rest:
-                if argument in part:
-                    into = argument
-                elif argument.startswith(('ADD_LINTER', 'SKIP_')):
-                    into = 'files'  # an option ends the list before it
-                else:
-                    part[into].append(argument)
-            self.generate.append(_Generate(line, part['files'], part['DEPENDENCIES']))
-        else:
-            for argument in arguments:  # any other command may write a variable
-                self._variables.pop(argument, None)
-
-    def _expand(self, text: str, quoted: bool) -> list[str]:
-        """An argument with the values of its variables. One that is not known stays as `${it}`."""
-        whole = re.fullmatch(r'\$\{([^{}$]+)\}', text)
-        if whole and whole[1] in self._variables and not quoted:
-            return self._variables[whole[1]]
-        text = re.sub(r'^\$\{(CMAKE_CURRENT|CMAKE|PROJECT)_SOURCE_DIR\}:', '', text)
-        text = re.sub(
-            r'\$\{([^{}$]+)\}',
-            lambda match: ';'.join(self._variables.get(match[1], [match[0]])),
-            text,
-        )
-        return [text] if quoted else [part for part in text.split(';') if part]
-
-
-def _commands(text: str) -> Iterator[tuple[int, str, list[tuple[str, bool]]]]:
-    """Each command with its line, its name in lower case, and its (argument, quoted) pairs."""
-    blocks: list[tuple[str, int]] = []
-    name, start, depth, arguments = None, 0, 0, []
-    for line, kind, token in [*_tokens(text), (0, 'end', '')]:
-        if depth:
-            if kind == 'end':
-                error = f'{PARSE_ERROR} Function missing ending ")". End of file reached"'
-                raise _CMakeError(f"a ')' that closes {name}( of line {start}", error)
-            if kind == 'paren':
-                depth += 1 if token == '(' else -1
-            else:
-                quotes = {'quoted': 1, 'bracket': token.find('[', 1) + 1}.get(kind, 0)
-                arguments.append((token[quotes : len(token) - quotes], kind != 'word'))
-            if not depth:
-                _match_blocks(blocks, name.lower(), start)
-                yield start, name.lower(), arguments
-                name, arguments = None, []
-        elif name and token == '(':
-            depth = 1
-        elif name:
-            error = f'{PARSE_ERROR} Expected "(", got ..."'
-            raise _CMakeError(f"a '(' after {name} in line {start}", error)
-        elif kind == 'word' and re.fullmatch(r'\w+', token):
-            name, start = token, line
-        elif kind != 'end':
-            what = f'a command before {token} in line {line}, such as {GENERATE}('
-            raise _CMakeError(what, f'{PARSE_ERROR} Expected a command name, got ... {token}"')
-    if blocks:
-        _nesting(f'end{blocks[-1][0]}() for {blocks[-1][0]}() of line {blocks[-1][1]}')
-
-
-def _match_blocks(blocks: list[tuple[str, int]], command: str, line: int) -> None:
-    if command in BLOCKS:
-        blocks.append((command, line))
-    elif command.startswith('end') and command[3:] in BLOCKS:
-        if not blocks:
-            _nesting(f'{command[3:]}(...) before {command}() of line {line}')
-        if blocks[-1][0] != command[3:]:
-            _nesting(f'end{blocks[-1][0]}() for {blocks[-1][0]}() of line {blocks[-1][1]}')
-        blocks.pop()
-    elif command in ('else', 'elseif') and (not blocks or blocks[-1][0] != 'if'):
-        _nesting(f'if(...) before {command}() of line {line}')
-
-
-def _nesting(missing: str) -> None:
-    error = 'CMake stops with "Flow control statements are not properly nested."'
-    raise _CMakeError(missing, error)
-
-
-def _tokens(text: str) -> Iterator[tuple[int, str, str]]:
-    position = 0
-    while position < len(text):
-        match = TOKEN.match(text, position)
-        line = text.count('\n', 0, position) + 1
-        if not match:
-            error = f'{PARSE_ERROR} Function missing ending ")". End of file reached"'
-            raise _CMakeError(f'what closes {text[position]} of line {line}', error)
-        if match.lastgroup != 'space' and not match['space']:
-            kind = next(k for k in ('bracket', 'quoted', 'paren', 'word') if match[k] is not None)
-            yield line, kind, match[0]
-        position = match.end()
