@@ -567,12 +567,20 @@ def test_other_mistakes(package, files, where, missing, error):
     assert len(found) == 1, repr(findings)
 
 
-def test_a_name_that_is_not_camel_case(package):
-    files = {'srv/TurnCamera.srv': None, 'srv/turn_camera.srv': TURN_CAMERA}
-    root = package(files, replace=[('srv/TurnCamera', 'srv/turn_camera')])
+@pytest.mark.parametrize(
+    ('kind', 'text'),
+    [('msg', 'bool on'), ('srv', TURN_CAMERA), ('action', 'bool on\n---\n---\n')],
+)
+def test_a_name_that_is_not_camel_case(package, kind, text):
+    file = f'{kind}/turn_camera.{kind}'
+    files = {'srv/TurnCamera.srv': None, file: text}
+    root = package(files, replace=[('srv/TurnCamera.srv', file)])
     (finding,) = check_package(root)
-    assert finding.file == 'srv/turn_camera.srv'
-    assert 'InvalidResourceName' in finding.error
+    assert finding.file == file
+    # What the build prints, from the parser that the build calls.
+    with pytest.raises(interfaces.parser.InvalidResourceName) as failure:
+        interfaces._parse('custom_interfaces', root / file)
+    assert f'{finding.error}.' == f'InvalidResourceName: {failure.value}'.split(' It should')[0]
 
 
 def test_a_find_package_that_comes_too_late(package):
