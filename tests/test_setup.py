@@ -359,3 +359,7 @@ def test_another_ros_and_other_settings_stay_out(tmp_path):
     assert mine.items() <= seen.items()
     for name in ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR', 'IPYTHONDIR'):
         assert seen[name].startswith(f'{tmp_path}/.jupyter')
+
+
+def test_this_project_is_found_without_an_import_hook():
+    assert not [finder for finder in sys.meta_path if 'editable' in repr(finder)]
