@@ -190,6 +190,15 @@ def test_a_compiler_without_its_library_is_reported(monkeypatch, tmp_path):
     assert not row.required
 
 
+def test_pybind11_is_looked_for_where_cmake_looks(monkeypatch, tmp_path):
+    assert not doctor.check_pybind11().to_do
+    monkeypatch.setattr(doctor, 'PREFIXES', (str(tmp_path),))
+    row = doctor.check_pybind11()
+    assert row.found == 'none'
+    assert 'pybind11-dev' in row.to_do
+    assert not row.required
+
+
 @pytest.mark.parametrize(
     ('told', 'advice'),
     [
