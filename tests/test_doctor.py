@@ -76,7 +76,7 @@ def test_only_a_required_check_decides(tmp_path):
 def test_the_table_for_the_notebook():
     table = doctor.report()
     assert list(table.columns) == ['check', 'found', 'verdict']
-    assert len(table) == 12
+    assert len(table) == 13
     assert (table['verdict'].head(5) == 'ok').all()
 
 
