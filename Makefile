@@ -12,6 +12,9 @@ test: set_up lint ## all checks: lint, tests of the helpers, every notebook comp
 notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
 	@$(PYTHON) tools/notebooks.py $(if $(LESSON),--lesson "$(LESSON)")
 
+bench: set_up ## measure how much faster two computing threads are than one; needs an idle machine
+	@$(PYTHON) -m benchmarks.two_threads
+
 lint: set_up ## ruff: style and format of modules and notebooks
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
 
@@ -25,7 +28,7 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab test notebooks lint lock clean set_up
+.PHONY: help lab test notebooks bench lint lock clean set_up
 
 PYTHON := .venv/bin/python
 

@@ -256,7 +256,9 @@ def lines_that_matter(text: str) -> list[str]:
             while end < len(lines) and re.match(r' *\d* \| |\S.*: note: ', lines[end]):
                 end += 1
             block = [x for x in lines[index:end] if ': note: ' not in x]
-        elif re.match(r'error: |ERROR|\S*ld: .*(undefined|cannot find)|.*: undefined ref', line):
+        elif re.match(
+            r'error: |ERROR|\S*ld: .*(undefined|cannot find|recompile)|.*: undefined ref', line
+        ):
             block = [line]
         else:
             block = []

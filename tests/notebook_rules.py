@@ -481,9 +481,10 @@ def teaching_order(names: list[str]) -> list[str]:
 
 
 def title_matches(name: str, notebook: NotebookNode) -> list[str]:
-    """The file 02_lose_messages.ipynb has the title `# 02 Lose messages`."""
+    """The file 02_lose_messages.ipynb has the title `# 02 Lose messages`; C++ is `cpp` in it."""
     title = notebook.cells[0].source.splitlines()[0].removeprefix('# ') if notebook.cells else ''
-    if re.sub(r'[^a-z0-9]+', '_', title.lower()).strip('_') == name.removesuffix('.ipynb'):
+    words = title.lower().replace('c++', 'cpp')
+    if re.sub(r'[^a-z0-9]+', '_', words).strip('_') == name.removesuffix('.ipynb'):
         return []
     return [f'The title {title!r} is not that of {name}.']
 

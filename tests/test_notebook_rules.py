@@ -293,6 +293,8 @@ def test_rules_for_the_folder(tmp_path):
     assert rules.teaching_order([*names, '02-Lose.ipynb'])
     assert rules.title_matches('02_lose_messages.ipynb', lesson()) == []
     assert rules.title_matches('02_lose_everything.ipynb', lesson())
+    in_cpp = new_notebook(cells=[new_markdown_cell('# 08 Share code in C++')])
+    assert rules.title_matches('08_share_code_in_cpp.ipynb', in_cpp) == []
     assert rules.links_lead_somewhere(lesson(), tmp_path)
     (tmp_path / '02_lose_messages.ipynb').touch()
     assert rules.links_lead_somewhere(lesson(), tmp_path) == []
