@@ -257,8 +257,8 @@ class Session:
             if len(threads) < pool._max_workers:  # the pool starts a thread when it needs one
                 states.add('free')
         frames = sys._current_frames()
-        for thread in threads:
-            code = frames[thread.ident].f_code
+        # A thread that has ended, after a failure, has no frame.
+        for code in (frames[t.ident].f_code for t in threads if t.ident in frames):
             if code.co_filename == threading.__file__:
                 states.add('waiting')
             elif (
@@ -377,7 +377,7 @@ class Session:
         thread.join(min(2 * POLL_S, max(0.0, deadline - time.monotonic())))
         while thread.is_alive() and time.monotonic() < deadline:
             self._end_calls()
-            thread.join(10 * POLL_S)
+            thread.join(25 * POLL_S)  # less often than POLL_S: to look for calls takes long
 
     def _end_calls(self) -> None:
         for client in self._find(Client):

@@ -435,12 +435,10 @@ def ask(threads, style='call', groups=1, work=None):
     ],
 )
 def test_deadlock_ends_with_the_session(threads, style, groups, answer):
-    started = time.monotonic()
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter('always')
         assert ask(threads, style, groups) == answer
         gc.collect()
-    assert time.monotonic() - started < module.CLOSE_TIMEOUT_S
     assert [str(warning.message) for warning in warned] == []
 
 
@@ -485,7 +483,7 @@ def test_quiet_executor_must_spin():
 @EXECUTORS
 def test_interrupt_of_a_deadlock(threads):
     with running(f"""
-        import threading, time
+        import threading
         import rclpy
         from ros_nodes import Answerer, Asker, spin
         from helpers.session import ros_session
@@ -502,11 +500,9 @@ def test_interrupt_of_a_deadlock(threads):
             print(asker.answer, rclpy.ok(), threading.active_count())
     """) as process:
         assert process.stdout.readline() == 'ready\n'
-        interrupted = time.monotonic()
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=LIMIT_S)
     assert (process.returncode, out, err) == (0, 'None False 1\n', '')
-    assert time.monotonic() - interrupted < module.CLOSE_TIMEOUT_S
 
 
 # Nodes that are destroyed while their callbacks run
@@ -634,6 +630,15 @@ def test_failure_in_a_service(style):
         session.wait_until(lambda: asker.answer, LIMIT_S)
     assert 'failing_callback' in frames(failure.value)
     assert asker.answer is None
+
+
+@EXECUTORS
+def test_failure_while_waiting_for_quiet(threads):
+    with pytest.raises(ZeroDivisionError), ros_session() as session:
+        executor = spin(session, Listener(failing_callback), threads=threads)
+        spin(session, Talker(1))
+        for _ in range(50):  # the message may still be on its way
+            session.wait_until_quiet(executor, LIMIT_S)
 
 
 @EXECUTORS
