@@ -90,6 +90,7 @@ def timeline(
     span_s: tuple[float, float] | None = None,
     title: str | None = None,
     ax: Axes | None = None,
+    time_label: str = TIME_LABEL,
 ) -> Axes:
     """Draw one lane a thread and one bar a callback, with its sequence number where it fits.
 
@@ -131,7 +132,7 @@ def timeline(
     ax.set_xlim(*(span_s or (0, None)))
     default = 'One bar for each callback, with its sequence number'
     legend = handles if isinstance(table, Mapping) else None
-    _dress(ax, title or default, TIME_LABEL, 'thread', legend, grid='x')
+    _dress(ax, title or default, time_label, 'thread', legend, grid='x')
     if bars.empty:
         _say(ax, 'no callback was called')
     _label_bars(ax, bars, lane)
@@ -321,6 +322,49 @@ def topic_graph(endpoints: pd.DataFrame, title: str | None = None) -> Axes:
                 arrowprops={'arrowstyle': '-|>', 'lw': 2, 'ls': '-' if both else '--',
                             'color': LIMIT, 'mutation_scale': 18},
             )  # fmt: skip
+    return ax
+
+
+def who_waits(
+    callback: str, answer: str, thread_free: bool, group_free: bool, title: str | None = None
+) -> Axes:
+    """Draw who waits for whom: a callback for an answer, the answer for a thread and a group.
+
+    What is not free is held by the callback. Then the arrows close a circle, which is drawn thick.
+    """
+    ax = _axes(None, height=4.2)
+    ax.set(xlim=(0, 10), ylim=(-3.2, 3.2))
+    ax.set_axis_off()
+    closed = not (thread_free and group_free)
+    default = 'A circle: nobody can go on' if closed else 'No circle: the answer can come'
+    ax.set_title(title or default, fontsize=LARGE, loc='left')
+
+    def box(x: float, y: float, text: str, style: str, colour: str) -> Text:
+        return ax.text(
+            x, y, text, ha='center', va='center', fontsize=NORMAL, linespacing=1.5,
+            bbox={'boxstyle': style, 'facecolor': colour, 'edgecolor': LIMIT, 'linewidth': 1.4},
+        )  # fmt: skip
+
+    def arrow(tail: Text, head: Text, text: str, stops: bool) -> None:
+        look = {'lw': 3, 'color': LOST} if stops else {'lw': 1.6, 'color': LIMIT, 'ls': '--'}
+        look |= {'arrowstyle': '-|>', 'mutation_scale': 20, 'shrinkA': 3, 'shrinkB': 3}
+        look |= {'patchA': tail.get_bbox_patch(), 'patchB': head.get_bbox_patch()}
+        (x0, y0), (x1, y1) = tail.get_position(), head.get_position()
+        ax.annotate('', xy=(x1, y1), xytext=(x0, y0), arrowprops=look)
+        ax.text(
+            (x0 + x1) / 2, (y0 + y1) / 2, text, ha='center', va='center', fontsize=SMALL,
+            bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 2},
+        )  # fmt: skip
+
+    waiting = box(1.3, 0, callback, 'square,pad=0.7', GROUP_COLOURS[0])
+    awaited = box(8.7, 0, answer, 'square,pad=0.7', GROUP_COLOURS[1])
+    arrow(waiting, awaited, 'waits for', closed)
+    for y, name, free in ((2.3, 'a thread', thread_free), (-2.3, "the client's group", group_free)):
+        state = 'free' if free else 'held'
+        needed = box(5, y, f'{name}\n{state}', 'round,pad=0.6,rounding_size=1.0', '#FFFFFF')
+        arrow(awaited, needed, 'needs', not free)
+        if not free:
+            arrow(needed, waiting, 'is held by', True)
     return ax
 
 

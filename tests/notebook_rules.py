@@ -22,7 +22,7 @@ from tools.notebooks import clean, text_of
 MAX_CODE_LINES = 25
 MAX_FILE_LINES = 36  # of a cell that writes a file, which cannot be cut in two
 MAX_WORDS = 180
-EXERCISES = {'01': 1, '02': 2, '03': 2, '04': 2}  # at least; one in any other lesson
+EXERCISES = {'01': 1, '02': 2, '03': 2, '04': 2, '05': 2}  # at least; one in any other lesson
 TAGS = {'predict', 'exercise', 'check', 'solution', 'nbval-ignore-output'}
 LABELS = ['You will do', 'You will learn', 'You need', 'Time']
 LABELS_OF_START = ['You will do', 'You need', 'Time']

@@ -583,6 +583,28 @@ def test_topic_graph_has_boxes_and_arrows():
     assert [arrow.get_linestyle() for arrow in arrows] == ['-', '--', '-']  # nobody hears doubler
 
 
+@pytest.mark.parametrize('thread_free', [True, False])
+@pytest.mark.parametrize('group_free', [True, False])
+def test_who_waits_closes_a_circle_where_something_is_held(thread_free, group_free):
+    ax = plots.who_waits('timer', 'the answer', thread_free, group_free)
+    words = words_of(ax)
+    assert f'a thread\n{"free" if thread_free else "held"}' in words
+    assert f"the client's group\n{'free' if group_free else 'held'}" in words
+    held = 2 - thread_free - group_free
+    assert words.count('is held by') == held
+    assert words.count('needs') == 2
+    arrows = [text.arrow_patch for text in ax.texts if getattr(text, 'arrow_patch', None)]
+    solid = [arrow for arrow in arrows if arrow.get_linestyle() != '--']
+    assert len(arrows) == 3 + held
+    assert len(solid) == (1 + 2 * held if held else 0)  # `waits for`, and two a thing that is held
+    assert ax.get_title('left').startswith('A circle' if held else 'No circle')
+
+
+def test_timeline_of_callbacks_that_no_message_called(slow):
+    ax = plots.timeline({'timer': slow}, time_label='time since the first callback (s)')
+    assert ax.get_xlabel() == 'time since the first callback (s)'
+
+
 @pytest.mark.parametrize(
     'draw',
     [
