@@ -1,0 +1,684 @@
+"""One pose from several imperfect sensors: an extended Kalman filter for a robot on a floor.
+
+The state is where the robot is in the frame `odom` or `map` (x, y in metres, yaw in radians), and
+how it moves, in its own frame (vx, vy in m/s, vyaw in rad/s, ax, ay in m/s^2). Any sensor measures
+any part of it, when it likes, with its own covariance.
+
+The motion model, the noise model, the order of the steps and the defaults are those of
+robot_localization's `ekf_node` in its two-dimensional mode (T. Moore and D. Stouch, "A Generalized
+Extended Kalman Filter Implementation for the Robot Operating System", 2014; src/ekf.cpp and
+src/filter_base.cpp of that package). On the drives in tests/data both give the same path.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations_with_replacement
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+STATE = ('x', 'y', 'yaw', 'vx', 'vy', 'vyaw', 'ax', 'ay')
+
+# The variance that each second adds to each part of the state: what the motion model leaves out.
+PROCESS_NOISE = {
+    'x': 0.05,
+    'y': 0.05,
+    'yaw': 0.06,
+    'vx': 0.025,
+    'vy': 0.025,
+    'vyaw': 0.02,
+    'ax': 0.01,
+    'ay': 0.01,
+}
+
+# The variance of what each column says. `vy` is no column: wheels that cannot move sideways say 0.
+VARIANCES = {
+    'vx': 0.0025,
+    'vy': 0.01,
+    'vyaw': 0.0025,
+    'imu_yaw': 0.0004,
+    'imu_vyaw': 0.0001,
+    'ax': 0.01,
+    'gps_x': 0.25,
+    'gps_y': 0.25,
+}
+
+# What a row says, in the order in which it is applied: each message has the column of each part of
+# the state that it measures. The IMU's parts are applied one after the other.
+MESSAGES = {
+    'odom': ({'vx': 'vx', 'vy': 'vy', 'vyaw': 'vyaw'},),
+    'imu': ({'yaw': 'imu_yaw'}, {'vyaw': 'imu_vyaw'}, {'ax': 'ax'}),
+    'gps': ({'x': 'gps_x', 'y': 'gps_y'},),
+}
+SENSORS = tuple(MESSAGES)
+
+POSE, TWIST = STATE[:3], STATE[3:6]
+INITIAL_VARIANCE = 1e-9
+
+_YAW = STATE.index('yaw')
+_TURN = np.where(np.array(STATE) == 'yaw', math.tau, 0.0)
+_IDENTITY = np.eye(len(STATE))
+
+
+class Innovation(NamedTuple):
+    """How a message differed from what the filter expected.
+
+    `measured` names the k parts of the state; `value` (k) is measured minus expected, the yaw
+    between -pi and pi; `covariance` (k, k) is what the filter expected of `value`; `nis` is
+    value' covariance^-1 value, the squared Mahalanobis distance (chi-square with k degrees of
+    freedom in a consistent filter); `accepted` is False where the gate kept the message out.
+    """
+
+    measured: tuple[str, ...]
+    value: np.ndarray
+    covariance: np.ndarray
+    nis: float
+    accepted: bool
+
+
+def motion(state: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the state (8) `dt` seconds later, and its derivative (8, 8) with respect to `state`.
+
+    The robot keeps its acceleration and its turning rate, and does not turn during the step.
+    """
+    cos, sin = math.cos(state[_YAW]), math.sin(state[_YAW])
+    turned = np.array([[cos, -sin], [sin, cos]])
+    transfer = _IDENTITY.copy()
+    transfer[:2, 3:5] = turned * dt
+    transfer[:2, 6:] = turned * (dt * dt / 2)
+    transfer[2, 5] = transfer[3, 6] = transfer[4, 7] = dt
+    moved = transfer @ state
+    # Turning the robot turns the step that it makes.
+    transfer[0, _YAW], transfer[1, _YAW] = state[1] - moved[1], moved[0] - state[0]
+    return _wrapped(moved), transfer
+
+
+class ExtendedKalmanFilter:
+    """The filter, message by message.
+
+    `process_noise` is the variance that a second adds: a dict by name (the others keep
+    PROCESS_NOISE), 8 variances, or an (8, 8) matrix. Without an `initial_state` (8) the first
+    message sets the part of the state that it measures; the rest is zero. `initial_covariance` is
+    8 variances or (8, 8); without it 1e-9 on the diagonal.
+
+    `state` (8) in the order of STATE and `covariance` (8, 8) are the estimate at the time `t` in
+    seconds (None before the first message).
+    """
+
+    def __init__(
+        self,
+        process_noise: Mapping[str, float] | Sequence | np.ndarray | None = None,
+        initial_state: Sequence[float] | None = None,
+        initial_covariance: Sequence | np.ndarray | None = None,
+    ) -> None:
+        self.process_noise = _process_noise(process_noise)
+        if initial_covariance is None:
+            self.covariance = INITIAL_VARIANCE * _IDENTITY
+        else:
+            self.covariance = _covariance('initial_covariance', initial_covariance, len(STATE))
+        self._empty = initial_state is None
+        if initial_state is None:
+            self.state = np.zeros(len(STATE))
+        else:
+            self.state = _wrapped(_vector('initial_state', initial_state, len(STATE)))
+        self.t: float | None = None
+
+    def predict(self, dt: float) -> None:
+        """Move the estimate `dt` seconds on. Raises ValueError if `dt` is negative."""
+        dt = _number('dt', dt)
+        if dt < 0:
+            raise ValueError(f'dt must be zero or more seconds, not {dt!r}.')
+        self._predict(dt)
+
+    def update(
+        self,
+        measured: Sequence[bool] | Sequence[str],
+        values: Sequence[float],
+        covariance: Sequence | np.ndarray,
+        gate: float | None = None,
+    ) -> Innovation | None:
+        """Correct the estimate with what a sensor measured now.
+
+        `measured` says which parts of the state: 8 booleans in the order of STATE (as
+        `odom0_config` of robot_localization), or k names. `values` (k) are in the same order;
+        those that are NaN are left out. `covariance` is (k, k), or k variances. With a `gate` the
+        message is kept out if its Mahalanobis distance is `gate` or more.
+
+        Returns the innovation, or None if all values are NaN.
+        """
+        message = _message(measured, values, covariance, gate)
+        return None if message is None else self._correct(*message)
+
+    def process(
+        self,
+        t: float,
+        measured: Sequence[bool] | Sequence[str],
+        values: Sequence[float],
+        covariance: Sequence | np.ndarray,
+        gate: float | None = None,
+    ) -> Innovation | None:
+        """Take a message of the time `t` (seconds): move the estimate to `t`, and correct it.
+
+        The other arguments are those of `update`. The first message sets what it measures. A
+        message that is older than the estimate corrects it as if it were of now, as
+        robot_localization does without its history (`smooth_lagged_data`).
+
+        Returns the innovation, or None for the first message and if all values are NaN.
+        """
+        t = _number('t', t)
+        message = _message(measured, values, covariance, gate)
+        return None if message is None else self._process(t, *message)
+
+    def _advance(self, t: float) -> None:
+        if self.t is None:
+            self.t = t
+        elif t > self.t:
+            self._predict(t - self.t)
+            self.t = t
+
+    def _process(self, t, index, values, covariance, gate) -> Innovation | None:
+        self._advance(t)
+        if not self._empty:
+            return self._correct(index, values, covariance, gate)
+        self.state[index] = values
+        self.state = _wrapped(self.state)
+        self.covariance[np.ix_(index, index)] = covariance
+        self._empty = False
+        return None
+
+    def _predict(self, dt: float) -> None:
+        self.state, jacobian = motion(self.state, dt)
+        self.covariance = jacobian @ self.covariance @ jacobian.T + dt * self.process_noise
+
+    def _correct(self, index, values, covariance, gate) -> Innovation:
+        shared = self.covariance[:, index]
+        expected = shared[index] + covariance
+        inverse = np.linalg.inv(expected)
+        innovation = values - self.state[index]
+        innovation -= _TURN[index] * np.round(innovation / math.tau)
+        nis = float(innovation @ inverse @ innovation)
+        accepted = gate is None or nis < gate * gate
+        if accepted:
+            gain = shared @ inverse
+            self.state = _wrapped(self.state + gain @ innovation)
+            # Joseph's form: a sum of squares, which rounding cannot make negative.
+            kept = _IDENTITY.copy()
+            kept[:, index] -= gain
+            self.covariance = kept @ self.covariance @ kept.T + gain @ covariance @ gain.T
+        names = tuple(STATE[i] for i in index)
+        return Innovation(names, innovation, expected, nis, accepted)
+
+
+def fuse(
+    measurements: pd.DataFrame,
+    sensors: Iterable[str] = SENSORS,
+    *,
+    process_noise: Mapping[str, float] | Sequence | np.ndarray | None = None,
+    variances: Mapping[str, float] | None = None,
+    gate: float | Mapping[str, float] | None = None,
+    initial_state: Sequence[float] | None = None,
+    initial_covariance: Sequence | np.ndarray | None = None,
+) -> pd.DataFrame:
+    """Estimate the path from a table of what the sensors said.
+
+    `measurements` has the column `t` (s, increasing) and those of the chosen sensors, NaN where a
+    sensor is silent: `vx` (m/s) and `vyaw` (rad/s) for 'odom'; `imu_yaw` (rad), `imu_vyaw` (rad/s)
+    and `ax` (m/s^2) for 'imu'; `gps_x` and `gps_y` (m) for 'gps'. In a row, odom is applied first,
+    then imu, then gps.
+
+    `variances` replaces some of VARIANCES; `gate` is a Mahalanobis distance for all sensors, or a
+    dict of some; the others are as for `ExtendedKalmanFilter`.
+
+    Returns a table with a row for each time: `t`, `x`, `y`, `yaw`, `vx`, `vy`, `vyaw`, and the
+    covariances of pose and twist as a nav_msgs/Odometry has them: `var_x`, `cov_x_y`, `cov_x_yaw`,
+    ... (NaN before the first message). `covariances` makes matrices of them.
+
+    Raises ValueError or TypeError, with a sentence that says what to change, for a table or a
+    setting that cannot be used.
+    """
+    rows = _run(
+        measurements, sensors, process_noise, variances, gate, initial_state, initial_covariance
+    )
+    times, states, matrices = [], [], []
+    for t, ekf, _ in rows:
+        times.append(t)
+        known = 1.0 if ekf.t is not None else np.nan
+        states.append(known * ekf.state)
+        matrices.append(known * ekf.covariance)
+    return _estimate(times, states, matrices)
+
+
+def innovations(
+    measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **settings
+) -> pd.DataFrame:
+    """Return how each message differed from what the filter expected: the arguments of `fuse`.
+
+    One row for each number measured: `t`, `sensor`, `variable` (its name in STATE), `innovation`
+    (measured minus expected), `sigma` (the standard deviation that the filter expects of it), and
+    of the whole message `nis`, `dof` (how many numbers it measured) and `accepted`.
+    """
+    rows = []
+    for t, _, heard in _run(measurements, sensors, **settings):
+        for sensor, innovation in heard:
+            sigma = np.sqrt(np.diag(innovation.covariance))
+            rows += [
+                (t, sensor, *one, innovation.nis, len(sigma), innovation.accepted)
+                for one in zip(innovation.measured, innovation.value, sigma, strict=True)
+            ]
+    columns = ['t', 'sensor', 'variable', 'innovation', 'sigma', 'nis', 'dof', 'accepted']
+    return pd.DataFrame(rows, columns=columns)
+
+
+def covariances(estimate: pd.DataFrame, names: Sequence[str] = ('x', 'y')) -> np.ndarray:
+    """Return the covariance of `names` in each row of what `fuse` returned: (rows, k, k).
+
+    The names are parts of the pose (x, y, yaw) or of the twist (vx, vy, vyaw), not of both.
+    """
+    if not (names and (set(names) <= set(POSE) or set(names) <= set(TWIST))):
+        raise ValueError(f'names must be some of {POSE} or some of {TWIST}, not {names!r}.')
+    columns = _columns(estimate, {_column(a, b) for a in names for b in names})
+    return np.array([[columns[_column(a, b)] for b in names] for a in names]).transpose(2, 0, 1)
+
+
+def errors(estimate: pd.DataFrame, truth: pd.DataFrame) -> pd.DataFrame:
+    """Return how far off the estimate is: `t`, `x`, `y`, `distance` (m), `yaw` (rad, -pi to pi).
+
+    `truth` has the columns `t`, `x`, `y`, `yaw`. Between its rows it is interpolated; it must
+    cover the times of the estimate.
+    """
+    times = estimate['t'].to_numpy(float)
+    known = truth['t'].to_numpy(float)
+    if len(times) and not (known[0] <= times[0] and times[-1] <= known[-1]):
+        raise ValueError('The truth must cover all times of the estimate.')
+    yaw = np.interp(times, known, np.unwrap(truth['yaw']))
+    x, y = (estimate[name] - np.interp(times, known, truth[name]) for name in ('x', 'y'))
+    off = pd.DataFrame({'t': times, 'x': x, 'y': y, 'yaw': _angle(estimate['yaw'] - yaw)})
+    return off.assign(distance=np.hypot(x, y))
+
+
+def rmse(estimate: pd.DataFrame, truth: pd.DataFrame) -> float:
+    """Return the root mean square of the distance (m) between estimate and truth."""
+    return float(np.sqrt(np.mean(errors(estimate, truth)['distance'] ** 2)))
+
+
+def nees(
+    estimate: pd.DataFrame, truth: pd.DataFrame, names: Sequence[str] = ('x', 'y')
+) -> np.ndarray:
+    """Return the normalised estimation error squared of each row: error' covariance^-1 error.
+
+    In a consistent filter it is chi-square with len(names) degrees of freedom. `names` are parts
+    of the pose.
+    """
+    off = errors(estimate, truth)[list(names)].to_numpy()
+    matrices = covariances(estimate, names)
+    return np.einsum('ni,ni->n', off, np.linalg.solve(matrices, off[..., None])[..., 0])
+
+
+def chi_square_bounds(dof: int, runs: int = 1, probability: float = 0.95) -> tuple[float, float]:
+    """Return the two values between which the mean of `runs` NIS or NEES lies with `probability`.
+
+    `dof` is how many numbers each has: 1 for a yaw, 2 for a position. The runs are independent,
+    and the same probability is left on both sides.
+    """
+    degrees = int(dof) * int(runs)
+    outside = (1 - probability) / 2
+    return tuple(_chi_square(degrees, p) / runs for p in (outside, 1 - outside))
+
+
+class Drive(NamedTuple):
+    """A simulated drive: what the sensors said, and apart from it, what was true."""
+
+    measurements: pd.DataFrame
+    truth: pd.DataFrame
+
+
+def simulate(
+    seed: int,
+    seconds: float = 120.0,
+    *,
+    rate: float = 50.0,
+    gps_period: float = 1.0,
+    wheel_scale: float = 1.03,
+    turn_scale: float = 1.05,
+    gyro_bias: float = 0.002,
+    slip: tuple[float, float] | None = None,
+    slip_speed: float = 0.5,
+    gps_outliers: int = 0,
+    gps_jump: float = 20.0,
+    gps_gap: tuple[float, float] | None = None,
+    imu_yaw: float = 0.0,
+) -> Drive:
+    """Drive a unicycle for some seconds, and return what its sensors say and what is true.
+
+    The robot starts at 0, 0 towards x, speeds up for two seconds, then swings between forwards and
+    backwards, and turns left and right: the path of the drives in tests/data. Wheels and IMU speak
+    `rate` times a second, GPS every `gps_period` seconds, with the standard deviations of
+    VARIANCES. Noise and outliers depend on the seed and nothing else on anything by chance.
+
+    What is wrong with the sensors: the wheels report `wheel_scale` times the speed and
+    `turn_scale` times the turning rate; while they slip (`slip`: from, to in s) they report
+    `slip_speed` m/s more than the robot moves. The gyro reports `gyro_bias` rad/s too much. The
+    IMU is mounted turned by `imu_yaw` rad. `gps_outliers` of the fixes jump `gps_jump` metres
+    away, and there is no fix during `gps_gap` (from, to in s).
+
+    Returns `Drive(measurements, truth)`. The measurements have the columns that `fuse` reads, and
+    `ay`, the IMU's other acceleration (m/s^2), which a turned IMU needs; the truth has `t` and
+    the columns of STATE.
+    """
+    rate, seconds = _number('rate', rate), _number('seconds', seconds)
+    t = np.arange(round(seconds * rate) + 1) / rate
+    truth = _path(t)
+    rng = np.random.default_rng(seed)
+    noise = {name: rng.normal(0, math.sqrt(VARIANCES[name]), len(t)) for name in VARIANCES}
+    noise['ay'] = rng.normal(0, math.sqrt(VARIANCES['ax']), len(t))
+    vx, vyaw = truth['vx'].to_numpy(), truth['vyaw'].to_numpy()
+    spins = np.zeros(len(t)) if slip is None else slip_speed * ((t >= slip[0]) & (t < slip[1]))
+    cos, sin = math.cos(imu_yaw), math.sin(imu_yaw)
+    said = {
+        'vx': wheel_scale * vx + spins,
+        'vyaw': turn_scale * vyaw,
+        'imu_yaw': truth['yaw'] + imu_yaw,
+        'imu_vyaw': vyaw + gyro_bias,
+        'ax': cos * truth['ax'] + sin * truth['ay'],
+        'ay': cos * truth['ay'] - sin * truth['ax'],
+        'gps_x': truth['x'],
+        'gps_y': truth['y'],
+    }
+    measurements = pd.DataFrame({'t': t} | {name: said[name] + noise[name] for name in said})
+    measurements['imu_yaw'] = _angle(measurements['imu_yaw'])
+    every = max(1, round(gps_period * rate))
+    heard = np.arange(len(t)) % every == 0
+    if gps_gap is not None:
+        heard &= (t < gps_gap[0]) | (t >= gps_gap[1])
+    if gps_outliers:
+        rows = rng.choice(np.flatnonzero(heard)[1:], gps_outliers, replace=False)
+        to = rng.uniform(-math.pi, math.pi, gps_outliers)
+        jump = gps_jump * np.column_stack([np.cos(to), np.sin(to)])
+        measurements.loc[rows, ['gps_x', 'gps_y']] += jump
+    measurements.loc[~heard, ['gps_x', 'gps_y']] = np.nan
+    return Drive(measurements, truth)
+
+
+def _path(t: np.ndarray) -> pd.DataFrame:
+    """The truth at the times `t`: speed and turning rate are given, the rest is integrated."""
+
+    def speed(t):
+        return 0.5 * np.minimum(t, 2) + 0.75 * (np.sin(0.4 * t) - math.sin(0.8)) * (t > 2)
+
+    def yaw(t):
+        return 0.05 * t + 1.5 * (1 - np.cos(0.2 * t))
+
+    between = (t[1:] + t[:-1]) / 2
+    steps = np.diff(t) * speed(between) * np.array([np.cos(yaw(between)), np.sin(yaw(between))])
+    x, y = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
+    vx, vyaw = speed(t), 0.05 + 0.3 * np.sin(0.2 * t)
+    ax = np.where(t <= 2, 0.5, 0.3 * np.cos(0.4 * t))
+    columns = x, y, _angle(yaw(t)), vx, np.zeros(len(t)), vyaw, ax, vx * vyaw
+    return pd.DataFrame({'t': t} | dict(zip(STATE, columns, strict=True)))
+
+
+# --- The run over a table ------------------------------------------------------------------------
+
+
+def _run(
+    measurements: pd.DataFrame,
+    sensors: Iterable[str] = SENSORS,
+    process_noise=None,
+    variances=None,
+    gate=None,
+    initial_state=None,
+    initial_covariance=None,
+) -> Iterator[tuple[float, ExtendedKalmanFilter, list[tuple[str, Innovation]]]]:
+    """Go through the rows: yield the time, the filter, and the innovations of the row."""
+    sensors = _sensors(sensors)
+    gates = _gates(gate)
+    variances = _variances(variances)
+    ekf = ExtendedKalmanFilter(process_noise, initial_state, initial_covariance)
+    messages = [(sensor, parts) for sensor in sensors for parts in MESSAGES[sensor]]
+    table = _table(measurements, [name for _, parts in messages for name in parts.values()])
+    prepared = []
+    for sensor, parts in messages:
+        index = np.array([STATE.index(name) for name in parts])
+        values = np.column_stack([table[column] for column in parts.values()])
+        covariance = np.diag([variances[column] for column in parts.values()])
+        silent = np.isnan(values)
+        some, whole = ~silent.all(axis=1), ~silent.any(axis=1)
+        prepared.append((sensor, index, values, covariance, some.tolist(), whole.tolist()))
+    if not any(any(some) for *_, some, _ in prepared):
+        raise ValueError(f'The table has no measurement of {", ".join(sensors)}: all are NaN.')
+    for row, t in enumerate(table['t'].tolist()):
+        heard = []
+        for sensor, index, values, covariance, some, whole in prepared:
+            if not some[row]:
+                continue
+            message = index, values[row], covariance
+            if not whole[row]:
+                message = _present(*message)
+            innovation = ekf._process(t, *message, gates.get(sensor))
+            if innovation is not None:
+                heard.append((sensor, innovation))
+        if ekf.t is not None:
+            ekf._advance(t)
+        yield t, ekf, heard
+
+
+def _estimate(times: list, states: list, matrices: list) -> pd.DataFrame:
+    columns = {'t': times} | dict(zip(POSE + TWIST, np.array(states).T, strict=False))
+    matrices = np.array(matrices)
+    for block in (POSE, TWIST):
+        for a, b in combinations_with_replacement(block, 2):
+            columns[_column(a, b)] = matrices[:, STATE.index(a), STATE.index(b)]
+    return pd.DataFrame(columns)
+
+
+def _column(a: str, b: str) -> str:
+    """The name of the column with the covariance of two parts of the state."""
+    first, second = sorted((a, b), key=STATE.index)
+    return f'var_{a}' if a == b else f'cov_{first}_{second}'
+
+
+def _wrapped(state: np.ndarray) -> np.ndarray:
+    return state - _TURN * np.round(state / math.tau)
+
+
+def _angle(radians):
+    """The same angle between -pi and pi."""
+    return radians - math.tau * np.round(radians / math.tau)
+
+
+def _chi_square(dof: int, probability: float) -> float:
+    """The value below which a chi-square number with `dof` degrees of freedom is so probably."""
+    # P(more than x) = [erfc(sqrt(x / 2)) if dof is odd] + sum of exp(-x / 2) (x / 2)^j / j!
+    j = np.arange(dof % 2 / 2, dof / 2)
+    factorials = np.array([math.lgamma(i + 1) for i in j])
+    low, high = 0.0, dof + 40 * math.sqrt(dof) + 100
+    for _ in range(100):
+        x = (low + high) / 2
+        more = np.exp(j * math.log(x / 2) - x / 2 - factorials).sum()
+        if dof % 2:
+            more += math.erfc(math.sqrt(x / 2))
+        low, high = (x, high) if 1 - more < probability else (low, x)
+    return x
+
+
+# --- What can be used ----------------------------------------------------------------------------
+
+
+def _message(measured, values, covariance, gate):
+    """Check a message, and return the part of it that is not NaN, or None."""
+    index = _index(measured)
+    values = _vector('values', values, len(index), nan_allowed=True)
+    covariance = _covariance('covariance', covariance, len(index))
+    if gate is not None:
+        gate = _gate(gate)
+    if np.isnan(values).all():
+        return None
+    return *_present(index, values, covariance), gate
+
+
+def _present(index, values, covariance):
+    there = ~np.isnan(values)
+    return index[there], values[there], covariance[np.ix_(there, there)]
+
+
+def _index(measured) -> np.ndarray:
+    measured = list(measured)
+    if len(measured) == len(STATE) and all(isinstance(m, bool | np.bool_) for m in measured):
+        index = np.flatnonzero(measured)
+    elif all(isinstance(name, str) and name in STATE for name in measured):
+        index = np.array([STATE.index(name) for name in measured], int)
+    else:
+        raise ValueError(
+            f'measured must be {len(STATE)} booleans or some of the names {", ".join(STATE)}, '
+            f'not {measured!r}.'
+        )
+    if len(index) == 0 or len(set(index)) < len(index):
+        raise ValueError(f'measured must name at least one part, and each once, not {measured!r}.')
+    return index
+
+
+def _vector(name: str, values, size: int, nan_allowed: bool = False) -> np.ndarray:
+    try:
+        vector = np.array(values, float)
+    except (TypeError, ValueError):
+        raise TypeError(f'{name} must be {size} numbers, not {values!r}.') from None
+    if vector.shape != (size,):
+        raise ValueError(f'{name} must be {size} numbers, not {values!r}.')
+    if np.isinf(vector).any() or (np.isnan(vector).any() and not nan_allowed):
+        raise ValueError(f'{name} must be finite, not {values!r}.')
+    return vector
+
+
+def _symmetric(name: str, matrix, size: int) -> np.ndarray:
+    try:
+        matrix = np.array(matrix, float)
+    except (TypeError, ValueError):
+        raise TypeError(f'{name} must be a matrix or variances, not {matrix!r}.') from None
+    if matrix.shape == (size,):
+        matrix = np.diag(matrix)
+    if matrix.shape != (size, size):
+        raise ValueError(
+            f'{name} must be {size} by {size}, or {size} variances, not {matrix.shape}.'
+        )
+    if not np.isfinite(matrix).all():
+        raise ValueError(f'{name} must be finite.')
+    if not np.allclose(matrix, matrix.T, rtol=1e-6, atol=0):
+        raise ValueError(f'{name} must be symmetric.')
+    return matrix
+
+
+def _covariance(name: str, matrix, size: int) -> np.ndarray:
+    matrix = _symmetric(name, matrix, size)
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        raise ValueError(
+            f'{name} must be positive definite: variances more than zero, and no two numbers '
+            'that always agree.'
+        ) from None
+    return matrix
+
+
+def _process_noise(noise) -> np.ndarray:
+    if noise is None or isinstance(noise, Mapping):
+        noise = list(_merged('process_noise', noise, PROCESS_NOISE).values())
+    matrix = _symmetric('process_noise', noise, len(STATE))
+    eigenvalues = np.linalg.eigvalsh(matrix)
+    if eigenvalues[0] < -1e-9 * abs(eigenvalues[-1]):
+        raise ValueError('process_noise must not be negative.')
+    return matrix
+
+
+def _merged(name: str, given: Mapping | None, defaults: Mapping) -> dict[str, float]:
+    given = {} if given is None else given
+    if not isinstance(given, Mapping):
+        raise TypeError(f'{name} must be a dict, not {given!r}.')
+    unknown = [key for key in given if key not in defaults]
+    if unknown:
+        raise ValueError(f'{name} knows {", ".join(defaults)}, not {unknown[0]!r}.')
+    return dict(defaults) | {key: _number(f'{name}[{key!r}]', given[key]) for key in given}
+
+
+def _variances(given: Mapping | None) -> dict[str, float]:
+    variances = _merged('variances', given, VARIANCES)
+    for name, variance in variances.items():
+        if variance <= 0:
+            raise ValueError(f'The variance of {name} must be positive, not {variance!r}.')
+    return variances
+
+
+def _gates(gate) -> dict[str, float | None]:
+    gates = gate if isinstance(gate, Mapping) else dict.fromkeys(SENSORS, gate)
+    for sensor in gates:
+        if sensor not in MESSAGES:
+            raise ValueError(f'gate knows {", ".join(SENSORS)}, not {sensor!r}.')
+    return {sensor: None if g is None else _gate(g) for sensor, g in gates.items()}
+
+
+def _gate(gate) -> float:
+    gate = _number('gate', gate)
+    if gate <= 0:
+        raise ValueError(f'gate must be a distance that is more than zero, not {gate!r}.')
+    return gate
+
+
+def _sensors(sensors) -> list[str]:
+    if isinstance(sensors, str) or not isinstance(sensors, Iterable):
+        raise TypeError(f'sensors must be a tuple of {", ".join(SENSORS)}, not {sensors!r}.')
+    sensors = list(sensors)
+    for sensor in sensors:
+        if sensor not in SENSORS:
+            raise ValueError(f'sensors must be some of {", ".join(SENSORS)}, not {sensor!r}.')
+    if not sensors:
+        raise ValueError(f'sensors must be at least one of {", ".join(SENSORS)}.')
+    return [sensor for sensor in SENSORS if sensor in sensors]
+
+
+def _number(name: str, value) -> float:
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise TypeError(f'{name} must be a number, not {value!r}.')
+    if not math.isfinite(value):
+        raise ValueError(f'{name} must be finite, not {value!r}.')
+    return float(value)
+
+
+def _table(measurements: pd.DataFrame, columns: list[str]) -> dict[str, np.ndarray]:
+    """Return `t` and the columns as arrays. `vy` is 0 wherever the wheels say something."""
+    if not isinstance(measurements, pd.DataFrame):
+        raise TypeError(f'A table of measurements is needed, not {type(measurements).__name__}.')
+    needed = ['t', *(name for name in columns if name != 'vy')]
+    table = _columns(measurements, needed)
+    if len(measurements) == 0:
+        raise ValueError('The table is empty.')
+    if not np.isfinite(table['t']).all():
+        raise ValueError('Every row needs its time: the column t must be finite.')
+    if (np.diff(table['t']) <= 0).any():
+        raise ValueError('The times must increase from row to row: sort t, and join equal times.')
+    for name in needed:
+        if np.isinf(table[name]).any():
+            raise ValueError(f'The column {name} must be finite, or NaN where it is silent.')
+    if 'vy' in columns:
+        silent = np.isnan(table['vx']) & np.isnan(table['vyaw'])
+        table['vy'] = np.where(silent, np.nan, 0.0)
+    return table
+
+
+def _columns(table: pd.DataFrame, names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Return the columns as arrays of numbers."""
+    names = list(names)
+    missing = [name for name in names if name not in table.columns]
+    if missing:
+        raise ValueError(f'The table lacks the column(s) {", ".join(missing)}.')
+    arrays = {}
+    for name in names:
+        if isinstance(table[name], pd.DataFrame):
+            raise ValueError(f'The table has the column {name} more than once.')
+        try:
+            arrays[name] = table[name].to_numpy(float, na_value=np.nan)
+        except (TypeError, ValueError):
+            raise TypeError(f'The column {name} must hold numbers.') from None
+    return arrays
