@@ -133,6 +133,8 @@ class ExtendedKalmanFilter:
         if dt < 0:
             raise ValueError(f'dt must be zero or more seconds, not {dt!r}.')
         self._predict(dt)
+        if self.t is not None:
+            self.t += dt
 
     def update(
         self,
@@ -151,7 +153,10 @@ class ExtendedKalmanFilter:
         Returns the innovation, or None if all values are NaN.
         """
         message = _message(measured, values, covariance, gate)
-        return None if message is None else self._correct(*message)
+        if message is None:
+            return None
+        self._empty = False
+        return self._correct(*message)
 
     def process(
         self,
@@ -185,7 +190,7 @@ class ExtendedKalmanFilter:
         if not self._empty:
             return self._correct(index, values, covariance, gate)
         self.state[index] = values
-        self.state = _wrapped(self.state)
+        _wrapped(self.state)
         self.covariance[np.ix_(index, index)] = covariance
         self._empty = False
         return None
@@ -219,6 +224,7 @@ def fuse(
     *,
     process_noise: Mapping[str, float] | Sequence | np.ndarray | None = None,
     variances: Mapping[str, float] | None = None,
+    config: Mapping[str, Sequence[bool] | Sequence[str]] | None = None,
     gate: float | Mapping[str, float] | None = None,
     initial_state: Sequence[float] | None = None,
     initial_covariance: Sequence | np.ndarray | None = None,
@@ -227,11 +233,14 @@ def fuse(
 
     `measurements` has the column `t` (s, increasing) and those of the chosen sensors, NaN where a
     sensor is silent: `vx` (m/s) and `vyaw` (rad/s) for 'odom'; `imu_yaw` (rad), `imu_vyaw` (rad/s)
-    and `ax` (m/s^2) for 'imu'; `gps_x` and `gps_y` (m) for 'gps'. In a row, odom is applied first,
-    then imu, then gps.
+    and `ax` (m/s^2) for 'imu'; `gps_x` and `gps_y` (m) for 'gps'. In a row, odom is applied first
+    (with vy = 0, because its wheels cannot move sideways), then yaw, vyaw and ax of the imu one
+    after the other, then gps: the calls of `ExtendedKalmanFilter.process` that MESSAGES lists.
 
-    `variances` replaces some of VARIANCES; `gate` is a Mahalanobis distance for all sensors, or a
-    dict of some; the others are as for `ExtendedKalmanFilter`.
+    `variances` replaces some of VARIANCES. `config` says which parts of the state a sensor
+    measures, where not all it can: {'odom': ('vx', 'vy')}, or 8 booleans instead of the names.
+    `gate` is a Mahalanobis distance for all sensors, or a dict: {'gps': 3.0}. The others are as for
+    `ExtendedKalmanFilter`.
 
     Returns a table with a row for each time: `t`, `x`, `y`, `yaw`, `vx`, `vy`, `vyaw`, and the
     covariances of pose and twist as a nav_msgs/Odometry has them: `var_x`, `cov_x_y`, `cov_x_yaw`,
@@ -240,35 +249,50 @@ def fuse(
     Raises ValueError or TypeError, with a sentence that says what to change, for a table or a
     setting that cannot be used.
     """
-    rows = _run(
-        measurements, sensors, process_noise, variances, gate, initial_state, initial_covariance
-    )
+    ekf = ExtendedKalmanFilter(process_noise, initial_state, initial_covariance)
     times, states, matrices = [], [], []
-    for t, ekf, _ in rows:
+    for t, _ in _run(ekf, measurements, sensors, variances, config, gate):
+        known = np.nan if ekf.t is None else 1.0
         times.append(t)
-        known = 1.0 if ekf.t is not None else np.nan
         states.append(known * ekf.state)
         matrices.append(known * ekf.covariance)
-    return _estimate(times, states, matrices)
+    columns = {'t': times} | dict(zip(STATE[:6], np.array(states).T, strict=False))
+    matrices = np.array(matrices)
+    for block in (POSE, TWIST):
+        for a, b in combinations_with_replacement(block, 2):
+            columns[_column(a, b)] = matrices[:, STATE.index(a), STATE.index(b)]
+    return pd.DataFrame(columns)
 
 
 def innovations(
-    measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **settings
+    measurements: pd.DataFrame,
+    sensors: Iterable[str] = SENSORS,
+    *,
+    process_noise: Mapping[str, float] | Sequence | np.ndarray | None = None,
+    variances: Mapping[str, float] | None = None,
+    config: Mapping[str, Sequence[bool] | Sequence[str]] | None = None,
+    gate: float | Mapping[str, float] | None = None,
+    initial_state: Sequence[float] | None = None,
+    initial_covariance: Sequence | np.ndarray | None = None,
 ) -> pd.DataFrame:
-    """Return how each message differed from what the filter expected: the arguments of `fuse`.
+    """Return how each message of `fuse`, with the same arguments, differed from the expected.
 
     One row for each number measured: `t`, `sensor`, `variable` (its name in STATE), `innovation`
     (measured minus expected), `sigma` (the standard deviation that the filter expects of it), and
     of the whole message `nis`, `dof` (how many numbers it measured) and `accepted`.
     """
-    rows = []
-    for t, _, heard in _run(measurements, sensors, **settings):
-        for sensor, innovation in heard:
-            sigma = np.sqrt(np.diag(innovation.covariance))
-            rows += [
-                (t, sensor, *one, innovation.nis, len(sigma), innovation.accepted)
-                for one in zip(innovation.measured, innovation.value, sigma, strict=True)
-            ]
+    ekf = ExtendedKalmanFilter(process_noise, initial_state, initial_covariance)
+    rows = [
+        (t, sensor, *number, message.nis, len(message.value), message.accepted)
+        for t, heard in _run(ekf, measurements, sensors, variances, config, gate)
+        for sensor, message in heard
+        for number in zip(
+            message.measured,
+            message.value,
+            np.sqrt(np.diag(message.covariance)),
+            strict=True,
+        )
+    ]
     columns = ['t', 'sensor', 'variable', 'innovation', 'sigma', 'nis', 'dof', 'accepted']
     return pd.DataFrame(rows, columns=columns)
 
@@ -290,19 +314,20 @@ def errors(estimate: pd.DataFrame, truth: pd.DataFrame) -> pd.DataFrame:
     `truth` has the columns `t`, `x`, `y`, `yaw`. Between its rows it is interpolated; it must
     cover the times of the estimate.
     """
-    times = estimate['t'].to_numpy(float)
-    known = truth['t'].to_numpy(float)
-    if len(times) and not (known[0] <= times[0] and times[-1] <= known[-1]):
+    estimate, truth = (_columns(table, ('t', *POSE)) for table in (estimate, truth))
+    t, known = estimate['t'], truth['t']
+    if not (len(known) and np.all(np.diff(known) > 0)):
+        raise ValueError('The truth needs rows whose times increase.')
+    if not np.all((known[0] <= t) & (t <= known[-1])):
         raise ValueError('The truth must cover all times of the estimate.')
-    yaw = np.interp(times, known, np.unwrap(truth['yaw']))
-    x, y = (estimate[name] - np.interp(times, known, truth[name]) for name in ('x', 'y'))
-    off = pd.DataFrame({'t': times, 'x': x, 'y': y, 'yaw': _angle(estimate['yaw'] - yaw)})
-    return off.assign(distance=np.hypot(x, y))
+    x, y = (estimate[name] - np.interp(t, known, truth[name]) for name in ('x', 'y'))
+    yaw = _angle(estimate['yaw'] - np.interp(t, known, np.unwrap(truth['yaw'])))
+    return pd.DataFrame({'t': t, 'x': x, 'y': y, 'yaw': yaw, 'distance': np.hypot(x, y)})
 
 
 def rmse(estimate: pd.DataFrame, truth: pd.DataFrame) -> float:
-    """Return the root mean square of the distance (m) between estimate and truth."""
-    return float(np.sqrt(np.mean(errors(estimate, truth)['distance'] ** 2)))
+    """Return the root mean square of the distance (m) between estimate and truth, as `errors`."""
+    return float(np.sqrt((errors(estimate, truth)['distance'] ** 2).mean()))
 
 
 def nees(
@@ -324,9 +349,14 @@ def chi_square_bounds(dof: int, runs: int = 1, probability: float = 0.95) -> tup
     `dof` is how many numbers each has: 1 for a yaw, 2 for a position. The runs are independent,
     and the same probability is left on both sides.
     """
-    degrees = int(dof) * int(runs)
+    for name, value in (('dof', dof), ('runs', runs)):
+        if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+            raise TypeError(f'{name} must be a whole number, not {value!r}.')
+        _positive(name, value)
+    if not 0 < _number('probability', probability) < 1:
+        raise ValueError(f'probability must be between 0 and 1, not {probability!r}.')
     outside = (1 - probability) / 2
-    return tuple(_chi_square(degrees, p) / runs for p in (outside, 1 - outside))
+    return tuple(_chi_square(dof * runs, p) / runs for p in (outside, 1 - outside))
 
 
 class Drive(NamedTuple):
@@ -342,65 +372,80 @@ def simulate(
     *,
     rate: float = 50.0,
     gps_period: float = 1.0,
-    wheel_scale: float = 1.03,
+    wheel_scale: float = 1.04,
     turn_scale: float = 1.05,
+    turn_bias: float = 0.012,
     gyro_bias: float = 0.002,
     slip: tuple[float, float] | None = None,
     slip_speed: float = 0.5,
     gps_outliers: int = 0,
     gps_jump: float = 20.0,
     gps_gap: tuple[float, float] | None = None,
-    imu_yaw: float = 0.0,
+    imu_mounting: float = 0.0,
+    variances: Mapping[str, float] | None = None,
 ) -> Drive:
     """Drive a unicycle for some seconds, and return what its sensors say and what is true.
 
     The robot starts at 0, 0 towards x, speeds up for two seconds, then swings between forwards and
     backwards, and turns left and right: the path of the drives in tests/data. Wheels and IMU speak
-    `rate` times a second, GPS every `gps_period` seconds, with the standard deviations of
-    VARIANCES. Noise and outliers depend on the seed and nothing else on anything by chance.
+    `rate` times a second, GPS every `gps_period` seconds. The noise is normal with VARIANCES, of
+    which `variances` replaces some. The seed decides the noise and the outliers, nothing else.
 
-    What is wrong with the sensors: the wheels report `wheel_scale` times the speed and
-    `turn_scale` times the turning rate; while they slip (`slip`: from, to in s) they report
-    `slip_speed` m/s more than the robot moves. The gyro reports `gyro_bias` rad/s too much. The
-    IMU is mounted turned by `imu_yaw` rad. `gps_outliers` of the fixes jump `gps_jump` metres
-    away, and there is no fix during `gps_gap` (from, to in s).
+    What else is wrong with the sensors: the wheels report `wheel_scale` times the speed, and
+    `turn_scale` times the turning rate plus `turn_bias` rad/s. While they slip (`slip`: from, to in
+    s) they report `slip_speed` m/s more than the robot moves. The gyro reports `gyro_bias` rad/s
+    too much. The IMU is mounted turned by `imu_mounting` rad, and reports in its own frame.
+    `gps_outliers` of the fixes, never the first, jump `gps_jump` metres away. There is no fix
+    during `gps_gap` (from, to in s).
 
     Returns `Drive(measurements, truth)`. The measurements have the columns that `fuse` reads, and
-    `ay`, the IMU's other acceleration (m/s^2), which a turned IMU needs; the truth has `t` and
-    the columns of STATE.
+    `ay`, the IMU's other acceleration (m/s^2), which a turned IMU needs. The truth has `t` and the
+    columns of STATE, with the centripetal acceleration as `ay`.
+
+    Raises ValueError or TypeError for a setting that cannot be used.
     """
-    rate, seconds = _number('rate', rate), _number('seconds', seconds)
+    settings = {'rate': rate, 'seconds': seconds, 'gps_period': gps_period}
+    rate, seconds, gps_period = (_positive(name, settings[name]) for name in settings)
+    variances = _variances(variances)
     t = np.arange(round(seconds * rate) + 1) / rate
     truth = _path(t)
-    rng = np.random.default_rng(seed)
-    noise = {name: rng.normal(0, math.sqrt(VARIANCES[name]), len(t)) for name in VARIANCES}
-    noise['ay'] = rng.normal(0, math.sqrt(VARIANCES['ax']), len(t))
-    vx, vyaw = truth['vx'].to_numpy(), truth['vyaw'].to_numpy()
-    spins = np.zeros(len(t)) if slip is None else slip_speed * ((t >= slip[0]) & (t < slip[1]))
-    cos, sin = math.cos(imu_yaw), math.sin(imu_yaw)
+    slips, gap = _during('slip', slip, t), _during('gps_gap', gps_gap, t)
+    cos, sin = math.cos(imu_mounting), math.sin(imu_mounting)
     said = {
-        'vx': wheel_scale * vx + spins,
-        'vyaw': turn_scale * vyaw,
-        'imu_yaw': truth['yaw'] + imu_yaw,
-        'imu_vyaw': vyaw + gyro_bias,
+        'vx': wheel_scale * truth['vx'] + slip_speed * slips,
+        'vyaw': turn_scale * truth['vyaw'] + turn_bias,
+        'imu_yaw': truth['yaw'] + imu_mounting,
+        'imu_vyaw': truth['vyaw'] + gyro_bias,
         'ax': cos * truth['ax'] + sin * truth['ay'],
         'ay': cos * truth['ay'] - sin * truth['ax'],
         'gps_x': truth['x'],
         'gps_y': truth['y'],
     }
-    measurements = pd.DataFrame({'t': t} | {name: said[name] + noise[name] for name in said})
+    rng = np.random.default_rng(seed)
+    sigma = np.sqrt([variances['ax' if name == 'ay' else name] for name in said])
+    measurements = pd.DataFrame(said) + rng.normal(0, sigma, (len(t), len(sigma)))
+    measurements.insert(0, 't', t)
     measurements['imu_yaw'] = _angle(measurements['imu_yaw'])
-    every = max(1, round(gps_period * rate))
-    heard = np.arange(len(t)) % every == 0
-    if gps_gap is not None:
-        heard &= (t < gps_gap[0]) | (t >= gps_gap[1])
-    if gps_outliers:
-        rows = rng.choice(np.flatnonzero(heard)[1:], gps_outliers, replace=False)
-        to = rng.uniform(-math.pi, math.pi, gps_outliers)
-        jump = gps_jump * np.column_stack([np.cos(to), np.sin(to)])
-        measurements.loc[rows, ['gps_x', 'gps_y']] += jump
-    measurements.loc[~heard, ['gps_x', 'gps_y']] = np.nan
+    fix = (np.arange(len(t)) % max(1, round(gps_period * rate)) == 0) & ~gap
+    later = np.flatnonzero(fix)[1:]
+    if not 0 <= gps_outliers <= len(later):
+        raise ValueError(f'gps_outliers must be 0 to {len(later)}, not {gps_outliers!r}.')
+    direction = rng.uniform(-math.pi, math.pi, gps_outliers)
+    measurements.loc[rng.choice(later, gps_outliers, replace=False), ['gps_x', 'gps_y']] += (
+        gps_jump * np.column_stack([np.cos(direction), np.sin(direction)])
+    )
+    measurements.loc[~fix, ['gps_x', 'gps_y']] = np.nan
     return Drive(measurements, truth)
+
+
+def _during(name: str, interval: tuple[float, float] | None, t: np.ndarray) -> np.ndarray:
+    """Which of the times lie in the interval; its end does not."""
+    if interval is None:
+        return np.zeros(len(t), bool)
+    start, end = _vector(name, interval, 2)
+    if not start < end:
+        raise ValueError(f'{name} must be (from, to) in seconds, not {interval!r}.')
+    return (start <= t) & (t < end)
 
 
 def _path(t: np.ndarray) -> pd.DataFrame:
@@ -425,20 +470,14 @@ def _path(t: np.ndarray) -> pd.DataFrame:
 
 
 def _run(
-    measurements: pd.DataFrame,
-    sensors: Iterable[str] = SENSORS,
-    process_noise=None,
-    variances=None,
-    gate=None,
-    initial_state=None,
-    initial_covariance=None,
-) -> Iterator[tuple[float, ExtendedKalmanFilter, list[tuple[str, Innovation]]]]:
-    """Go through the rows: yield the time, the filter, and the innovations of the row."""
+    ekf: ExtendedKalmanFilter, measurements: pd.DataFrame, sensors, variances, config, gate
+) -> Iterator[tuple[float, list[tuple[str, Innovation]]]]:
+    """Feed the rows to the filter. After each, yield its time and the innovations by sensor."""
     sensors = _sensors(sensors)
-    gates = _gates(gate)
     variances = _variances(variances)
-    ekf = ExtendedKalmanFilter(process_noise, initial_state, initial_covariance)
-    messages = [(sensor, parts) for sensor in sensors for parts in MESSAGES[sensor]]
+    messages = _messages(sensors, config)
+    gates = gate if isinstance(gate, Mapping) else dict.fromkeys(sensors, gate)
+    gates = {_known('gate', sensor, SENSORS): _gate(gates[sensor]) for sensor in gates}
     table = _table(measurements, [name for _, parts in messages for name in parts.values()])
     prepared = []
     for sensor, parts in messages:
@@ -453,26 +492,16 @@ def _run(
     for row, t in enumerate(table['t'].tolist()):
         heard = []
         for sensor, index, values, covariance, some, whole in prepared:
-            if not some[row]:
-                continue
-            message = index, values[row], covariance
-            if not whole[row]:
-                message = _present(*message)
-            innovation = ekf._process(t, *message, gates.get(sensor))
-            if innovation is not None:
-                heard.append((sensor, innovation))
+            if some[row]:
+                message = index, values[row], covariance
+                if not whole[row]:
+                    message = _present(*message)
+                innovation = ekf._process(t, *message, gates.get(sensor))
+                if innovation is not None:
+                    heard.append((sensor, innovation))
         if ekf.t is not None:
             ekf._advance(t)
-        yield t, ekf, heard
-
-
-def _estimate(times: list, states: list, matrices: list) -> pd.DataFrame:
-    columns = {'t': times} | dict(zip(POSE + TWIST, np.array(states).T, strict=False))
-    matrices = np.array(matrices)
-    for block in (POSE, TWIST):
-        for a, b in combinations_with_replacement(block, 2):
-            columns[_column(a, b)] = matrices[:, STATE.index(a), STATE.index(b)]
-    return pd.DataFrame(columns)
+        yield t, heard
 
 
 def _column(a: str, b: str) -> str:
@@ -482,7 +511,9 @@ def _column(a: str, b: str) -> str:
 
 
 def _wrapped(state: np.ndarray) -> np.ndarray:
-    return state - _TURN * np.round(state / math.tau)
+    """The same state, with the yaw between -pi and pi. Changes `state` itself."""
+    state[_YAW] = math.remainder(state[_YAW], math.tau)
+    return state
 
 
 def _angle(radians):
@@ -513,8 +544,7 @@ def _message(measured, values, covariance, gate):
     index = _index(measured)
     values = _vector('values', values, len(index), nan_allowed=True)
     covariance = _covariance('covariance', covariance, len(index))
-    if gate is not None:
-        gate = _gate(gate)
+    gate = _gate(gate)
     if np.isnan(values).all():
         return None
     return *_present(index, values, covariance), gate
@@ -594,48 +624,62 @@ def _process_noise(noise) -> np.ndarray:
 
 
 def _merged(name: str, given: Mapping | None, defaults: Mapping) -> dict[str, float]:
-    given = {} if given is None else given
-    if not isinstance(given, Mapping):
+    """The defaults, some of them replaced."""
+    if not isinstance(given, Mapping | None):
         raise TypeError(f'{name} must be a dict, not {given!r}.')
-    unknown = [key for key in given if key not in defaults]
-    if unknown:
-        raise ValueError(f'{name} knows {", ".join(defaults)}, not {unknown[0]!r}.')
-    return dict(defaults) | {key: _number(f'{name}[{key!r}]', given[key]) for key in given}
+    return dict(defaults) | {
+        _known(name, key, defaults): _number(f'{name}[{key!r}]', value)
+        for key, value in (given or {}).items()
+    }
 
 
 def _variances(given: Mapping | None) -> dict[str, float]:
     variances = _merged('variances', given, VARIANCES)
-    for name, variance in variances.items():
-        if variance <= 0:
-            raise ValueError(f'The variance of {name} must be positive, not {variance!r}.')
-    return variances
-
-
-def _gates(gate) -> dict[str, float | None]:
-    gates = gate if isinstance(gate, Mapping) else dict.fromkeys(SENSORS, gate)
-    for sensor in gates:
-        if sensor not in MESSAGES:
-            raise ValueError(f'gate knows {", ".join(SENSORS)}, not {sensor!r}.')
-    return {sensor: None if g is None else _gate(g) for sensor, g in gates.items()}
-
-
-def _gate(gate) -> float:
-    gate = _number('gate', gate)
-    if gate <= 0:
-        raise ValueError(f'gate must be a distance that is more than zero, not {gate!r}.')
-    return gate
+    return {name: _positive(f'variances[{name!r}]', variances[name]) for name in variances}
 
 
 def _sensors(sensors) -> list[str]:
     if isinstance(sensors, str) or not isinstance(sensors, Iterable):
         raise TypeError(f'sensors must be a tuple of {", ".join(SENSORS)}, not {sensors!r}.')
-    sensors = list(sensors)
-    for sensor in sensors:
-        if sensor not in SENSORS:
-            raise ValueError(f'sensors must be some of {", ".join(SENSORS)}, not {sensor!r}.')
-    if not sensors:
+    chosen = [_known('sensors', sensor, SENSORS) for sensor in sensors]
+    if not chosen:
         raise ValueError(f'sensors must be at least one of {", ".join(SENSORS)}.')
-    return [sensor for sensor in SENSORS if sensor in sensors]
+    return [sensor for sensor in SENSORS if sensor in chosen]
+
+
+def _messages(sensors: list[str], config) -> list[tuple[str, dict[str, str]]]:
+    """The messages of the sensors, without the parts that are not to be used."""
+    if not isinstance(config, Mapping | None):
+        raise TypeError(f'config must be a dict, not {config!r}.')
+    used = {sensor: {name for parts in MESSAGES[sensor] for name in parts} for sensor in SENSORS}
+    for sensor, measured in (config or {}).items():
+        can = used[_known('config', sensor, SENSORS)]
+        names = {STATE[i] for i in _index(measured)}
+        if not names <= can:
+            raise ValueError(f'{sensor} cannot measure {", ".join(sorted(names - can))}.')
+        used[sensor] = names
+    messages = [
+        (sensor, {name: parts[name] for name in parts if name in used[sensor]})
+        for sensor in sensors
+        for parts in MESSAGES[sensor]
+    ]
+    return [(sensor, parts) for sensor, parts in messages if parts]
+
+
+def _gate(gate) -> float | None:
+    return None if gate is None else _positive('gate', gate)
+
+
+def _known(name: str, key, allowed: Iterable[str]) -> str:
+    if key not in allowed:
+        raise ValueError(f'{name} can name {", ".join(allowed)}, not {key!r}.')
+    return key
+
+
+def _positive(name: str, value) -> float:
+    if _number(name, value) <= 0:
+        raise ValueError(f'{name} must be positive, not {value!r}.')
+    return float(value)
 
 
 def _number(name: str, value) -> float:
@@ -647,10 +691,12 @@ def _number(name: str, value) -> float:
 
 
 def _table(measurements: pd.DataFrame, columns: list[str]) -> dict[str, np.ndarray]:
-    """Return `t` and the columns as arrays. `vy` is 0 wherever the wheels say something."""
+    """Return `t` and the columns as arrays."""
     if not isinstance(measurements, pd.DataFrame):
         raise TypeError(f'A table of measurements is needed, not {type(measurements).__name__}.')
-    needed = ['t', *(name for name in columns if name != 'vy')]
+    if 'vy' in columns:  # no column: the wheels say it whenever they say something
+        columns = [*columns, 'vx', 'vyaw']
+    needed = ['t', *(name for name in dict.fromkeys(columns) if name != 'vy')]
     table = _columns(measurements, needed)
     if len(measurements) == 0:
         raise ValueError('The table is empty.')
