@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_complex_dtype, is_numeric_dtype
 
 STATE = ('x', 'y', 'yaw', 'vx', 'vy', 'vyaw', 'ax', 'ay')
 
@@ -303,7 +304,9 @@ def covariances(estimate: pd.DataFrame, names: Sequence[str] = ('x', 'y')) -> np
     The names are parts of the pose (x, y, yaw) or of the twist (vx, vy, vyaw), not of both.
     """
     if not (names and (set(names) <= set(POSE) or set(names) <= set(TWIST))):
-        raise ValueError(f'names must be some of {POSE} or some of {TWIST}, not {names!r}.')
+        raise ValueError(
+            f'names must be some of {", ".join(POSE)} or some of {", ".join(TWIST)}, not {names!r}.'
+        )
     columns = _columns(estimate, {_column(a, b) for a in names for b in names})
     return np.array([[columns[_column(a, b)] for b in names] for a in names]).transpose(2, 0, 1)
 
@@ -350,9 +353,7 @@ def chi_square_bounds(dof: int, runs: int = 1, probability: float = 0.95) -> tup
     and the same probability is left on both sides.
     """
     for name, value in (('dof', dof), ('runs', runs)):
-        if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-            raise TypeError(f'{name} must be a whole number, not {value!r}.')
-        _positive(name, value)
+        _positive(name, _whole(name, value))
     if not 0 < _number('probability', probability) < 1:
         raise ValueError(f'probability must be between 0 and 1, not {probability!r}.')
     outside = (1 - probability) / 2
@@ -404,8 +405,18 @@ def simulate(
 
     Raises ValueError or TypeError for a setting that cannot be used.
     """
-    settings = {'rate': rate, 'seconds': seconds, 'gps_period': gps_period}
-    rate, seconds, gps_period = (_positive(name, settings[name]) for name in settings)
+    for name, value in (('seconds', seconds), ('rate', rate), ('gps_period', gps_period)):
+        _positive(name, value)
+    for name, value in (
+        ('wheel_scale', wheel_scale),
+        ('turn_scale', turn_scale),
+        ('turn_bias', turn_bias),
+        ('gyro_bias', gyro_bias),
+        ('slip_speed', slip_speed),
+        ('gps_jump', gps_jump),
+        ('imu_mounting', imu_mounting),
+    ):
+        _number(name, value)
     variances = _variances(variances)
     t = np.arange(round(seconds * rate) + 1) / rate
     truth = _path(t)
@@ -428,7 +439,7 @@ def simulate(
     measurements['imu_yaw'] = _angle(measurements['imu_yaw'])
     fix = (np.arange(len(t)) % max(1, round(gps_period * rate)) == 0) & ~gap
     later = np.flatnonzero(fix)[1:]
-    if not 0 <= gps_outliers <= len(later):
+    if not 0 <= _whole('gps_outliers', gps_outliers) <= len(later):
         raise ValueError(f'gps_outliers must be 0 to {len(later)}, not {gps_outliers!r}.')
     direction = rng.uniform(-math.pi, math.pi, gps_outliers)
     measurements.loc[rng.choice(later, gps_outliers, replace=False), ['gps_x', 'gps_y']] += (
@@ -556,16 +567,19 @@ def _present(index, values, covariance):
 
 
 def _index(measured) -> np.ndarray:
+    allowed = (
+        f'measured must be {len(STATE)} booleans or some of the names {", ".join(STATE)}, '
+        f'not {measured!r}.'
+    )
+    if not isinstance(measured, Iterable):
+        raise TypeError(allowed)
     measured = list(measured)
     if len(measured) == len(STATE) and all(isinstance(m, bool | np.bool_) for m in measured):
         index = np.flatnonzero(measured)
     elif all(isinstance(name, str) and name in STATE for name in measured):
         index = np.array([STATE.index(name) for name in measured], int)
     else:
-        raise ValueError(
-            f'measured must be {len(STATE)} booleans or some of the names {", ".join(STATE)}, '
-            f'not {measured!r}.'
-        )
+        raise ValueError(allowed)
     if len(index) == 0 or len(set(index)) < len(index):
         raise ValueError(f'measured must name at least one part, and each once, not {measured!r}.')
     return index
@@ -619,7 +633,7 @@ def _process_noise(noise) -> np.ndarray:
     matrix = _symmetric('process_noise', noise, len(STATE))
     eigenvalues = np.linalg.eigvalsh(matrix)
     if eigenvalues[0] < -1e-9 * abs(eigenvalues[-1]):
-        raise ValueError('process_noise must not be negative.')
+        raise ValueError('process_noise must be positive semidefinite: no variance less than zero.')
     return matrix
 
 
@@ -682,6 +696,12 @@ def _positive(name: str, value) -> float:
     return float(value)
 
 
+def _whole(name: str, value) -> int:
+    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
+        raise TypeError(f'{name} must be a whole number, not {value!r}.')
+    return int(value)
+
+
 def _number(name: str, value) -> float:
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise TypeError(f'{name} must be a number, not {value!r}.')
@@ -723,8 +743,10 @@ def _columns(table: pd.DataFrame, names: Iterable[str]) -> dict[str, np.ndarray]
     for name in names:
         if isinstance(table[name], pd.DataFrame):
             raise ValueError(f'The table has the column {name} more than once.')
-        try:
-            arrays[name] = table[name].to_numpy(float, na_value=np.nan)
-        except (TypeError, ValueError):
-            raise TypeError(f'The column {name} must hold numbers.') from None
+        column = table[name].infer_objects()
+        if column.isna().all():
+            column = column.astype(float)
+        if not is_numeric_dtype(column) or is_complex_dtype(column):
+            raise TypeError(f'The column {name} must hold numbers.')
+        arrays[name] = column.to_numpy(float, na_value=np.nan)
     return arrays
