@@ -782,8 +782,8 @@ def table(**columns):
 @pytest.mark.parametrize(
     ('measurements', 'error', 'said'),
     [
-        (None, TypeError, 'A table of measurements is needed, not NoneType.'),
-        ({'t': [0]}, TypeError, 'A table of measurements is needed, not dict.'),
+        (None, TypeError, 'A table (pandas.DataFrame) is needed, not NoneType.'),
+        ({'t': [0]}, TypeError, 'A table (pandas.DataFrame) is needed, not dict.'),
         (lambda: table()[:0], ValueError, 'The table is empty.'),
         (
             lambda: table().drop(columns=['t', 'ax']),
