@@ -345,9 +345,15 @@ def nees(
     In a consistent filter it is chi-square with len(names) degrees of freedom. `names` are parts
     of the pose.
     """
-    off = errors(estimate, truth)[list(names)].to_numpy()
+    if not set(names) <= set(POSE):
+        raise ValueError(f'names must be some of {", ".join(POSE)}, not {names!r}.')
     matrices = covariances(estimate, names)
-    return np.einsum('ni,ni->n', off, np.linalg.solve(matrices, off[..., None])[..., 0])
+    off = errors(estimate, truth)[list(names)].to_numpy()
+    try:
+        weighted = np.linalg.solve(matrices, off[..., None])[..., 0]
+    except np.linalg.LinAlgError:
+        raise ValueError('The covariance of each row must be positive definite.') from None
+    return np.sum(off * weighted, axis=1)
 
 
 def chi_square_bounds(dof: int, runs: int = 1, probability: float = 0.95) -> tuple[float, float]:
@@ -409,6 +415,8 @@ def simulate(
 
     Raises ValueError or TypeError for a setting that cannot be used.
     """
+    if _whole('seed', seed) < 0:
+        raise ValueError(f'seed must be zero or more, not {seed!r}.')
     for name, value in (('seconds', seconds), ('rate', rate), ('gps_period', gps_period)):
         _positive(name, value)
     for name, value in (
