@@ -9,6 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from lab_server import Server
 from playwright.sync_api import ElementHandle, Page
 
 LIMIT_S = 300  # for what a lesson computes; everything else has Playwright's 30 s
@@ -25,12 +26,10 @@ CODE_CELLS = f"[...{PANEL}.content.model.cells].filter(cell => cell.type === 'co
 FAILED = "cell => cell.outputs.toJSON().some(output => output.output_type === 'error')"
 ALL_RAN = f"""() => {IDLE} && ({CODE_CELLS}.some({FAILED})
     || {CODE_CELLS}.every(cell => cell.executionCount !== null))"""
-CELL_RAN = f"""([index, before]) => {{
+CELL_RAN = f"""index => {{
     const cell = {PANEL}.content.model.cells.get(index);
-    return {IDLE} && cell.executionState === 'idle'
-        && cell.executionCount !== null && cell.executionCount !== before;
+    return {IDLE} && cell.executionState === 'idle' && cell.executionCount !== null;
 }}"""
-
 SLIDE_DRAWN = f"""index => {{
     const widgets = {PANEL}.content.widgets;
     const slide = widgets.filter(cell => cell.node.classList.contains('jp-deck-mod-onscreen'));
@@ -50,9 +49,10 @@ SLIDE_DRAWN = f"""index => {{
 class LabPage:
     """One tab of the browser, on a server that `make lab` or `make present` started."""
 
-    def __init__(self, page: Page, server: Any) -> None:
+    def __init__(self, page: Page, server: Server, artefacts: Path) -> None:
         self.page = page
         self.server = server
+        self.artefacts = artefacts
 
     def goto(self, path: str, **wait: Any) -> None:
         """Open an address of the server."""
@@ -90,7 +90,7 @@ class LabPage:
         self.command('notebook:clear-all-cell-outputs')
         self.menu(menu, item)
         if menu == 'Kernel':
-            self.page.locator('.jp-Dialog').get_by_role('button', name='Restart').click()
+            self.page.locator('.jp-Dialog .jp-mod-accept').click()
         self.wait_until_all_ran()
 
     def wait_until_all_ran(self) -> None:
@@ -136,20 +136,22 @@ class LabPage:
         self.page.keyboard.insert_text(source)
 
     def start(self, index: int) -> None:
-        """Select a cell with a click and press Ctrl+Enter."""
+        """Select a cell with a click, and press Ctrl+Enter. It has no number until it has run."""
+        self.page.evaluate(
+            f'index => {PANEL}.content.model.cells.get(index).clearExecution()', index
+        )
         self.show(index).query_selector('.jp-InputPrompt').click()
         self.page.keyboard.press('Control+Enter')
 
     def run(self, index: int) -> str:
         """Run a cell, wait for its end, and return what it printed."""
-        before = self.cells()[index]['execution_count']
         self.start(index)
-        self.wait_until_ran(index, before)
+        self.wait_until_ran(index)
         return printed(self.cells()[index])
 
-    def wait_until_ran(self, index: int, before: int | None) -> None:
-        """Wait until a cell has a number other than `before`, and its kernel nothing to do."""
-        self.page.wait_for_function(CELL_RAN, arg=[index, before], timeout=LIMIT_S * 1000)
+    def wait_until_ran(self, index: int) -> None:
+        """Wait until a cell has a number, and its kernel nothing to do."""
+        self.page.wait_for_function(CELL_RAN, arg=index, timeout=LIMIT_S * 1000)
 
     # Slides
 
@@ -183,7 +185,7 @@ class LabPage:
 
     def screenshot(self, *path: str) -> None:
         """Save what is seen as a PNG below the folder of the artefacts."""
-        file = Path(self.server.artefacts, *path).with_suffix('.png')
+        file = Path(self.artefacts, *path).with_suffix('.png')
         file.parent.mkdir(parents=True, exist_ok=True)
         self.page.screenshot(path=file)
 

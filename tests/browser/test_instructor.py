@@ -3,11 +3,10 @@
 import nbformat
 import pytest
 from lab_page import PANEL, complaints, printed
+from lab_server import NOTEBOOKS
 
-from conftest import ROOT
 from tools.slides import slide_types
 
-PATHS = sorted((ROOT / 'notebooks').glob('*.ipynb'))
 # What of a slide is cut off, or needs a scroll bar.
 CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
     if (!cell.node.classList.contains('jp-deck-mod-onscreen')) return [];
@@ -28,7 +27,7 @@ CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
 }})"""
 
 
-@pytest.mark.parametrize('path', PATHS, ids=[path.name for path in PATHS])
+@pytest.mark.parametrize('path', NOTEBOOKS, ids=[path.name for path in NOTEBOOKS])
 def test_every_slide_is_reached_and_nothing_is_cut_off(deck, path):
     notebook = nbformat.read(path, as_version=4)
     wanted = [i for i, kind in enumerate(slide_types(notebook)) if kind != 'skip']
@@ -67,11 +66,11 @@ def test_run_and_change_a_cell_in_a_slide(deck):
     deck.page.keyboard.press('Control+A')
     deck.page.keyboard.insert_text('robots = 2')
     deck.page.keyboard.press('Control+Enter')
-    deck.wait_until_ran(starter, None)
+    deck.wait_until_ran(starter)
     while deck.active() < check:
         deck.press('Space')
     deck.page.keyboard.press('Control+Enter')
-    deck.wait_until_ran(check, None)
+    deck.wait_until_ran(check)
     assert complaints(deck.cells()[check]) == []
     assert 'All done.' in printed(deck.cells()[check])
     assert deck.page.evaluate(CUT_OFF) == []

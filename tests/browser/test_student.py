@@ -2,10 +2,7 @@
 
 import pytest
 from lab_page import PANEL, complaints, printed
-
-from conftest import ROOT
-
-LESSONS = sorted(path.name for path in (ROOT / 'notebooks').glob('*.ipynb'))
+from lab_server import NOTEBOOKS
 
 
 def assert_all_ran(lab):
@@ -23,7 +20,7 @@ def assert_all_ran(lab):
         assert len(images) >= len(saved)
 
 
-@pytest.mark.parametrize('name', LESSONS)
+@pytest.mark.parametrize('name', [path.name for path in NOTEBOOKS])
 def test_open_a_lesson_and_run_all(lab, name):
     lab.open(name)
     lab.run_all()
@@ -86,11 +83,10 @@ def test_interrupt_an_experiment_and_run_it_again(lab):
     for index in range(experiment):
         if lab.cells()[index]['cell_type'] == 'code':
             lab.run(index)
-    lab.command('notebook:clear-all-cell-outputs')
     lab.start(experiment)
     lab.page.wait_for_function(f"() => {PANEL}.sessionContext.session.kernel.status === 'busy'")
     lab.page.locator('.jp-NotebookPanel-toolbar [data-command="notebook:interrupt-kernel"]').click()
-    lab.wait_until_ran(experiment, None)
+    lab.wait_until_ran(experiment)
     assert any('KeyboardInterrupt' in text for text in complaints(lab.cells()[experiment]))
     lab.screenshot('interrupted')
     lab.run(experiment)
