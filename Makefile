@@ -21,6 +21,9 @@ test-browser: ## the real JupyterLab in Chromium, as students and instructors us
 notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
 	@$(PYTHON) tools/notebooks.py $(if $(LESSON),--lesson "$(LESSON)")
 
+slides: set_up ## write the lessons as HTML slides into slides/, which need no network; LESSON=02 for one
+	@$(PYTHON) tools/export_slides.py $(if $(LESSON),--lesson "$(LESSON)")
+
 lint: set_up ## ruff: style and format of modules and notebooks
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
 
@@ -28,13 +31,13 @@ lock: set_up ## write requirements.lock from pyproject.toml; UPGRADE=yes takes n
 	@tools/lock.sh .venv/bin/uv $(if $(filter yes,$(UPGRADE)),--upgrade)
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built
-	rm -rf .venv .jupyter scratch .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv .jupyter scratch slides .hypothesis .pytest_cache .ruff_cache
 	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-browser notebooks lint lock clean set_up
+.PHONY: help lab present test test-browser notebooks slides lint lock clean set_up
 
 PYTHON := .venv/bin/python
 

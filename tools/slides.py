@@ -27,10 +27,10 @@ ALONE = {'deck-break', 'solution'}
 # The sizes of deck.css, in hundredths of the slide's height. Letters are taken a little wider than
 # in most fonts. tests/browser measures what they really are.
 SLIDE, WIDTH = 97.0, 148.0
-FOLDED, BORDER = 4.0, 1.4
-PROSE_LINE, PROSE_GAP, PROSE_CHARACTERS, PROSE_PICTURE = 4.2, 3.0, 88, 47.0
-HEADINGS = {'#': 13.0, '##': 11.0, '###': 8.5}
-TABLE_ROW = 5.7
+FOLDED, BORDER = 4.0, 1.5
+PROSE_LINE, PROSE_GAP, PROSE_CHARACTERS, PROSE_PICTURE = 4.2, 3.1, 82, 47.0
+HEADINGS = {'#': 17.0, '##': 12.0, '###': 9.0}
+TABLE_ROW = 4.6
 # Lines of code at most: the size of a letter, the height of a figure.
 CODE = {8: (2.4, 62.0), 18: (2.4, 40.0), 26: (2.15, 28.0), 999: (1.85, 28.0)}
 CODE_LINE, CODE_CHARACTER = 1.3, 0.61  # times the size of a letter

@@ -44,6 +44,13 @@ def instructor_server(tmp_path_factory) -> Iterator[Server]:
 
 
 @pytest.fixture(scope='session')
+def artefacts() -> Path:
+    """Return the folder of the screenshots."""
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    return ARTEFACTS
+
+
+@pytest.fixture(scope='session')
 def chromium() -> Iterator[Browser]:
     """Yield the Chromium that `make test-browser` found."""
     with sync_playwright() as playwright:
