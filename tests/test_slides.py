@@ -46,14 +46,22 @@ def table(rows):
         ([TITLE, STEP, code(18), text(), code(16)], 'slide slide fragment subslide fragment'),
         # except where the two do not fit together either.
         (
-            [TITLE, STEP, text('word ' * 180), code(25, outputs=printed(5))],
-            'slide slide subslide subslide',
+            [TITLE, STEP, text('word ' * 80), code(25, outputs=printed(8))],
+            'slide slide fragment subslide',
         ),
+        ([TITLE, code(), text('### Explain\n\nWhy.')], 'slide fragment fragment'),
+        ([TITLE, code(24), text('### Explain\n\n' + 'word ' * 80)], 'slide fragment subslide'),
         ([TITLE, code(), code(1, 'solution'), code(1)], 'slide fragment subslide fragment'),
         ([TITLE, text('', 'deck-break'), code()], 'slide subslide fragment'),
         ([TITLE, code(25, 'deck-skip'), code(16)], 'slide skip fragment'),
         ([TITLE, text('word ' * 400, 'notes'), code(16)], 'slide skip fragment'),
         ([text('First.', 'notes'), TITLE, STEP], 'skip slide slide'),
+        ([code(1, 'deck-skip'), code()], 'skip slide'),
+        # A note does not part a text from its code.
+        (
+            [TITLE, code(18), text(), text('Ask.', 'notes'), code(16)],
+            'slide fragment subslide skip fragment',
+        ),
     ],
 )
 def test_the_rule(cells, types):

@@ -2,7 +2,8 @@
 
 A title and a step (`#`, `##`) start a slide. What follows is revealed on it, cell by cell, as long
 as it fits: `fragment`. A part (`###`), a solution, and what no longer fits start a slide below it:
-`subslide`. A cell stays together with the text that leads to it, where a slide has room for both.
+`subslide`. A cell stays together with the text that leads to it, where a slide has room for both,
+and `### Explain` with what it explains.
 
 Where the rule is wrong for a cell, a tag of the cell (JupyterLab, Property Inspector) changes it:
 
@@ -42,10 +43,10 @@ def slide_types(notebook: NotebookNode) -> list[str]:
     used = 0.0
     for group in _groups(notebook):
         heights = [height(cell) for cell in group]
-        for count, cell in enumerate(group):
-            needed = heights[count] if count else sum(heights)
-            kind = _slide_type(cell, not types, used + needed <= SLIDE)
-            used = heights[count] + (used if kind in ('fragment', 'skip') else 0)
+        together = [sum(heights) if sum(heights) <= SLIDE else heights[0], *heights[1:]]
+        for cell, own, needed in zip(group, heights, together, strict=True):
+            kind = _slide_type(cell, set(types) <= {'skip'}, used + needed <= SLIDE)
+            used = own + (used if kind in ('fragment', 'skip') else 0)
             types.append(kind)
     return types
 
@@ -53,13 +54,12 @@ def slide_types(notebook: NotebookNode) -> list[str]:
 def _groups(notebook: NotebookNode) -> list[list[NotebookNode]]:
     """Return the cells in groups: text, and the code that it leads to."""
     groups: list[list[NotebookNode]] = []
-    before = None
     for cell in notebook.cells:
-        if cell.cell_type != 'markdown' and before is not None and not _tags(cell) & ALONE:
+        follows = _tags(cell) & SKIPPED or cell.cell_type != 'markdown' and not _tags(cell) & ALONE
+        if groups and follows:
             groups[-1].append(cell)
         else:
             groups.append([cell])
-        before = cell
     return groups
 
 
@@ -68,7 +68,7 @@ def _slide_type(cell: NotebookNode, first: bool, fits: bool) -> str:
         return 'skip'
     if first or re.match(r'##? ', cell.source):
         return 'slide'
-    if not fits or cell.source.startswith('### ') or _tags(cell) & ALONE:
+    if not fits or re.match('### (?!Explain)', cell.source) or _tags(cell) & ALONE:
         return 'subslide'
     return 'fragment'
 

@@ -89,11 +89,11 @@ def test_every_slide_is_reached_and_nothing_is_cut_off(open_deck, artefacts, pat
 
 def test_formulas_are_drawn_and_notes_and_solutions_are_not_shown(open_deck, artefacts):
     page = open_deck('99_try_formulas.html')
-    assert page.locator('mjx-container').count() == 4
+    assert page.locator('.slides mjx-container').count() == 4
     page.keyboard.press('ArrowRight')
     page.wait_for_function('() => Reveal.getIndices().h === 1')
     page.screenshot(path=artefacts / 'formulas_exported.png')
-    boxes = page.locator('.present mjx-container').all()
+    boxes = page.locator('.slides section.present section.present mjx-container').all()
     assert all(formula.bounding_box()['height'] > 10 for formula in boxes)
     assert '$' not in page.locator('.slides').inner_text()
     assert page.locator('text=secret').count() == 0
