@@ -36,7 +36,7 @@ from traitlets import default
 from tools.slides import slide_types
 
 FOLDER = Path(__file__).resolve().parent.parent / 'notebooks'
-CELL_TIMEOUT_S = 60
+CELL_TIMEOUT_S = 100
 # The README and lesson 00 show these: the id of a cell, and the file for its picture.
 PICTURES = {'lost-before-none-after': 'images/lost_before_none_after.png'}
 NOTEBOOK_METADATA = {
