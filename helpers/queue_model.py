@@ -20,7 +20,8 @@ import pandas as pd
 
 from helpers.recording import COLUMNS, check_table
 
-# A worker may be late, on a busy machine; it may not rest for this part of a callback.
+# A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as long
+# as callbacks and timers of the same run were late.
 REST = 0.4
 
 
@@ -240,10 +241,11 @@ def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -
     # A worker that stays free to the end, perhaps one that never worked at all.
     ends = np.append(ends, times[order][-1])[: len(starts)]
     rested = np.interp(ends, edges, waited) - np.interp(starts, edges, waited)
+    allowed = REST * callbacks.median() + np.ptp(callbacks) + np.ptp(periods)
     return [
         f'Message {table["seq"].iloc[lost[np.searchsorted(pushed_out, starts[i], "right")]]} was '
         f'pushed out although a worker was free for {ends[i] - starts[i]:.3g} s.'
-        for i in np.flatnonzero(rested > REST * callbacks.median())
+        for i in np.flatnonzero(rested > allowed)
     ]
 
 
