@@ -20,8 +20,8 @@ import pandas as pd
 
 from helpers.recording import COLUMNS, check_table
 
-# A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as long
-# as callbacks and timers of the same run were late.
+# A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
+# long as callbacks and timers of the same run were late.
 REST = 0.4
 
 
