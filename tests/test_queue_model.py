@@ -307,6 +307,20 @@ def test_a_worker_may_be_as_late_as_its_callbacks():
     assert rested in explain(table, 10, 1).contradictions
 
 
+def test_messages_that_need_time_to_the_queue():
+    # Each was published 60 ms before it arrived. A message was taken just before the next one came,
+    # which had then been published for 10 ms.
+    table = predict(0.05, 0.2, 10, 1, 41)
+    table['published_s'] -= 0.06
+    assert reported(table, 10, 1)
+    assert not explain(table, 10, 1, delay_s=0.009).complete
+    assert explain(table, 10, 1, delay_s=0.011).complete
+    # A message less is noticed all the same.
+    assert not explain(without(table, 7), 10, 1, delay_s=0.011).complete
+    with pytest.raises(ValueError, match='delay_s must be a number of seconds, zero or more'):
+        explain(table, 10, 1, delay_s=-1)
+
+
 @pytest.mark.parametrize(('depth', 'threads'), [(11, 1), (10, 2), (10, 4)])
 def test_another_queue_or_executor_contradicts(depth, threads):
     assert reported(predict(0.05, 0.2, 10, 1, 41), depth, threads)
