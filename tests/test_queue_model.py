@@ -308,10 +308,10 @@ def test_a_worker_may_be_as_late_as_its_callbacks():
 
 
 def test_messages_that_need_time_to_the_queue():
-    # Each was published 60 ms before it arrived. A message was taken just before the next one came,
-    # which had then been published for 10 ms.
+    # Each was published 110 ms before it arrived. A message was taken as soon as it was the oldest:
+    # then the second one behind a full queue had been published for 10 ms.
     table = predict(0.05, 0.2, 10, 1, 41)
-    table['published_s'] -= 0.06
+    table['published_s'] -= 0.11
     assert reported(table, 10, 1)
     assert not explain(table, 10, 1, delay_s=0.009).complete
     assert explain(table, 10, 1, delay_s=0.011).complete
