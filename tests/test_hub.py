@@ -440,7 +440,8 @@ async def teach(hub: Hub) -> ClassHour:
     hour.lessons_s = time.monotonic() - start
     for student in students:
         k = student.kernels[LESSONS[1].name]
-        print(await k.text("""
+        print(
+            await k.text("""
 import os
 os.makedirs('/tmp/hubdiag', exist_ok=True)
 for _n in 'ABCD':
@@ -448,7 +449,8 @@ for _n in 'ABCD':
     if not _e.complete:
         tables[_n].to_csv(f'/tmp/hubdiag/{os.environ["JUPYTERHUB_USER"]}_{_n}.csv')
         print(os.environ['JUPYTERHUB_USER'], _n, _e)
-"""))
+""")
+        )
         hour.strangers += (await student.kernels[LESSONS[0].name].text(STRANGERS)).split()
 
     hour.memory_mb = {student.name: student.memory_mb() for student in students}
