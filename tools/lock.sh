@@ -1,6 +1,5 @@
 #!/bin/sh
 # Write requirements.lock: every dependency of pyproject.toml, pinned, with the hashes of its files.
-# Then, for each dependency group, requirements-GROUP.lock: what the group needs besides.
 # usage: tools/lock.sh UV [--upgrade]
 # Without --upgrade a version that still fits stays as it is.
 set -eu
@@ -11,15 +10,10 @@ shift
 new=.requirements.lock.new
 [ ! -f requirements.lock ] || cp requirements.lock "$new" # uv keeps the versions it finds here
 trap 'rm -f "$new" "$new.checked"' EXIT
-compile() { # to the file $1, from the arguments that follow
-    file=$1
-    shift
-    # empy has no wheel: tools/set_up.sh builds its one module.
-    "$uv" pip compile "$@" --universal --python-version 3.11 --only-binary :all: --no-binary empy \
-        --generate-hashes --no-annotate --no-header --no-emit-index-url --no-emit-find-links \
-        --quiet --output-file "$file" > /dev/null
-}
-compile "$new" pyproject.toml --all-extras "$@"
+# empy has no wheel: tools/set_up.sh builds its one module.
+"$uv" pip compile pyproject.toml --all-extras --universal --python-version 3.11 \
+    --only-binary :all: --no-binary empy --generate-hashes --no-annotate --no-header \
+    --no-emit-index-url --no-emit-find-links --quiet --output-file "$new" "$@" > /dev/null
 
 # The lock fits several Pythons, but a package may lack the wheel of one. tools/set_up.sh reads the
 # result in the second line, and need not ask the package index.
@@ -43,16 +37,3 @@ fi
     cat "$new"
 } > requirements.lock
 echo "requirements.lock: $(grep -c '^[a-z].*==' requirements.lock) pins, Python$pythons"
-
-for group in hub; do
-    lock=requirements-$group.lock
-    [ ! -f "$lock" ] || cp "$lock" "$new"
-    compile "$new" --group "$group" --constraints requirements.lock "$@"
-    {
-        echo '# Made by `make lock` from pyproject.toml. Do not edit.'
-        # A pin is a line that begins with its name, and the hashes below it.
-        awk 'FNR == NR { have[$1]; next } /^[a-z]/ { wanted = !($1 in have) } wanted' \
-            requirements.lock "$new"
-    } > "$lock"
-    echo "$lock: $(grep -c '^[a-z].*==' "$lock") pins"
-done
