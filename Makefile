@@ -1,16 +1,39 @@
 # `make help` lists the commands. environment.md says what is installed, and why.
 
 help: ## show this list
-	@sed -n 's/^\([a-z]*\):.*## /  make \1	/p' Makefile | expand -t 18
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1	/p' Makefile | expand -t 21
 
 lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, LAB_ARGS=... change how
-	@$(PYTHON) -m jupyterlab --ServerApp.root_dir=. --LabApp.default_url=/lab/tree/notebooks/00_start_here.ipynb $(lab_options) $(LAB_ARGS)
+	@$(call open_lab,false,/lab/tree/notebooks/00_start_here.ipynb)
+
+present: set_up ## open JupyterLab on a lesson as slides whose cells run: LESSON=02; PORT=... as above
+	@[ -n "$(deck)" ] || { echo 'Name one lesson, for example: make present LESSON=02' >&2; exit 1; }
+	@$(call open_lab,true,/lab/workspaces/present/tree/$(deck)?reset)
 
 test: set_up lint ## all checks: lint, tests of the helpers, every notebook compared with its saved outputs
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope $(PYTEST_ARGS)
 
+test-browser: ## the real JupyterLab in Chromium, as students and instructors use it; it takes minutes
+	@[ -n "$(CHROMIUM)" ] || { echo '$(no_chromium)' >&2; exit 1; }
+	@tools/set_up.sh browser
+	@CHROMIUM="$(CHROMIUM)" $(PYTHON) -m pytest -n 2 --dist worksteal -o faulthandler_timeout=600 tests/browser $(PYTEST_ARGS)
+
+hub: ## a JupyterHub for a class on this machine; HUB_ARGS=... changes how. See environment.md
+	@tools/hub/set_up.sh
+	@exec .venv/bin/jupyterhub --config tools/hub/jupyterhub_config.py $(HUB_ARGS)
+
+test-hub: ## a class of 12 on a JupyterHub, who run lessons 02 and 03 at the same time; it takes minutes
+	@tools/hub/set_up.sh
+	@$(PYTHON) -m pytest -n 0 -rA -o faulthandler_timeout=1200 tests/hub $(PYTEST_ARGS)
+
 notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
 	@$(PYTHON) tools/notebooks.py $(if $(LESSON),--lesson "$(LESSON)")
+
+slides: set_up ## write the lessons as HTML slides into slides/, which need no network; LESSON=02 for one
+	@$(PYTHON) tools/export_slides.py $(if $(LESSON),--lesson "$(LESSON)")
+
+bench: set_up ## measure how much faster two computing threads are than one; needs an idle machine
+	@$(PYTHON) -m benchmarks.two_threads
 
 lint: set_up ## ruff: style and format of modules and notebooks
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
@@ -19,23 +42,36 @@ lock: set_up ## write requirements.lock from pyproject.toml; UPGRADE=yes takes n
 	@tools/lock.sh .venv/bin/uv $(if $(filter yes,$(UPGRADE)),--upgrade)
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built
-	rm -rf .venv .jupyter scratch .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv .jupyter scratch slides .hypothesis .pytest_cache .ruff_cache
 	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab test notebooks lint lock clean set_up
+.PHONY: help lab present test test-browser hub test-hub notebooks slides bench lint lock clean set_up
 
 PYTHON := .venv/bin/python
 
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker.
 WORKERS := 4
 
+CHROMIUM ?= $(shell command -v chromium || command -v chromium-browser || command -v google-chrome)
+no_chromium = There is no Chromium: install it, on Debian with `sudo apt install chromium`, or name yours with CHROMIUM=...
+
+ROOT := .
+deck = $(if $(LESSON),$(wildcard notebooks/$(LESSON)_*.ipynb))
+
+# The first argument says whether JupyterLab shows the notebook as slides, the second is its address.
 # A port that you name is the one you get, or an error. Without a name, the first free one from 8888.
-lab_options := $(if $(PORT),--port="$(PORT)" --ServerApp.port_retries=0) \
+open_lab = slides="$(JUPYTER_CONFIG_DIR)/lab/user-settings/jupyterlab-slideshow" && \
+	mkdir -p "$(JUPYTER_CONFIG_DIR)/custom" "$$slides" && \
+	cp tools/deck.css "$(JUPYTER_CONFIG_DIR)/custom/custom.css" && \
+	echo '{"active": $(1)}' > "$$slides/plugin.jupyterlab-settings" && \
+	exec $(PYTHON) -m jupyterlab --ServerApp.root_dir="$(ROOT)" --LabApp.custom_css=True \
+	--LabApp.default_url='$(2)' \
+	$(if $(PORT),--port="$(PORT)" --ServerApp.port_retries=0) \
 	$(if $(filter no,$(BROWSER)),--no-browser) \
-	$(if $(filter 0,$(shell id -u)),--allow-root)
+	$(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 
 # What you have set for other work stays out: another ROS 2 that is sourced, Python's and Jupyter's
 # variables, the settings in your home folder. JupyterLab's state of this course is in .jupyter.

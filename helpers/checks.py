@@ -11,6 +11,8 @@ import re
 from collections.abc import Callable, Set
 from numbers import Integral, Real
 
+from helpers.text import wrap
+
 NO_GUESS = 'No guess yet. Write one in the predict cell, run that cell, then run this one again.'
 
 _failed_tries: dict[str, int] = {}  # by title: failed tries since the last try that passed
@@ -60,7 +62,7 @@ def compare_prediction(
 
 
 def check(title: str, *requirements: tuple[str, bool | Callable[[], object], str]) -> None:
-    """Print for each requirement whether it is met, then what is still missing.
+    """Print for each requirement whether it is met or missing, then how many are met.
 
     A requirement is `(what_is_right, test, hint)`. `test` is a truth value, or a function without
     arguments that returns one. If that function raises, the requirement is missing, and its line
@@ -76,23 +78,23 @@ def check(title: str, *requirements: tuple[str, bool | Callable[[], object], str
         if not isinstance(requirement, tuple) or len(requirement) != 3:
             raise TypeError('A requirement must be a tuple (what_is_right, test, hint).')
     results = [(what, *_run(test), hint) for what, test, hint in requirements]
-    missing = [what for what, met, _, _ in results if not met]
-    tries = _failed_tries[title] = _failed_tries.get(title, 0) + 1 if missing else 0
-    _passed[title] = not missing
+    met_ones = sum(met for _, met, _, _ in results)
+    done = _passed[title] = met_ones == len(results)
+    tries = _failed_tries[title] = 0 if done else _failed_tries.get(title, 0) + 1
     for what, met, problem, hint in results:
-        print(f'[{"ok" if met else "missing"}] {what}{problem}')
+        _print(f'[{"ok" if met else "missing"}] {what}{problem}')
         if not met and tries > 1:
-            print(f'    Hint: {hint}')
-    summary = f'{title}: {len(results) - len(missing)} of {len(results)}.'
-    if missing:
-        print(f'{summary} Still missing: {"; ".join(missing)}.')
-    else:
-        print(f'{summary} All done.')
+            _print(f'    Hint: {hint}')
+    _print(f'{title}: {met_ones} of {len(results)}.{" All done." if done else ""}')
 
 
 def passed(title: str) -> bool:
     """Return whether the last `check` with this title found everything right."""
     return _passed.get(title, False)
+
+
+def _print(text: str) -> None:
+    print(*wrap(text, rest=' ' * 10), sep='\n')
 
 
 def _plain(value: object) -> object:

@@ -30,6 +30,7 @@ SHARED_MEMORY = Path('/dev/shm')
 ENOUGH_SHARED_MEMORY_BYTES = 32 * 2**20  # a notebook's nodes take about 1 MiB
 MESSAGE_TIMEOUT_S = 10.0
 COMMAND_TIMEOUT_S = 20.0
+PREFIXES = (sys.prefix, '/usr/local', '/usr')
 BROWSERS = (
     'firefox',
     'chromium',
@@ -250,6 +251,16 @@ def check_colcon() -> Check:
     return Check('colcon', 'none', to_do, required=False)
 
 
+def check_pybind11() -> Check:
+    """Check that pybind11 is where CMake looks for packages."""
+    for prefix in PREFIXES:
+        for file in Path(prefix).glob('*/cmake/pybind11/pybind11ConfigVersion.cmake'):
+            version = re.search(r'set\(PACKAGE_VERSION "(.+?)"', file.read_text(encoding='utf-8'))
+            return Check('pybind11', version[1] if version else str(file.parent), required=False)
+    to_do = 'for lesson 08 run `sudo apt install pybind11-dev`'
+    return Check('pybind11', 'none', to_do, required=False)
+
+
 def check_browser() -> Check:
     """Look for a web browser on this machine."""
     for name in BROWSERS:
@@ -281,6 +292,7 @@ def checks() -> list[Check]:
         check_compiler(),
         check_cmake(),
         check_python_headers(),
+        check_pybind11(),
         check_browser(),
     ]
 

@@ -27,6 +27,7 @@ from catkin_pkg.package import InvalidPackage, Package, parse_package_string
 from rosidl_adapter import parser
 
 from helpers.cmake_lists import GENERATE, CMakeLists, CMakeListsError
+from helpers.text import wrap
 
 KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
 COMMENTS = ('default', 'all', 'none')
@@ -131,10 +132,12 @@ class Findings(tuple):
     def __repr__(self) -> str:
         if not self:
             return '[ok] Nothing is missing.'
-        return '\n'.join(
-            f'[missing] {finding.file}: {finding.missing}\n          Without it: {finding.error}'
-            for finding in self
-        )
+        indent = ' ' * 10
+        lines = []
+        for finding in self:
+            lines += wrap(f'[missing] {finding.file}: {finding.missing}', rest=indent)
+            lines += wrap(f'Without it: {finding.error}', first=indent, rest=indent)
+        return '\n'.join(lines)
 
 
 def check_package(path: str | os.PathLike) -> Findings:
@@ -322,6 +325,14 @@ def _rows(fields: list[parser.Field], depth: int) -> Iterator[tuple]:
 
 GENERATORS = ('rosidl_default_generators', 'rosidl_core_generators')
 RUNTIMES = ('rosidl_default_runtime', 'rosidl_core_runtime')
+# Types of Python and C++ that an interface does not have.
+SLIPS = {
+    'int': 'int32 or int64',
+    'float': 'float32 or float64',
+    'double': 'float64',
+    'str': 'string',
+    'boolean': 'bool',
+}
 GROUP = 'rosidl_interface_packages'
 FIRST_PART = {
     'msg': '',
@@ -360,6 +371,11 @@ class _Check:
         """The files that rosidl_generate_interfaces() is given, as far as they are known."""
         calls = self.cmake.generate if self.cmake else []
         return [f for call in calls for f in call.files if not _unknown(f)]
+
+    def _given(self) -> list[str]:
+        """The packages behind DEPENDENCIES, also where somebody has put commas between them."""
+        given = self.cmake.dependencies if self.cmake else []
+        return [package for word in given for package in word.split(',') if package]
 
     def _unsure(self) -> bool:
         """May rosidl_generate_interfaces() be given more files than are listed?"""
@@ -400,16 +416,16 @@ class _Check:
         if not any(package.startswith('ament_cmake') for package in build):
             yield Finding(
                 name, '<buildtool_depend>ament_cmake</buildtool_depend>',
-                'it builds where ament_cmake is installed; elsewhere nothing installs it, and '
-                'CMake does not find "ament_cmakeConfig.cmake"',
+                'it builds only where ament_cmake is installed already; elsewhere '
+                '"ament_cmakeConfig.cmake" is not found',
             )  # fmt: skip
         if not self.on_disk:
             return
         if not build & {*GENERATORS}:
             yield Finding(
                 name, f'<buildtool_depend>{GENERATORS[0]}</buildtool_depend>',
-                'it builds where the generators are installed; elsewhere nothing installs them, '
-                f'and CMake does not find "{GENERATORS[0]}Config.cmake"',
+                'it builds only where the generators are installed already; elsewhere '
+                f'"{GENERATORS[0]}Config.cmake" is not found',
             )  # fmt: skip
         if not _depends(manifest, 'exec', 'build_export') & {*RUNTIMES}:
             yield Finding(
@@ -420,16 +436,15 @@ class _Check:
             tag = f'<member_of_group>{GROUP}</member_of_group>'
             yield Finding(name, tag, f'"Packages installing interfaces must include \'{tag}\'"')
         reached = self._reached(build)
-        given = self.cmake.dependencies if self.cmake else []
+        given = self._given()
         for package in dict.fromkeys([*given, *self.uses]):
             if package == manifest.name or '$' in package or not self._where(package):
                 continue
             if package not in (build if package in given else reached):
                 yield Finding(
                     name, f'<depend>{package}</depend>',
-                    f'it builds where {package} is installed; elsewhere nothing installs it, and '
-                    f'colcon may build the two in the wrong order: "{package}Config.cmake" is '
-                    'not found',
+                    f'it builds only where {package} is installed already; elsewhere '
+                    f'"{package}Config.cmake" is not found',
                 )  # fmt: skip
 
     # CMakeLists.txt
@@ -535,7 +550,14 @@ class _Check:
                         'fails with FileNotFoundError',
                     )  # fmt: skip
 
-        given = cmake.dependencies
+        for given in cmake.dependencies:
+            if ',' in given:
+                yield Finding(
+                    name, f'blanks in place of commas after DEPENDENCIES: {given}',
+                    f'"the passed dependency \'{given}\' has not been found before using '
+                    'find_package()"',
+                )  # fmt: skip
+        given = self._given()
         before = {package for package, line in found.items() if line < first}
         brought = self._reached(before)
         for package in given:
@@ -601,8 +623,12 @@ class _Check:
         except parser.InvalidActionSpecification as error:
             what = f'two lines that are exactly {SEPARATOR}: goal, result and feedback'
             yield Finding(file, what, _described(error))
+        except NameError as error:  # of a field; the parser raises Python's own
+            what = 'a field name in lower case with underscores, such as deg_turn'
+            yield Finding(file, what, _described(error))
         except Exception as error:  # the parser raises many kinds
-            yield Finding(file, 'a definition that rosidl can read', _described(error))
+            missing = _wrong_type(path) or 'a definition that rosidl can read'
+            yield Finding(file, missing, _described(error))
         else:
             for field in (field for fields in parts.values() for field in fields):
                 yield from self._check_field(file, field, own)
@@ -672,6 +698,16 @@ class _Check:
             f'the package {package}, which is neither installed nor in this workspace{hint}',
             f'find_package() does not find "{package}Config.cmake"',
         )
+
+
+def _wrong_type(file: Path) -> str:
+    """What an interface should have in place of the first type that is known to be a slip."""
+    for word in re.findall(r'^\s*([\w/]+)', file.read_text('utf-8', 'replace'), re.MULTILINE):
+        if word in SLIPS:
+            return f'a type that exists, {SLIPS[word]}, in place of {word}'
+        if long := re.fullmatch(r'(\w+)/msg/(\w+)', word):
+            return f'{long[1]}/{long[2]} in place of {word}: in a definition a type has no /msg/'
+    return ''
 
 
 def _unknown(file: str) -> bool:

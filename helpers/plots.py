@@ -2,8 +2,9 @@
 
 Every function takes tables as `recording` and `queue_model` make them: one row a message, columns
 `seq`, `published_s`, `started_s`, `finished_s`, `thread`. A table describes a finished run: a
-message that was never heard counts as lost. `interface_tree` takes the tables of `interfaces`. Bad
-input raises before anything is drawn.
+message that was never heard counts as lost. `interface_tree` takes the tables of `interfaces`;
+`path`, `error`, `innovation` and `frame_tree` take tables of a drive, with one row a time or a
+transform. Bad input raises before anything is drawn.
 
 The colours are those of Okabe and Ito ("Color Universal Design", 2008), which people with any kind
 of colour vision can tell apart. No meaning hangs on a colour alone: the shape differs too.
@@ -23,7 +24,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Ellipse, Patch
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
@@ -38,6 +39,15 @@ GROUP_COLOURS = ('#56B4E9', '#E69F00', '#009E73', '#CC79A7', '#F0E442')
 GROUP_HATCHES = ('', '//', '..', '\\\\', 'xx')
 # The shapes of the packages. They are four and the colours five: the pairs repeat after twenty.
 TREE_MARKERS = 'osD^'
+
+# One look a line, where several are compared: all differ in colour, and in how they are dashed.
+LINE_LOOKS = (
+    {'color': HEARD, 'ls': '-'},
+    {'color': LOST, 'ls': (0, (5, 2))},
+    {'color': '#009E73', 'ls': (0, (5, 2, 1, 2))},
+    {'color': '#CC79A7', 'ls': (0, (1, 1.2))},
+)
+TRUTH = '#c3c9ce'
 
 SMALL, NORMAL, LARGE = 12, 13, 15  # font sizes in points, readable from the last row of a room
 SIZE, WIDE = (9, 4), (11, 4.4)  # inches
@@ -90,6 +100,7 @@ def timeline(
     span_s: tuple[float, float] | None = None,
     title: str | None = None,
     ax: Axes | None = None,
+    time_label: str = TIME_LABEL,
 ) -> Axes:
     """Draw one lane a thread and one bar a callback, with its sequence number where it fits.
 
@@ -131,7 +142,7 @@ def timeline(
     ax.set_xlim(*(span_s or (0, None)))
     default = 'One bar for each callback, with its sequence number'
     legend = handles if isinstance(table, Mapping) else None
-    _dress(ax, title or default, TIME_LABEL, 'thread', legend, grid='x')
+    _dress(ax, title or default, time_label, 'thread', legend, grid='x')
     if bars.empty:
         _say(ax, 'no callback was called')
     _label_bars(ax, bars, lane)
@@ -324,6 +335,49 @@ def topic_graph(endpoints: pd.DataFrame, title: str | None = None) -> Axes:
     return ax
 
 
+def who_waits(
+    callback: str, answer: str, thread_free: bool, group_free: bool, title: str | None = None
+) -> Axes:
+    """Draw who waits for whom: a callback for an answer, the answer for a thread and a group.
+
+    What is not free is held by the callback. Then the arrows close a circle, which is drawn thick.
+    """
+    ax = _axes(None, height=4.2)
+    ax.set(xlim=(0, 10), ylim=(-3.2, 3.2))
+    ax.set_axis_off()
+    closed = not (thread_free and group_free)
+    default = 'A circle: nobody can go on' if closed else 'No circle: the answer can come'
+    ax.set_title(title or default, fontsize=LARGE, loc='left')
+
+    def box(x: float, y: float, text: str, style: str, colour: str) -> Text:
+        return ax.text(
+            x, y, text, ha='center', va='center', fontsize=NORMAL, linespacing=1.5,
+            bbox={'boxstyle': style, 'facecolor': colour, 'edgecolor': LIMIT, 'linewidth': 1.4},
+        )  # fmt: skip
+
+    def arrow(tail: Text, head: Text, text: str, stops: bool) -> None:
+        look = {'lw': 3, 'color': LOST} if stops else {'lw': 1.6, 'color': LIMIT, 'ls': '--'}
+        look |= {'arrowstyle': '-|>', 'mutation_scale': 20, 'shrinkA': 3, 'shrinkB': 3}
+        look |= {'patchA': tail.get_bbox_patch(), 'patchB': head.get_bbox_patch()}
+        (x0, y0), (x1, y1) = tail.get_position(), head.get_position()
+        ax.annotate('', xy=(x1, y1), xytext=(x0, y0), arrowprops=look)
+        ax.text(
+            (x0 + x1) / 2, (y0 + y1) / 2, text, ha='center', va='center', fontsize=SMALL,
+            bbox={'facecolor': 'white', 'edgecolor': 'none', 'pad': 2},
+        )  # fmt: skip
+
+    waiting = box(1.3, 0, callback, 'square,pad=0.7', GROUP_COLOURS[0])
+    awaited = box(8.7, 0, answer, 'square,pad=0.7', GROUP_COLOURS[1])
+    arrow(waiting, awaited, 'waits for', closed)
+    for y, name, free in ((2.3, 'a thread', thread_free), (-2.3, "the client's group", group_free)):
+        state = 'free' if free else 'held'
+        needed = box(5, y, f'{name}\n{state}', 'round,pad=0.6,rounding_size=1.0', '#FFFFFF')
+        arrow(awaited, needed, 'needs', not free)
+        if not free:
+            arrow(needed, waiting, 'is held by', True)
+    return ax
+
+
 def interface_tree(table: pd.DataFrame, title: str | None = None, ax: Axes | None = None) -> Axes:
     """Draw the tree of an interface's fields: one line a field, its type, one mark a package.
 
@@ -378,6 +432,217 @@ def interface_tree(table: pd.DataFrame, title: str | None = None, ax: Axes | Non
         frameon=False,
     )  # fmt: skip
     return ax
+
+
+def path(
+    truth: pd.DataFrame,
+    estimates: Mapping[str, pd.DataFrame],
+    fixes: pd.DataFrame | None = None,
+    ellipses_s: float | None = None,
+    title: str | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw where the robot was, and where each of up to four estimates says that it was.
+
+    `truth` and each estimate have the columns `x` and `y` in metres. `fixes` adds what GPS said
+    (columns `gps_x`, `gps_y`). With `ellipses_s` each estimate needs `t` (s), `var_x`, `cov_x_y`
+    and `var_y` (m^2), too: every so many seconds an ellipse shows 3 sigma, where the robot should
+    be 99 times of 100.
+
+    Raises TypeError or ValueError for a bad table, and for no or too many estimates.
+    """
+    _check_columns('truth', truth, 'x', 'y')
+    more = () if ellipses_s is None else ('t', 'var_x', 'cov_x_y', 'var_y')
+    _check_lines('estimate', estimates, 'x', 'y', *more)
+    if fixes is not None:
+        _check_columns('fixes', fixes, 'gps_x', 'gps_y')
+    if ellipses_s is not None and not (_is_finite(ellipses_s) and ellipses_s > 0):
+        raise ValueError(f'ellipses_s must be a number of seconds above 0, not {ellipses_s!r}.')
+
+    ax = _axes(ax, height=5.6)
+    handles = ax.plot(truth.x, truth.y, color=TRUTH, lw=6, label='truth', solid_capstyle='round')
+    if fixes is not None:
+        look = {'marker': '+', 'color': '#555555', 'ls': 'none', 'ms': 6}
+        handles += ax.plot(fixes.gps_x, fixes.gps_y, label='GPS', **look)
+    for look, (name, table) in zip(LINE_LOOKS, estimates.items(), strict=False):
+        handles += ax.plot(table.x, table.y, lw=1.8, label=name, **look)
+        if ellipses_s is not None:
+            for row in table[(table.t // ellipses_s).diff() > 0].itertuples():
+                ax.add_patch(_ellipse(row, look['color']))
+    handles += [ax.scatter(truth.x.iloc[0], truth.y.iloc[0], s=70, color=LIMIT, zorder=5,
+                           label='start')]  # fmt: skip
+    ax.set_aspect('equal', 'datalim')
+    _dress(ax, title or 'The path, seen from above', 'x (m)', 'y (m)', handles)
+    return ax
+
+
+def error(
+    errors: Mapping[str, pd.DataFrame],
+    spans_s: Mapping[str, tuple[float, float]] | None = None,
+    ylabel: str = 'distance from the truth (m)',
+    log: bool = False,
+    title: str | None = None,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the error of up to four estimates over time.
+
+    Each table has the columns `t` (s) and `distance` (m). `spans_s` shades times in which
+    something happened: `{'no GPS': (40, 80)}`, in seconds. `log` makes the vertical axis
+    logarithmic, from 1 cm up.
+
+    Raises TypeError or ValueError for a bad table or span, and for no or too many tables.
+    """
+    _check_lines('error', errors, 't', 'distance')
+    spans = {name: _checked_span(span) for name, span in (spans_s or {}).items()}
+    ax = _axes(ax)
+    handles = []
+    for look, (name, table) in zip(LINE_LOOKS, errors.items(), strict=False):
+        handles += ax.plot(table.t, table.distance, lw=2, label=name, **look)
+    for name, span in spans.items():
+        look = {'facecolor': '#f0f0f0', 'edgecolor': '#c9c9c9', 'hatch': '//', 'label': name}
+        handles.append(ax.axvspan(*span, zorder=0, lw=0, **look))
+    if log:
+        ax.set_yscale('log')
+        ax.set_ylim(bottom=0.01)
+    else:
+        ax.set_ylim(bottom=0)
+    _dress(ax, title or 'How far off each estimate is', 'time (s)', ylabel, handles)
+    return ax
+
+
+def innovation(innovations: pd.DataFrame, title: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draw the innovations of one variable over time, with the band of 3 sigma.
+
+    `innovations` has one row a measurement, in the order of time: `t` (s), `innovation` and `sigma`
+    (m, rad, ...), `accepted` (bool). A dot is a measurement that the filter used, a cross one that
+    its gate kept out.
+
+    Raises TypeError or ValueError for a bad table.
+    """
+    _check_columns('innovations', innovations, 't', 'innovation', 'sigma', 'accepted')
+    accepted = innovations.accepted.to_numpy(bool)
+    used, kept_out = innovations[accepted], innovations[~accepted]
+    ax = _axes(ax)
+    three = 3 * innovations.sigma
+    look = {'facecolor': '#56B4E9', 'alpha': 0.3, 'lw': 0, 'label': '3 sigma'}
+    handles = [ax.fill_between(innovations.t, -three, three, **look)]
+    for edge in (-three, three):
+        ax.plot(innovations.t, edge, color=HEARD, lw=1.2)
+    ax.axhline(0, color=LIMIT, lw=1)
+    handles += ax.plot(used.t, used.innovation, 'o', color=LIMIT, ms=4.5,
+                       label=f'used {len(used)}')  # fmt: skip
+    if len(kept_out):
+        label = f'kept out {len(kept_out)}'
+        handles.append(_crosses(ax, kept_out.t, kept_out.innovation, label))
+    _dress(ax, title or 'Measured minus expected', 'time (s)', 'innovation (m)', handles)
+    return ax
+
+
+def frame_tree(transforms: pd.DataFrame, title: str | None = None) -> Axes:
+    """Draw a tree of frames, from the left: one arrow a transform, its line tells who publishes it.
+
+    `transforms` has one row a transform, with the columns `parent`, `child` and `publisher` (all
+    text).
+
+    Raises TypeError or ValueError for a bad table, for more than four publishers, and where the
+    transforms make no tree: a frame with two parents, two roots, or a circle.
+    """
+    _check_columns('transforms', transforms, 'parent', 'child', 'publisher')
+    depths, rows = _tree_layout(transforms)
+    publishers = list(dict.fromkeys(transforms.publisher))
+    _check_number('publishers', publishers)
+    looks = dict(zip(publishers, LINE_LOOKS, strict=False))
+    widths = pd.Series({frame: 0.13 * len(frame) + 0.25 for frame in depths})  # inches
+    widest = widths.groupby(pd.Series(depths)).max()
+    gap = 0.75
+    left = (widest + gap).cumsum().shift(fill_value=0)
+    width = left.iloc[-1] + widest.iloc[-1]
+
+    height = 0.75 * (max(rows.values()) + 1) + 1.2
+    figure = plt.figure(figsize=(max(SIZE[0], width + 0.4), height), dpi=DPI, layout='constrained')
+    ax = figure.add_subplot()
+    for frame, depth in depths.items():
+        ax.text(
+            left[depth] + widest[depth] / 2, -rows[frame], frame, ha='center', va='center',
+            fontsize=NORMAL, family='monospace',
+            bbox={'boxstyle': 'round,pad=0.5', 'facecolor': 'white', 'edgecolor': LIMIT},
+        )  # fmt: skip
+    for row in transforms.itertuples():
+        depth = depths[row.parent]
+        look = looks[row.publisher]
+        ends = [
+            (left[depth] + (widest[depth] + widths[row.parent]) / 2 + 0.1, -rows[row.parent]),
+            (left[depth + 1] + (widest[depth + 1] - widths[row.child]) / 2 - 0.1, -rows[row.child]),
+        ]
+        ax.plot(*zip(*ends, strict=True), lw=2.2, **look)
+        ax.plot(*ends[1], marker='>', ms=9, color=look['color'])
+    handles = [Line2D([], [], lw=2.2, label=name, **look) for name, look in looks.items()]
+    ax.set_xlim(-0.2, max(width, SIZE[0] - 0.4) + 0.2)
+    ax.set_ylim(-max(rows.values()) - 0.6, 0.6)
+    _dress(ax, title or 'The tree of frames', '', '', handles)
+    ax.set_axis_off()
+    return ax
+
+
+def _check_columns(what: str, table: pd.DataFrame, *columns: str) -> None:
+    """Raise unless `table` is a table that has rows and these columns."""
+    if not isinstance(table, pd.DataFrame):
+        raise TypeError(f'{what} must be a DataFrame, not {type(table).__name__}.')
+    missing = [name for name in columns if name not in table.columns]
+    if missing or table.empty:
+        raise ValueError(f'{what} needs rows with the columns {", ".join(columns)}.')
+
+
+def _check_lines(what: str, tables: Mapping[str, pd.DataFrame], *columns: str) -> None:
+    if not isinstance(tables, Mapping):
+        raise TypeError(f'Give each {what} a name: {{"a name": table}}.')
+    _check_number(f'{what}s', tables)
+    for name, table in tables.items():
+        _check_columns(f'The {what} {name!r}', table, *columns)
+
+
+def _check_number(what: str, items) -> None:
+    if not 1 <= len(items) <= len(LINE_LOOKS):
+        raise ValueError(f'One picture can show 1 to {len(LINE_LOOKS)} {what}, not {len(items)}.')
+
+
+def _ellipse(row, colour: str) -> Ellipse:
+    """The 3-sigma ellipse of a position, from the eigenvalues of its covariance."""
+    covariance = np.array([[row.var_x, row.cov_x_y], [row.cov_x_y, row.var_y]])
+    variances, axes = np.linalg.eigh(covariance)
+    width, height = 2 * 3 * np.sqrt(variances.clip(min=0))
+    angle = math.degrees(math.atan2(axes[1, 0], axes[0, 0]))
+    return Ellipse((row.x, row.y), width, height, angle=angle, fill=False, color=colour, lw=1.2)
+
+
+def _tree_layout(transforms: pd.DataFrame) -> tuple[dict[str, int], dict[str, float]]:
+    """Return each frame's depth and its row: the leaves have rows 0, 1, 2, ..."""
+    twice = transforms.child[transforms.child.duplicated()]
+    if len(twice):
+        raise ValueError(f'The frame {twice.iloc[0]} has two parents: a tree allows one.')
+    roots = [name for name in dict.fromkeys(transforms.parent) if name not in {*transforms.child}]
+    if len(roots) != 1:
+        raise ValueError(f'A tree has one root, these transforms have {len(roots)}.')
+    children = transforms.groupby('parent', sort=False)['child'].agg(list).to_dict()
+    depths: dict[str, int] = {}
+    rows: dict[str, float] = {}
+    leaves = 0
+
+    def place(frame: str, depth: int) -> None:
+        nonlocal leaves
+        depths[frame] = depth
+        for child in children.get(frame, []):
+            place(child, depth + 1)
+        if frame in children:
+            rows[frame] = float(np.mean([rows[child] for child in children[frame]]))
+        else:
+            rows[frame] = leaves
+            leaves += 1
+
+    place(roots[0], 0)
+    if len(depths) <= len(transforms):
+        raise ValueError('Some of these transforms make a circle.')
+    return depths, rows
 
 
 def _checked_groups(table: pd.DataFrame | Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:

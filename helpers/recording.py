@@ -1,4 +1,4 @@
-"""What happened to every message: when it was published, and when and where its callback ran."""
+"""What happened: when each message was published, and when and where each callback ran."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class Recording:
         append, thread_id, nan = self._heard.append, threading.get_ident, float('nan')
         append_finished = self._finished.append
 
-        def start(message) -> list:
+        def start(message, *info) -> list:
             row = [sequence(message), clock(), nan, thread_id()]
             append(row)
             return row
@@ -74,27 +74,7 @@ class Recording:
             row[2] = clock()
             append_finished(row)
 
-        if inspect.iscoroutinefunction(callback):
-
-            @functools.wraps(callback)
-            async def recorded_callback(message, *info):
-                row = start(message)
-                try:
-                    return await callback(message, *info)
-                finally:
-                    finish(row)
-
-        else:
-
-            @functools.wraps(callback)
-            def recorded_callback(message, *info):
-                row = start(message)
-                try:
-                    return callback(message, *info)
-                finally:
-                    finish(row)
-
-        subscription.callback = recorded_callback
+        subscription.callback = _surround(callback, start, finish)
 
     @property
     def published(self) -> int:
@@ -167,6 +147,89 @@ class Recording:
         table[times] -= table['published_s'].min()
         table['thread'] = table['thread'].astype(object).where(table['thread'].notna(), None)
         return table[COLUMNS]
+
+
+class CallbackRecording:
+    """Records every run of some callbacks, from now on.
+
+    `CallbackRecording(tick=node.timer, look=node.service)` watches timers, services and
+    subscriptions, each under a name. They are plain rclpy objects, and stay what they are.
+    """
+
+    def __init__(self, **watched) -> None:
+        # For each name its runs: [started, finished, thread id]; finished is NaN while it runs.
+        self.runs: dict[str, list[list]] = {name: [] for name in watched}
+        for name, thing in watched.items():
+            thing.callback = self._watch(thing.callback, self.runs[name])
+
+    @staticmethod
+    def _watch(callback: Callable, runs: list[list]) -> Callable:
+        def start(*arguments) -> list:
+            row = [time.monotonic(), float('nan'), threading.get_ident()]
+            runs.append(row)
+            return row
+
+        def finish(row: list) -> None:
+            row[1] = time.monotonic()
+
+        return _surround(callback, start, finish)
+
+    def finished(self, name: str) -> int:
+        """Return how many runs have finished."""
+        return sum(run[1] == run[1] for run in self.runs[name])  # NaN is not equal to itself
+
+    def inside(self, inner: str, outer: str) -> int:
+        """Return how many runs of `inner` started while a run of `outer` was going on."""
+        return sum(
+            any(started <= run[0] < finished for started, finished, _ in self.runs[outer])
+            for run in self.runs[inner]
+        )
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return for each name a table like that of `Recording`, one row a run, for a timeline.
+
+        `seq` counts from 0, the times are seconds since the first start of all, and a callback has
+        `published_s` equal to `started_s`. The threads have the same names in all tables.
+        """
+        every = sorted((row for runs in self.runs.values() for row in runs), key=lambda row: row[0])
+        workers = dict.fromkeys(row[2] for row in every)
+        workers = {ident: f'worker {i}' for i, ident in enumerate(workers, 1)}
+        zero = every[0][0] if every else 0.0
+        return {
+            name: pd.DataFrame(
+                [
+                    [seq, started - zero, started - zero, finished - zero, workers[ident]]
+                    for seq, (started, finished, ident) in enumerate(runs)
+                ],
+                columns=COLUMNS,
+            )
+            for name, runs in self.runs.items()
+        }
+
+
+def _surround(callback: Callable, start: Callable, finish: Callable) -> Callable:
+    """Return the callback with `row = start(*arguments)` before it and `finish(row)` after it."""
+    if inspect.iscoroutinefunction(callback):
+
+        @functools.wraps(callback)
+        async def recorded_callback(*arguments):
+            row = start(*arguments)
+            try:
+                return await callback(*arguments)
+            finally:
+                finish(row)
+
+    else:
+
+        @functools.wraps(callback)
+        def recorded_callback(*arguments):
+            row = start(*arguments)
+            try:
+                return callback(*arguments)
+            finally:
+                finish(row)
+
+    return recorded_callback
 
 
 def check_table(table: pd.DataFrame) -> pd.DataFrame:

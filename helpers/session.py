@@ -12,9 +12,12 @@ import contextlib
 import gc
 import os
 import socket
+import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterator
+from concurrent.futures import thread as thread_pool
 from dataclasses import dataclass
 
 from helpers.progress import ProgressBar
@@ -22,6 +25,7 @@ from helpers.progress import ProgressBar
 try:
     import rclpy
     from rcl_interfaces.msg import Log
+    from rclpy.client import Client
     from rclpy.executors import Executor, ExternalShutdownException
     from rclpy.node import Node
     from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -35,6 +39,7 @@ except ImportError as error:
 
 CLOSE_TIMEOUT_S = 5.0
 POLL_S = 0.01
+QUIET_ROUNDS = 20
 DISCOVERY = ('LOCALHOST', 'SUBNET')
 LOG_LEVELS = {10: 'DEBUG', 20: 'INFO', 30: 'WARN', 40: 'ERROR', 50: 'FATAL'}
 
@@ -107,6 +112,10 @@ class LogRecord:
 
     def __str__(self) -> str:
         return f'[{self.level}] [{self.node}]: {self.text}'
+
+
+class SessionClosedError(Exception):
+    """Raised in a callback that still waits for the answer of a service when its session closes."""
 
 
 class Session:
@@ -206,8 +215,8 @@ class Session:
         try:
             # Ends when the session stops, without Executor.shutdown() under a running spin.
             executor.spin_until_future_complete(self._stop)
-        except ExternalShutdownException:
-            pass  # the cell itself called rclpy.shutdown()
+        except (ExternalShutdownException, SessionClosedError):
+            pass  # the cell itself called rclpy.shutdown(), or left a callback that waits
         except BaseException as failure:
             self._failures.append(failure)
 
@@ -241,6 +250,60 @@ class Session:
                 bar.update(waited_s)
                 pause.wait(POLL_S)
 
+    def wait_until_quiet(self, executor: Executor, timeout_s: float = 30.0) -> bool:
+        """Wait until nothing happens in an executor any more, timers and time-outs apart.
+
+        The executor gets one empty task after the other. It is quiet when it has done
+        `QUIET_ROUNDS` of them and nothing else: then it passes over whatever is left. It is also
+        quiet when all its threads are held by callbacks that wait for an answer or an Event. No
+        clock decides, so a busy machine only takes longer. Returns whether a thread is free.
+
+        Raises ValueError where the executor does not spin in this session, and what `wait_until`
+        raises.
+        """
+        __tracebackhide__ = True
+        if executor not in self._executors:
+            raise ValueError('This executor does not spin: call session.spin(executor) first.')
+        task, rounds, states = executor.create_task(int), 0, set()
+
+        def is_quiet() -> bool:
+            nonlocal task, rounds, states
+            states = self._states(executor)
+            if 'working' in states:
+                rounds = 0
+            elif task.done():
+                task, rounds = executor.create_task(int), rounds + 1
+            elif 'free' not in states:
+                rounds += 1
+            return rounds >= QUIET_ROUNDS
+
+        self.wait_until(is_quiet, timeout_s)
+        return 'free' in states
+
+    def _states(self, executor: Executor) -> set[str]:
+        """Return what the threads that run an executor's callbacks do: work, wait, or nothing."""
+        pool = getattr(executor, '_executor', None)
+        states = set()
+        if pool is None:
+            threads = [self._spin_threads[self._executors.index(executor)]]
+        else:
+            threads = list(pool._threads)
+            if len(threads) < pool._max_workers:  # the pool starts a thread when it needs one
+                states.add('free')
+        frames = sys._current_frames()
+        # A thread that has ended, after a failure, has no frame.
+        for code in (frames[t.ident].f_code for t in threads if t.ident in frames):
+            if code.co_filename == threading.__file__:
+                states.add('waiting')
+            elif (
+                code.co_filename == thread_pool.__file__
+                or code is Executor._wait_for_ready_callbacks.__code__
+            ):
+                states.add('free')
+            else:
+                states.add('working')
+        return states
+
     def raise_if_failed(self) -> None:
         """Raise the first exception that left a callback, with its own traceback."""
         __tracebackhide__ = True
@@ -253,7 +316,9 @@ class Session:
         for executor in self._executors:
             for task in list(getattr(executor, '_futures', ())):
                 failure = task.exception() if task.done() else None
-                if failure is not None and failure not in self._failures:
+                if failure is None or isinstance(failure, SessionClosedError):
+                    continue
+                if failure not in self._failures:
                     self._failures.append(failure)
 
     def log(self, node: str | None = None) -> list[LogRecord]:
@@ -315,14 +380,14 @@ class Session:
         if not self._stop.done():
             self._stop.set_result(None)
         for thread in self._spin_threads:
-            thread.join(max(0.0, deadline - time.monotonic()))
+            self._join(thread, deadline)
         for executor in self._executors:
             # rclpy leaves the threads of the pool to the garbage collector.
             pool = getattr(executor, '_executor', None)
             if pool is not None:
                 pool.shutdown(wait=False, cancel_futures=True)
         for thread in self._threads():
-            thread.join(max(0.0, deadline - time.monotonic()))
+            self._join(thread, deadline)
         self._collect_failures()
         for executor in self._executors:
             # A coroutine that was never started would warn when it is collected.
@@ -332,16 +397,35 @@ class Session:
             executor.shutdown(timeout_sec=0)
         self.log()
         self._log_subscription = None
-        for thing in gc.get_objects():
-            if issubclass(type(thing), Node) and getattr(thing, 'context', None) is self._context:
-                # A node whose __init__ failed has only some of its parts.
-                with contextlib.suppress(Exception):
-                    thing.destroy_node()
+        for node in self._find(Node):
+            # A node whose __init__ failed has only some of its parts.
+            with contextlib.suppress(Exception):
+                node.destroy_node()
         rclpy.try_shutdown()
         self._shared.close()
         self._closed = True
         if _open_session is self:
             _open_session = None
+
+    def _join(self, thread: threading.Thread, deadline: float) -> None:
+        """Wait for the end of a thread. A call in it that waits for an answer fails."""
+        thread.join(min(2 * POLL_S, max(0.0, deadline - time.monotonic())))
+        while thread.is_alive() and time.monotonic() < deadline:
+            self._end_calls()
+            thread.join(25 * POLL_S)  # less often than POLL_S: to look for calls takes long
+
+    def _end_calls(self) -> None:
+        for client in self._find(Client):
+            for future in list(client._pending_requests.values()):
+                with warnings.catch_warnings(action='ignore'):  # a done callback that fails
+                    future.set_exception(SessionClosedError('The session closes: no answer.'))
+                future.exception()  # or rclpy says that nobody has read it
+
+    def _find(self, kind: type) -> Iterator:
+        """Yield all nodes or clients of this session, also those that nobody knows any more."""
+        for thing in gc.get_objects():
+            if issubclass(type(thing), kind) and getattr(thing, 'context', None) is self._context:
+                yield thing
 
     def _threads(self) -> list[threading.Thread]:
         pools = [getattr(executor, '_executor', None) for executor in self._executors]

@@ -31,11 +31,13 @@ from pathlib import Path, PurePosixPath
 
 from helpers.progress import ProgressBar
 from helpers.session import configure_discovery, reserve_domain_id
+from helpers.text import wrap
 
 ROOT = Path(__file__).resolve().parent.parent
 BUILD_TIMEOUT_S = 600.0
 STOP_TIMEOUT_S = 5.0
 POLL_S = 0.02
+CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
 
 _locks: dict[Path, int] = {}  # the workspaces of this process, each with the file that locks it
 _open_workspace: Workspace | None = None
@@ -254,7 +256,9 @@ def lines_that_matter(text: str) -> list[str]:
             while end < len(lines) and re.match(r' *\d* \| |\S.*: note: ', lines[end]):
                 end += 1
             block = [x for x in lines[index:end] if ': note: ' not in x]
-        elif re.match(r'error: |ERROR|\S*ld: .*(undefined|cannot find)|.*: undefined ref', line):
+        elif re.match(
+            r'error: |ERROR|\S*ld: .*(undefined|cannot find|recompile)|.*: undefined ref', line
+        ):
             block = [line]
         else:
             block = []
@@ -290,13 +294,9 @@ def _cmake_error(block: list[str]) -> list[str]:
             told = _traceback(told[tracebacks[-1] :])
         if not told:
             return []
-    short = [part for x in told for part in ([x] if x.startswith(' ') else _wrapped(x))]
+    short = [part for x in told for part in ([x] if x.startswith(' ') else wrap(x))]
     mine = [x.strip() for x in block[stack + 1 :] if x.strip().startswith('CMakeLists.txt')]
     return [block[0], *(f'  {x}' for x in short), *(f'  called from {x}' for x in mine[-1:])]
-
-
-def _wrapped(line: str) -> list[str]:
-    return textwrap.wrap(line, 94, break_long_words=False, break_on_hyphens=False)
 
 
 def _traceback(block: list[str]) -> list[str]:
@@ -404,7 +404,8 @@ class Process:
         def told() -> list[str]:
             return [line for line in self.lines if text in line]
 
-        self._wait(lambda: len(told()) >= count, timeout_s, f'{count} line(s) with {text!r}')
+        lines = 'a line' if count == 1 else f'{count} lines'
+        self._wait(lambda: len(told()) >= count, timeout_s, f'{lines} with {text!r}')
         return told()[count - 1]
 
     def wait(self, timeout_s: float = 20.0) -> int:
@@ -433,7 +434,11 @@ class Process:
             pause.wait(POLL_S)
 
     def _last(self) -> str:
-        return f'Its last lines: {" / ".join(self.lines[-3:]) or "none"}'
+        # A traceback underlines a part of a line; its last line says what happened.
+        lines = [line.strip() for line in self.lines if re.search(r'[^\s^~]', line)]
+        if lines and re.match(r'[\w.]+(Error|Exception)\b', lines[-1]):
+            return f'Its last line: {lines[-1]}'
+        return f'Its last lines: {" / ".join(lines[-3:]) or "none"}'
 
     def stop(self) -> None:
         """End it as Ctrl+C does. One that does not end within a few seconds is killed."""
@@ -584,10 +589,16 @@ class Workspace:
         total = max(1, len(packages) or len(list(self.path.glob('src/**/package.xml'))))
 
         def progress() -> float:
-            """The packages that are done, and of the current one what make says it has done."""
-            done = sum(line.startswith(('Finished <<<', 'Failed   <<<')) for line in list(lines))
-            part = next((m for x in reversed(lines) if (m := re.match(r'\[ *(\d+)%\]', x))), None)
-            return (done + (int(part[1]) / 100 if part else 0)) / total
+            """The packages that are done, and the part of the current one."""
+            done, part = 0, 0.0
+            for line in list(lines):
+                if line.startswith(('Finished <<<', 'Failed   <<<')):
+                    done, part = done + 1, 0.0
+                elif line == '-- Configuring done' or line.startswith('-- Configuring done ('):
+                    part = CONFIGURE_SHARE
+                elif made := re.match(r'\[ *(\d+)%\]', line):
+                    part = CONFIGURE_SHARE + (1 - CONFIGURE_SHARE) * int(made[1]) / 100
+            return (done + part) / total
 
         started = time.monotonic()
         try:
@@ -641,10 +652,8 @@ class Workspace:
         elif not packages and asked:
             known = sorted(folder.parent.name for folder in self.path.glob('src/**/package.xml'))
             own = [line for line in own if 'ignoring unknown package' not in line]
-            errors = [
-                f'Nothing was built: src/ has no package {" or ".join(asked)}, only '
-                f'{", ".join(known) or "no package at all"}.'
-            ]
+            there = f'only {", ".join(known)}' if known else 'it is empty'
+            errors = [f'Nothing was built: src/ has no package {" or ".join(asked)}, {there}.']
         elif not packages and not own:
             errors = ['Nothing was built: src/ has no package.']
         missing = [name for name in asked if name not in packages]

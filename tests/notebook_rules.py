@@ -18,15 +18,17 @@ from nbformat import NotebookNode
 from nbval.plugin import comment_markers, metadata_tags
 
 from tools.notebooks import clean, text_of
+from tools.slides import SKIPPED, SLIDE, height, slide_types
 
 MAX_CODE_LINES = 25
 MAX_FILE_LINES = 36  # of a cell that writes a file, which cannot be cut in two
 MAX_WORDS = 180
-EXERCISES = {'01': 1, '02': 2, '03': 2, '04': 2}  # at least; one in any other lesson
-TAGS = {'predict', 'exercise', 'check', 'solution', 'nbval-ignore-output'}
+EXERCISES = {'01': 1, '02': 2, '03': 2, '04': 2, '05': 2}  # at least; one in any other lesson
+TAGS = {'predict', 'exercise', 'check', 'solution', 'nbval-ignore-output', 'deck-break', *SKIPPED}
 LABELS = ['You will do', 'You will learn', 'You need', 'Time']
 LABELS_OF_START = ['You will do', 'You need', 'Time']
 REASON = '# Not compared: '
+NOTE = 'For the instructor'
 PATH_OF_A_MACHINE = re.compile(
     r'(?<![\w.])/(?:home|root|tmp|work|usr|opt|var|mnt|srv|Users|private)\b(?:/\S*)?'
     # What follows `python3/` is a tree that Workspace.print_tree wrote, below the workspace.
@@ -255,11 +257,11 @@ def saved_clean(notebook: NotebookNode) -> list[str]:
     return found
 
 
-def hides_solutions_only(notebook: NotebookNode) -> list[str]:
+def hides_solutions_and_notes_only(notebook: NotebookNode) -> list[str]:
     return [
-        f'Cell {index}: hide the source of a solution, and of nothing else.'
+        f'Cell {index}: hide the source of a solution or of a note, and of nothing else.'
         for index, cell in enumerate(notebook.cells, 1)
-        if ('jupyter' in cell.metadata) != ('solution' in tags(cell))
+        if ('jupyter' in cell.metadata) == {'solution', 'notes'}.isdisjoint(tags(cell))
     ]
 
 
@@ -369,7 +371,30 @@ def fits_a_slide(notebook: NotebookNode) -> list[str]:
             found.append(f'Cell {index} has {lines} lines of code, more than {most}.')
         if cell.cell_type == 'markdown' and words > MAX_WORDS:
             found.append(f'Cell {index} has {words} words, more than {MAX_WORDS}.')
+        if (percent := height(cell)) > SLIDE:
+            found.append(f'Cell {index} with its outputs takes {percent:.0f} % of the height.')
     return found
+
+
+def on_its_slide(notebook: NotebookNode) -> list[str]:
+    """Every cell has the slide type that the rule of tools/slides.py gives it."""
+    return [
+        f'Cell {index} is not a {slide_type}: run tools/notebooks.py --clean-only.'
+        for index, (cell, slide_type) in enumerate(
+            zip(notebook.cells, slide_types(notebook), strict=True), 1
+        )
+        if cell.metadata.get('slideshow') != {'slide_type': slide_type}
+    ]
+
+
+def notes_name_the_reader(notebook: NotebookNode) -> list[str]:
+    """JupyterLab shows the first line of a folded cell: it says who may open it."""
+    return [
+        f'Cell {index} is a note: text that begins with `{NOTE}`.'
+        for index, cell in enumerate(notebook.cells, 1)
+        if 'notes' in tags(cell)
+        and not (cell.cell_type == 'markdown' and cell.source.startswith(NOTE))
+    ]
 
 
 # Exercises
@@ -440,10 +465,10 @@ GROUPS: dict[str, list[Rule]] = {
         no_changed_outputs,
     ],
     'compared': [nothing_ignored, known_tags],
-    'file': [saved_clean, hides_solutions_only, folded_solutions_keep_their_secret],
+    'file': [saved_clean, hides_solutions_and_notes_only, folded_solutions_keep_their_secret],
     'spine': [has_title, has_labels, has_steps, headings_in_order, recap_answers_opening, predicts],
     'exercises': [enough_exercises, exercises_complete, exercises_checked],
-    'slides': [fits_a_slide],
+    'slides': [fits_a_slide, on_its_slide, notes_name_the_reader],
 }
 
 
@@ -481,9 +506,10 @@ def teaching_order(names: list[str]) -> list[str]:
 
 
 def title_matches(name: str, notebook: NotebookNode) -> list[str]:
-    """The file 02_lose_messages.ipynb has the title `# 02 Lose messages`."""
+    """The file 02_lose_messages.ipynb has the title `# 02 Lose messages`; C++ is `cpp` in it."""
     title = notebook.cells[0].source.splitlines()[0].removeprefix('# ') if notebook.cells else ''
-    if re.sub(r'[^a-z0-9]+', '_', title.lower()).strip('_') == name.removesuffix('.ipynb'):
+    words = title.lower().replace('c++', 'cpp')
+    if re.sub(r'[^a-z0-9]+', '_', words).strip('_') == name.removesuffix('.ipynb'):
         return []
     return [f'The title {title!r} is not that of {name}.']
 

@@ -1,10 +1,13 @@
 """Nodes and small helpers that several tests use."""
 
+import contextlib
 import threading
 
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 LIMIT_S = 20.0  # for every wait; never reached unless something is broken
 
@@ -44,6 +47,58 @@ class Listener(Node):
         self.heard.append(message.data)
         if self.work is not None:
             self.work(message)
+
+
+class Answerer(Node):
+    """Serves `look`; `work`, if given, is called before the answer."""
+
+    def __init__(self, work=None) -> None:
+        super().__init__('answerer')
+        self.work = work
+        self.service = self.create_service(Trigger, 'look', self.look)
+
+    def look(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self.work is not None:
+            self.work()
+        response.message = 'clear'
+        return response
+
+
+class Asker(Node):
+    """Calls `look` once, in the callback of a timer, and keeps the answer.
+
+    With `groups=1` the timer and the client share a mutually exclusive group, with 2 they do not.
+    """
+
+    def __init__(self, style: str = 'call', groups: int = 1) -> None:
+        super().__init__('asker')
+        self.asked = 0
+        self.answer = None
+        group = None if groups == 1 else MutuallyExclusiveCallbackGroup()
+        self.client = self.create_client(Trigger, 'look', callback_group=group)
+        self.timer = self.create_timer(0.005, getattr(self, style))
+
+    def ask(self):
+        self.timer.cancel()
+        self.asked += 1
+        return Trigger.Request()
+
+    def call(self) -> None:
+        self.answer = self.client.call(self.ask()).message
+
+    def call_twice(self) -> None:
+        for _ in range(2):
+            with contextlib.suppress(Exception):
+                self.call()
+
+    async def wait(self) -> None:
+        self.answer = (await self.client.call_async(self.ask())).message
+
+    def call_back(self) -> None:
+        self.client.call_async(self.ask()).add_done_callback(self.keep)
+
+    def keep(self, future) -> None:
+        self.answer = future.result().message
 
 
 class Gate:

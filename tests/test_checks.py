@@ -137,9 +137,7 @@ def test_all_right(capsys):
 
 def test_first_wrong_try_says_what_is_missing_without_hint(capsys):
     assert exercise(capsys, second=False) == (
-        '[ok] the group is Reentrant\n'
-        '[missing] no message is lost\n'
-        'Exercise 1: 1 of 2. Still missing: no message is lost.\n'
+        '[ok] the group is Reentrant\n[missing] no message is lost\nExercise 1: 1 of 2.\n'
     )
     assert checks.passed('Exercise 1') is False
 
@@ -232,3 +230,12 @@ def test_a_malformed_requirement_is_refused(capsys, requirement):
         checks.check('Exercise 1', ('fine', True, ''), requirement)
     assert capsys.readouterr().out == ''
     assert checks._failed_tries == {}
+
+
+def test_long_lines_are_broken_at_blanks(capsys):
+    words = ' '.join(f'word{number}' for number in range(40))
+    checks.check('Exercise 1', (words, False, words))
+    checks.check('Exercise 1', (words, False, words))
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 94
+    assert ' '.join(' '.join(lines).split()).count(words) == 3

@@ -76,7 +76,7 @@ def test_only_a_required_check_decides(tmp_path):
 def test_the_table_for_the_notebook():
     table = doctor.report()
     assert list(table.columns) == ['check', 'found', 'verdict']
-    assert len(table) == 12
+    assert len(table) == 13
     assert (table['verdict'].head(5) == 'ok').all()
 
 
@@ -187,6 +187,15 @@ def test_a_compiler_without_its_library_is_reported(monkeypatch, tmp_path):
     row = doctor.check_compiler()
     assert row.found == 'cannot compile `#include <string>`'
     assert row.to_do
+    assert not row.required
+
+
+def test_pybind11_is_looked_for_where_cmake_looks(monkeypatch, tmp_path):
+    assert not doctor.check_pybind11().to_do
+    monkeypatch.setattr(doctor, 'PREFIXES', (str(tmp_path),))
+    row = doctor.check_pybind11()
+    assert row.found == 'none'
+    assert 'pybind11-dev' in row.to_do
     assert not row.required
 
 

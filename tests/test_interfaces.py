@@ -522,11 +522,11 @@ ACTION = 'Goal goal\n---\ngeometry_msgs/Pose[] poses\n---\nfloat32 left\n'
         ),
         (
             {'srv/TurnCamera.srv': 'float32 a\n---\nsensor_msgs/msg/Image b\n'},
-            'srv/TurnCamera.srv', 'rosidl can read', 'InvalidResourceName: sensor_msgs/msg/Image',
+            'srv/TurnCamera.srv', 'has no /msg/', 'InvalidResourceName: sensor_msgs/msg/Image',
         ),
         (
             {'srv/TurnCamera.srv': 'float32 degTurn\n---\nsensor_msgs/Image b\n'},
-            'srv/TurnCamera.srv', 'rosidl can read', 'NameError',
+            'srv/TurnCamera.srv', 'a field name', "NameError: 'degTurn' is an invalid field name",
         ),
         (
             {'srv/More.srv': '---\n'},
@@ -581,6 +581,40 @@ def test_a_name_that_is_not_camel_case(package, kind, text):
     with pytest.raises(interfaces.parser.InvalidResourceName) as failure:
         interfaces._parse('custom_interfaces', root / file)
     assert f'{finding.error}.' == f'InvalidResourceName: {failure.value}'.split(' It should')[0]
+
+
+@pytest.mark.parametrize(
+    ('line', 'missing'),
+    [
+        ('float deg_turn', 'a type that exists, float32 or float64, in place of float'),
+        ('int deg_turn', 'a type that exists, int32 or int64, in place of int'),
+        (
+            'sensor_msgs/msg/Image deg_turn',
+            'sensor_msgs/Image in place of sensor_msgs/msg/Image: in a definition a type has no '
+            '/msg/',
+        ),
+        ('float32 degTurn', 'a field name in lower case with underscores, such as deg_turn'),
+        ('float32', 'a definition that rosidl can read'),
+    ],
+)
+def test_a_line_that_rosidl_cannot_read(package, line, missing):
+    root = package({'srv/TurnCamera.srv': TURN_CAMERA.replace('float32 deg_turn', line)})
+    finding = next(f for f in check_package(root) if f.file == 'srv/TurnCamera.srv')
+    assert finding.missing == missing
+
+
+def test_commas_after_dependencies(package):
+    text = CMAKE.replace('DEPENDENCIES sensor_msgs', 'DEPENDENCIES sensor_msgs, std_msgs')
+    text = text.replace('find_package(sen', 'find_package(std_msgs REQUIRED)\nfind_package(sen')
+    xml = FILES['package.xml'].replace('<depend>s', '<depend>std_msgs</depend>\n<depend>s')
+    (finding,) = check_package(package({'CMakeLists.txt': text, 'package.xml': xml}))
+    assert finding.missing == 'blanks in place of commas after DEPENDENCIES: sensor_msgs,'
+
+
+def test_findings_fit_on_a_slide(package):
+    shown = repr(check_package(package({'package.xml': None, 'CMakeLists.txt': None})))
+    assert max(map(len, shown.splitlines())) <= 94
+    assert shown.splitlines()[1].startswith('          Without it: ')
 
 
 def test_a_find_package_that_comes_too_late(package):

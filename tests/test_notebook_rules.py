@@ -13,6 +13,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from nbval.plugin import get_sanitize_patterns
 
 from tools import notebooks as tool
+from tools import slides
 
 SANITIZE = Path(__file__).parent / 'nbval_sanitize.cfg'
 OPENING = """\
@@ -92,7 +93,13 @@ def lesson(*cells, before=()):
         for output in cell.outputs:
             if output.output_type == 'execute_result':
                 output.execution_count = count
+    return with_file_metadata(notebook)
+
+
+def with_file_metadata(notebook):
     notebook.metadata = nbformat.from_dict(tool.NOTEBOOK_METADATA)
+    for cell, slide_type in zip(notebook.cells, slides.slide_types(notebook), strict=True):
+        cell.metadata.slideshow = nbformat.from_dict({'slide_type': slide_type})
     return notebook
 
 
@@ -102,8 +109,7 @@ def start():
     )
     notebook = new_notebook(cells=[new_markdown_cell(text), code('1', outputs=[])])
     notebook.cells[1].execution_count = 1
-    notebook.metadata = nbformat.from_dict(tool.NOTEBOOK_METADATA)
-    return notebook
+    return with_file_metadata(notebook)
 
 
 @pytest.mark.parametrize('group', rules.GROUPS)
@@ -112,6 +118,11 @@ def test_a_correct_notebook_is_let_pass(correct, group):
     notebook = correct()
     nbformat.validate(notebook)
     assert rules.problems(notebook, group) == []
+
+
+def note(text):
+    metadata = {'tags': ['notes'], 'jupyter': {'source_hidden': True}}
+    return new_markdown_cell(text, metadata=nbformat.from_dict(metadata))
 
 
 def with_source(index, old, new):
@@ -213,8 +224,11 @@ BROKEN = [
     (rules.saved_clean, lesson(code('run()', outputs=VIEW))),
     (rules.saved_clean, prints('1 of 2\r2 of 2\n')),
     (rules.saved_clean, old_format()),
-    (rules.hides_solutions_only, with_metadata(1, jupyter={'source_hidden': True})),
-    (rules.hides_solutions_only, lesson(new_code_cell('x', metadata={'tags': ['solution']}))),
+    (rules.hides_solutions_and_notes_only, with_metadata(1, jupyter={'source_hidden': True})),
+    (
+        rules.hides_solutions_and_notes_only,
+        lesson(new_code_cell('x', metadata={'tags': ['solution']})),
+    ),
     (rules.folded_solutions_keep_their_secret, lesson(code('depth = 20', 'solution'))),
     (rules.has_title, with_source(0, '# 02 Lose', '# Lose')),
     (rules.has_title, without(0)),
@@ -250,6 +264,11 @@ BROKEN = [
     (rules.fits_a_slide, lesson(code('\n'.join(['run()'] * (rules.MAX_CODE_LINES + 1))))),
     (rules.fits_a_slide, lesson(code('%%write a\n' + 'run()\n' * rules.MAX_FILE_LINES))),
     (rules.fits_a_slide, lesson(new_markdown_cell('word ' * (rules.MAX_WORDS + 1)))),
+    (rules.fits_a_slide, lesson(code('run()', outputs=printed('line\n' * 40)))),
+    (rules.on_its_slide, with_cell(2, metadata={})),
+    (rules.on_its_slide, with_metadata(2, slideshow={'slide_type': '-'})),
+    (rules.notes_name_the_reader, lesson(note('Ask first.'))),
+    (rules.notes_name_the_reader, lesson(code('For the instructor', 'notes'))),
 ]
 
 
@@ -277,6 +296,8 @@ def test_every_rule_is_tried_on_a_broken_notebook():
         (rules.no_last_semicolon, lesson(code('a = draw();'), code('f(";")'), code('%magic'))),
         (rules.has_steps, lesson(new_markdown_cell('## Exercises'))),
         (rules.fits_a_slide, lesson(code('%%write a\n' + 'run()\n' * rules.MAX_CODE_LINES))),
+        (rules.notes_name_the_reader, lesson(note('For the instructor: 5 minutes'))),
+        (rules.hides_solutions_and_notes_only, lesson(note('For the instructor: 5 minutes'))),
     ],
 )
 def test_what_is_allowed_is_let_pass(rule, notebook):
@@ -293,6 +314,8 @@ def test_rules_for_the_folder(tmp_path):
     assert rules.teaching_order([*names, '02-Lose.ipynb'])
     assert rules.title_matches('02_lose_messages.ipynb', lesson()) == []
     assert rules.title_matches('02_lose_everything.ipynb', lesson())
+    in_cpp = new_notebook(cells=[new_markdown_cell('# 08 Share code in C++')])
+    assert rules.title_matches('08_share_code_in_cpp.ipynb', in_cpp) == []
     assert rules.links_lead_somewhere(lesson(), tmp_path)
     (tmp_path / '02_lose_messages.ipynb').touch()
     assert rules.links_lead_somewhere(lesson(), tmp_path) == []

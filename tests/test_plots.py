@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import combinations
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -10,6 +11,7 @@ import pandas as pd
 import pytest
 from matplotlib.collections import PathCollection
 from matplotlib.colors import to_hex, to_rgba
+from matplotlib.patches import Ellipse
 from matplotlib.text import Text
 
 from helpers import plots
@@ -583,6 +585,28 @@ def test_topic_graph_has_boxes_and_arrows():
     assert [arrow.get_linestyle() for arrow in arrows] == ['-', '--', '-']  # nobody hears doubler
 
 
+@pytest.mark.parametrize('thread_free', [True, False])
+@pytest.mark.parametrize('group_free', [True, False])
+def test_who_waits_closes_a_circle_where_something_is_held(thread_free, group_free):
+    ax = plots.who_waits('timer', 'the answer', thread_free, group_free)
+    words = words_of(ax)
+    assert f'a thread\n{"free" if thread_free else "held"}' in words
+    assert f"the client's group\n{'free' if group_free else 'held'}" in words
+    held = 2 - thread_free - group_free
+    assert words.count('is held by') == held
+    assert words.count('needs') == 2
+    arrows = [text.arrow_patch for text in ax.texts if getattr(text, 'arrow_patch', None)]
+    solid = [arrow for arrow in arrows if arrow.get_linestyle() != '--']
+    assert len(arrows) == 3 + held
+    assert len(solid) == (1 + 2 * held if held else 0)  # `waits for`, and two a thing that is held
+    assert ax.get_title('left').startswith('A circle' if held else 'No circle')
+
+
+def test_timeline_of_callbacks_that_no_message_called(slow):
+    ax = plots.timeline({'timer': slow}, time_label='time since the first callback (s)')
+    assert ax.get_xlabel() == 'time since the first callback (s)'
+
+
 @pytest.mark.parametrize(
     'draw',
     [
@@ -597,3 +621,133 @@ def test_nothing_to_draw_is_one_sentence(draw):
     with pytest.raises(ValueError, match=r'^[^\n]+\.$'):
         draw()
     assert plt.get_fignums() == before
+
+
+# --- Drives ---
+
+T = np.arange(0.0, 10.0, 0.5)
+DRIVE = pd.DataFrame(
+    {'t': T, 'x': T, 'y': 0.1 * T, 'distance': 0.2 * T, 'var_x': 4.0, 'cov_x_y': 0.0, 'var_y': 1.0}
+)
+
+
+def test_path_has_the_truth_the_estimates_and_ellipses_of_3_sigma():
+    fixes = pd.DataFrame({'gps_x': [0.3, np.nan, 2.1], 'gps_y': [0.1, np.nan, 0.2]})
+    ax = plots.path(DRIVE, {'a': DRIVE, 'b': DRIVE + 1}, fixes, ellipses_s=4)
+    assert legend_of(ax) == ['truth', 'GPS', 'a', 'b', 'start']
+    truth, gps, a, b = ax.lines
+    assert a.get_xydata().tolist() == truth.get_xydata().tolist()
+    assert b.get_xydata().tolist() == (truth.get_xydata() + 1).tolist()
+    assert gps.get_marker() == '+'
+    assert a.get_linestyle() != b.get_linestyle()
+    # At the first row past 4 s and 8 s; `b` is one second and one metre further.
+    ellipses = [e for e in ax.patches if isinstance(e, Ellipse)]
+    assert np.allclose([e.get_center() for e in ellipses], [(4, 0.4), (8, 0.8), (4, 1.3), (8, 1.7)])
+    assert {(e.width, e.height, e.angle % 180) for e in ellipses[:2]} <= {
+        (12.0, 6.0, 0.0), (6.0, 12.0, 90.0)
+    }  # fmt: skip
+    assert ax.get_aspect() == 1
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ('x (m)', 'y (m)')
+
+
+def test_ellipses_turn_with_the_covariance():
+    turned = DRIVE.assign(var_x=2.5, var_y=2.5, cov_x_y=1.5)  # variances 4 and 1, turned by 45 deg
+    ax = plots.path(turned, {'a': turned}, ellipses_s=100)
+    assert not ax.patches
+    (ellipse,) = plots.path(turned, {'a': turned}, ellipses_s=6).patches
+    long = ellipse.angle if ellipse.width > ellipse.height else ellipse.angle + 90
+    assert long % 180 == pytest.approx(45)
+    assert sorted([ellipse.width, ellipse.height]) == pytest.approx([6, 12])
+
+
+def test_error_has_a_line_each_and_shaded_times():
+    ax = plots.error({'a': DRIVE, 'b': DRIVE}, spans_s={'no GPS': (4, 8)}, ylabel='late (m)')
+    assert legend_of(ax) == ['a', 'b', 'no GPS']
+    assert [line.get_ydata().tolist() for line in ax.lines] == [DRIVE.distance.tolist()] * 2
+    (span,) = ax.patches
+    assert (span.get_x(), span.get_width()) == (4, 4)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ('time (s)', 'late (m)')
+    assert ax.get_yscale() == 'linear'
+    assert plots.error({'a': DRIVE}, log=True).get_yscale() == 'log'
+
+
+def test_innovation_has_its_band_and_crosses_for_what_was_kept_out():
+    table = pd.DataFrame(
+        {
+            't': [1, 2, 3],
+            'innovation': [0.1, 9, -0.2],
+            'sigma': 0.5,
+            'accepted': [True, False, True],
+        }
+    )
+    ax = plots.innovation(table)
+    assert legend_of(ax) == ['3 sigma', 'used 2', 'kept out 1']
+    points = points_of(ax)
+    assert points['kept out 1'].tolist() == [[2, 9]]
+    low, high, zero, used = ax.lines
+    assert set(low.get_ydata()) == {-1.5}
+    assert set(high.get_ydata()) == {1.5}
+    assert used.get_xydata().tolist() == [[1, 0.1], [3, -0.2]]
+    assert legend_of(plots.innovation(table.assign(accepted=True))) == ['3 sigma', 'used 3']
+
+
+FRAMES = pd.DataFrame(
+    [('odom', 'base', 'filter'), ('base', 'imu', 'robot'), ('base', 'gps', 'robot'),
+     ('map', 'odom', 'map filter')],
+    columns=['parent', 'child', 'publisher'],
+)  # fmt: skip
+
+
+def test_frame_tree_places_each_frame_right_of_its_parent():
+    ax = plots.frame_tree(FRAMES)
+    places = {text.get_text(): text.get_position() for text in ax.texts}
+    assert list(places) == ['map', 'odom', 'base', 'imu', 'gps']
+    for row in FRAMES.itertuples():
+        assert places[row.parent][0] < places[row.child][0]
+    assert places['imu'][1] > places['gps'][1]
+    assert places['base'][1] == (places['imu'][1] + places['gps'][1]) / 2
+    assert legend_of(ax) == ['filter', 'robot', 'map filter']
+    ax.figure.draw_without_rendering()
+    boxes = [text.get_window_extent() for text in ax.texts]
+    assert not any(a.count_overlaps([b]) for a, b in combinations(boxes, 2))
+
+
+@pytest.mark.parametrize(
+    ('draw', 'error', 'words'),
+    [
+        (lambda: plots.path(None, {'a': DRIVE}), TypeError, 'truth must be a DataFrame'),
+        (lambda: plots.path(DRIVE, DRIVE), TypeError, 'Give each estimate a name'),
+        (lambda: plots.path(DRIVE, [DRIVE]), TypeError, 'Give each estimate a name'),
+        (lambda: plots.path(DRIVE, {}), ValueError, '1 to 4 estimates, not 0'),
+        (lambda: plots.path(DRIVE, {'a': DRIVE[['t']]}), ValueError, "estimate 'a' needs rows"),
+        (lambda: plots.path(DRIVE, {'a': DRIVE}, ellipses_s=0), ValueError, 'ellipses_s must be'),
+        (lambda: plots.path(DRIVE, {'a': DRIVE}, DRIVE), ValueError, 'fixes needs rows'),
+        (lambda: plots.error(dict.fromkeys('abcde', DRIVE)), ValueError, '1 to 4 errors, not 5'),
+        (lambda: plots.error({'a': DRIVE}, {'x': (2, 1)}), ValueError, 'span_s must be two'),
+        (lambda: plots.innovation(DRIVE), ValueError, 'innovations needs rows with the columns'),
+        (lambda: plots.frame_tree(FRAMES.iloc[:0]), ValueError, 'transforms needs rows'),
+        (lambda: plots.frame_tree(FRAMES.iloc[[0, 0]]), ValueError, 'base has two parents'),
+        (lambda: plots.frame_tree(FRAMES.iloc[1:]), ValueError, 'these transforms have 2'),
+        (
+            lambda: plots.frame_tree(FRAMES.replace('map', 'imu')),
+            ValueError,
+            'these transforms have 0',
+        ),
+        (
+            lambda: plots.frame_tree(FRAMES.assign(child=['base', 'imu', 'map', 'odom'])),
+            ValueError,
+            'these transforms have 0',
+        ),
+    ],
+)
+def test_bad_drives(draw, error, words):
+    before = plt.get_fignums()
+    with pytest.raises(error, match=words):
+        draw()
+    assert plt.get_fignums() == before
+
+
+def test_a_circle_beside_a_tree_is_no_tree():
+    loop = pd.DataFrame([('a', 'b', 'n'), ('b', 'a', 'n')], columns=FRAMES.columns)
+    with pytest.raises(ValueError, match='a circle'):
+        plots.frame_tree(pd.concat([FRAMES, loop]))

@@ -5,11 +5,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from rclpy.callback_groups import ReentrantCallbackGroup
-from ros_nodes import LIMIT_S, Gate, Listener, Talker, spin
+from ros_nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Int64, String
 
-from helpers.recording import COLUMNS, Recording, check_table
+from helpers.recording import COLUMNS, CallbackRecording, Recording, check_table
 from helpers.session import ros_session
 
 TIMES = ['published_s', 'started_s', 'finished_s']
@@ -330,3 +330,52 @@ def test_bad_table(table, error, said):
 def test_good_table_with_more_columns():
     table = GOOD.assign(note='more is no harm')
     assert check_table(table[::-1]).equals(table)
+
+
+# Callbacks of any kind
+
+
+@pytest.mark.parametrize(
+    ('style', 'threads', 'together'), [('call', 2, 1), ('call_back', 1, 0), ('wait', 1, 1)]
+)
+def test_runs_of_callbacks(style, threads, together):
+    with ros_session() as session:
+        asker, answerer = Asker(style, groups=2), Answerer(lambda: time.sleep(0.02))
+        recording = CallbackRecording(ask=asker.timer, look=answerer.service)
+        spin(session, asker, answerer, threads=threads)
+        session.wait_until(lambda: asker.answer, LIMIT_S)
+        session.wait_until(lambda: recording.finished('ask') == 1, LIMIT_S)
+    assert asker.answer == 'clear'
+    assert (recording.finished('ask'), recording.finished('look')) == (1, 1)
+    assert recording.inside('look', 'ask') == together
+    tables = recording.tables()
+    assert list(tables) == ['ask', 'look']
+    for table in tables.values():
+        check_table(table)
+        assert list(table.columns) == COLUMNS
+        assert table.seq.tolist() == [0]
+        assert (table.finished_s > table.started_s).all()
+    assert tables['ask'].started_s[0] == 0
+    assert tables['look'].started_s[0] > 0
+    assert tables['ask'].thread[0] == 'worker 1'
+    assert tables['look'].thread[0] == f'worker {threads}'
+
+
+def test_run_that_goes_on():
+    gate = Gate()
+    with ros_session() as session:
+        asker, answerer = Asker('call_back'), Answerer(gate)
+        recording = CallbackRecording(look=answerer.service)
+        spin(session, asker, answerer)
+        session.wait_until(lambda: gate.inside == 1, LIMIT_S)
+        assert recording.finished('look') == 0
+        assert recording.tables()['look'].finished_s.isna().all()
+        gate.open()
+    assert recording.finished('look') == 1
+
+
+def test_no_run():
+    assert CallbackRecording().tables() == {}
+    recording = CallbackRecording(look=SimpleNamespace(callback=print))
+    assert recording.tables()['look'].columns.tolist() == COLUMNS
+    assert recording.tables()['look'].empty

@@ -19,7 +19,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle, InvalidNodeNameException
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
-from ros_nodes import LIMIT_S, Gate, Listener, Talker, spin
+from ros_nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 from std_msgs.msg import String
 
 from helpers import session as module
@@ -480,6 +480,147 @@ def test_callback_that_does_not_end(threads, monkeypatch):
     wait_for(lambda: python_threads() == before)
 
 
+# Deadlocks
+
+
+def ask(threads, style='call', groups=1, work=None):
+    """Let an asker call an answerer until nothing happens any more. Return the asker's answer."""
+    with ros_session() as session:
+        asker = Asker(style, groups)
+        executor = spin(session, asker, Answerer(work), threads=threads)
+        session.wait_until(lambda: asker.asked, LIMIT_S)
+        session.wait_until_quiet(executor)
+    return asker.answer
+
+
+@pytest.mark.parametrize(
+    ('threads', 'style', 'groups', 'answer'),
+    [
+        (1, 'call', 1, None),
+        (1, 'call', 2, None),
+        (2, 'call', 1, None),
+        (2, 'call', 2, 'clear'),
+        (2, 'call_twice', 1, None),
+        (1, 'wait', 1, None),
+        (1, 'wait', 2, 'clear'),
+        (2, 'wait', 1, None),
+        (2, 'wait', 2, 'clear'),
+        (1, 'call_back', 1, 'clear'),
+    ],
+)
+def test_deadlock_ends_with_the_session(threads, style, groups, answer):
+    with warnings.catch_warnings(record=True) as warned:
+        warnings.simplefilter('always')
+        assert ask(threads, style, groups) == answer
+        gc.collect()
+    assert [str(warning.message) for warning in warned] == []
+
+
+@pytest.mark.parametrize('style', ['call', 'call_back'])
+def test_nobody_answers(style, capsys):
+    with ros_session() as session:
+        asker = Asker(style)
+        executor = spin(session, asker)
+        session.wait_until(lambda: asker.asked, LIMIT_S)
+        session.wait_until_quiet(executor)
+    gc.collect()
+    assert asker.answer is None
+    assert capsys.readouterr() == ('', '')
+
+
+def test_work_is_not_quiet():
+    assert ask(2, groups=2, work=lambda: time.sleep(0.5)) == 'clear'
+    assert ask(1, 'wait', groups=2, work=lambda: time.sleep(0.5)) == 'clear'
+
+
+def test_work_without_end_is_never_quiet():
+    gate = threading.Event()
+
+    def work():
+        while not gate.is_set():
+            time.sleep(0.001)
+
+    with ros_session() as session:
+        asker = Asker('call_back')
+        executor = spin(session, asker, Answerer(work), threads=2)
+        session.wait_until(lambda: asker.asked, LIMIT_S)
+        with pytest.raises(TimeoutError):
+            session.wait_until_quiet(executor, timeout_s=0.6)
+        gate.set()
+
+
+def test_quiet_executor_must_spin():
+    with ros_session() as session, pytest.raises(ValueError, match='does not spin'):
+        session.wait_until_quiet(SingleThreadedExecutor())
+
+
+@EXECUTORS
+def test_interrupt_of_a_deadlock(threads):
+    with running(f"""
+        import threading
+        import rclpy
+        from ros_nodes import Answerer, Asker, spin
+        from helpers.session import ros_session
+
+        try:
+            with ros_session() as session:
+                asker = Asker()
+                executor = spin(session, asker, Answerer(), threads={threads})
+                session.wait_until(lambda: asker.asked)
+                session.wait_until_quiet(executor)
+                print('ready', flush=True)
+                session.wait_until(lambda: asker.answer)
+        except KeyboardInterrupt:
+            print(asker.answer, rclpy.ok(), threading.active_count())
+    """) as process:
+        assert process.stdout.readline() == 'ready\n'
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=LIMIT_S)
+    assert (process.returncode, out, err) == (0, 'None False 1\n', '')
+
+
+# Nodes that are destroyed while their callbacks run
+
+
+@EXECUTORS
+def test_subscriber_destroyed_in_its_callback(threads):
+    gate = Gate()
+    with ros_session() as session:
+        listener, talker = Listener(gate), Talker(5)
+        executor = spin(session, listener, threads=threads)
+        for _ in range(5):
+            talker.publish()
+        session.wait_until(lambda: gate.inside == 1, LIMIT_S)
+        listener.destroy_node()
+        gate.open()
+        session.wait_until_quiet(executor)
+    assert listener.heard == ['Hello World: 0']
+
+
+def test_service_destroyed_in_its_callback():
+    gate = Gate()
+    with pytest.raises(InvalidHandle), ros_session() as session:
+        asker, answerer = Asker(groups=2), Answerer(gate)
+        spin(session, asker, answerer, threads=3)
+        session.wait_until(lambda: gate.inside == 1, LIMIT_S)
+        answerer.destroy_node()
+        gate.open()
+        session.wait_until(lambda: asker.answer, LIMIT_S)
+
+
+@pytest.mark.parametrize('style', ['call', 'wait'])
+def test_client_destroyed_while_it_waits(style):
+    gate = Gate()
+    with ros_session() as session:
+        asker = Asker(style, groups=2)
+        executor = spin(session, asker, Answerer(gate), threads=3)
+        session.wait_until(lambda: gate.inside == 1, LIMIT_S)
+        asker.destroy_node()
+        gate.open()
+        session.wait_until_quiet(executor)
+    assert asker.answer is None
+
+
 # Failures
 
 
@@ -553,6 +694,25 @@ def test_wait_until_raises_a_callback_failure_at_once(threads):
             assert time.monotonic() - started < LIMIT_S / 2
     assert 'failing_callback' in frames(failure.value)
     assert not hasattr(failure.value, '__notes__')
+
+
+@pytest.mark.parametrize('style', ['call', 'wait'])
+def test_failure_in_a_service(style):
+    with pytest.raises(ZeroDivisionError) as failure, ros_session() as session:
+        asker = Asker(style, groups=2)
+        spin(session, asker, Answerer(lambda: failing_callback(None)), threads=2)
+        session.wait_until(lambda: asker.answer, LIMIT_S)
+    assert 'failing_callback' in frames(failure.value)
+    assert asker.answer is None
+
+
+@EXECUTORS
+def test_failure_while_waiting_for_quiet(threads):
+    with pytest.raises(ZeroDivisionError), ros_session() as session:
+        executor = spin(session, Listener(failing_callback), threads=threads)
+        spin(session, Talker(1))
+        for _ in range(50):  # the message may still be on its way
+            session.wait_until_quiet(executor, LIMIT_S)
 
 
 @EXECUTORS

@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -17,6 +18,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PYPROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())
 LOCK = (ROOT / 'requirements.lock').read_text()
+GROUPS = PYPROJECT['dependency-groups']
+GROUP_LOCKS = {name: (ROOT / f'requirements-{name}.lock').read_text() for name in GROUPS}
 BASE_PYTHON = Path(sys._base_executable)
 HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
 
@@ -24,7 +27,11 @@ HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
 def direct_dependencies() -> list[str]:
     extras = PYPROJECT['project']['optional-dependencies']
     requirements = [*PYPROJECT['project']['dependencies'], *extras['ros'], *extras['dev']]
-    return [re.match(r'[\w-]+', requirement)[0] for requirement in requirements]
+    return [name_of(requirement) for requirement in requirements]
+
+
+def name_of(requirement: str) -> str:
+    return re.match(r'[\w-]+', requirement)[0]
 
 
 # --- The lock ------------------------------------------------------------------------------------
@@ -41,13 +48,15 @@ def pins(lock: str) -> dict[str, str]:
 
 def test_every_pin_has_a_version_and_a_hash():
     assert len(pins(LOCK)) > 100
-    for name, pin in pins(LOCK).items():
+    for name, pin in pins(''.join([LOCK, *GROUP_LOCKS.values()])).items():
         assert re.match(rf'{re.escape(name)}==\d', pin), pin
         assert '--hash=sha256:' in pin, name
 
 
 def test_the_lock_names_no_index():
-    assert not re.search(r'://|--(extra-)?index|--find-links|file:|@', LOCK)
+    assert not re.search(
+        r'://|--(extra-)?index|--find-links|file:|@', ''.join([LOCK, *GROUP_LOCKS.values()])
+    )
 
 
 def test_the_lock_names_the_pythons_it_fits():
@@ -59,6 +68,33 @@ def test_the_lock_names_the_pythons_it_fits():
 @pytest.mark.parametrize('name', direct_dependencies())
 def test_a_direct_dependency_is_locked_and_has_its_reason(name):
     assert name in pins(LOCK)
+    assert_reason(name)
+
+
+@pytest.mark.parametrize('group', GROUPS)
+def test_a_group_is_locked_and_agrees_with_the_rest(group):
+    mine = pins(GROUP_LOCKS[group])
+    for requirement in GROUPS[group]:
+        assert name_of(requirement) in mine
+        assert_reason(name_of(requirement))
+    for other in map(pins, [LOCK, *GROUP_LOCKS.values()]):
+        for name in mine.keys() & other.keys():
+            assert mine[name].split()[0] == other[name].split()[0]
+
+
+def test_the_proxy_of_the_hub_is_locked():
+    lock = json.loads((ROOT / 'tools/hub/package-lock.json').read_text())
+    packages = {name: package for name, package in lock['packages'].items() if name}
+    assert all(package['integrity'].startswith('sha512-') for package in packages.values())
+    assert not any('resolved' in package for package in packages.values())
+    for name, version in json.loads((ROOT / 'tools/hub/package.json').read_text())[
+        'dependencies'
+    ].items():
+        assert packages[f'node_modules/{name}']['version'] == version
+        assert_reason(name)
+
+
+def assert_reason(name: str) -> None:
     reasons = (ROOT / 'environment.md').read_text()
     assert re.search(rf'^\| `{re.escape(name)}(\[\w+\])?` \| .{{10,}} \|$', reasons, re.MULTILINE)
 
@@ -223,14 +259,14 @@ class Checkout:
         header = f'# Every wheel exists for Python {HERE}\n'
         (self.root / 'requirements.lock').write_text(header + ''.join(pins))
 
-    def set_up(self, **environment: str) -> subprocess.CompletedProcess:
+    def set_up(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess:
         """Run the script offline. As a user may have it: settings of pip only, none of uv."""
         kept = {k: v for k, v in os.environ.items() if not k.startswith(('PIP_', 'UV_'))}
         kept |= {'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': self.wheels.as_uri()}
         kept |= {'UV_CACHE_DIR': str(self.wheels / 'cache'), 'PIP_CONFIG_FILE': os.devnull}
         kept |= {'PATH': f'{BASE_PYTHON.parent}{os.pathsep}{kept["PATH"]}'}
         return subprocess.run(
-            [self.root / 'tools/set_up.sh'],
+            [self.root / 'tools/set_up.sh', *arguments],
             env=kept | environment,
             cwd='/',
             stdin=subprocess.DEVNULL,
@@ -314,6 +350,22 @@ def test_a_wrong_hash_installs_nothing_and_the_next_call_repairs(checkout):
     assert again.stderr.startswith('Making .venv')
     assert not (checkout.root / '.venv/lib/damage').exists()
     assert checkout.installed() == ALL
+
+
+def test_what_a_group_needs_is_kept_once_it_was_asked_for(checkout):
+    checkout.lock(checkout.pins[name] for name in ('setuptools', 'uv'))
+    for group, name in (('browser', 'iniconfig'), ('hub', 'pluggy')):
+        pin = checkout.pins.get(name) or wheel_of(name, checkout.wheels)
+        (checkout.root / f'requirements-{group}.lock').write_text(pin)
+    without = [name for name in ALL if name != 'iniconfig']
+    with_both = sorted([*ALL, 'pluggy'])
+    for arguments, expected in (
+        ([], without), (['browser'], ALL), ([], ALL), (['hub'], with_both), ([], with_both)
+    ):  # fmt: skip
+        answer = checkout.set_up(*arguments)
+        assert answer.returncode == 0, answer.stderr
+        assert checkout.installed() == expected
+    assert answer.stderr == ''
 
 
 def test_a_moved_checkout_is_noticed(checkout, path):

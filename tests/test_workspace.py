@@ -269,6 +269,10 @@ def test_mistakes_of_a_python_package(other):
     assert not result.ok
     assert result.errors == ['Nothing was built: src/ has no package talker, only talker_pkg.']
 
+    (other.path / 'src').rename(other.path / 'elsewhere')
+    result = other.build('talker')
+    assert result.errors == ['Nothing was built: src/ has no package talker, it is empty.']
+
 
 def test_an_interrupted_build_leaves_no_process(other):
     write_interfaces(other)
@@ -316,6 +320,19 @@ def test_without_python_headers_one_sentence_says_what_to_install(monkeypatch):
     monkeypatch.setattr(module.sysconfig, 'get_path', lambda kind: '/nowhere')
     version = f'{sys.version_info.major}.{sys.version_info.minor}'
     assert f'run `sudo apt install python{version}-dev`' in missing_tools()
+
+
+def test_of_the_linker_only_its_error_is_kept():
+    error = (
+        '/usr/bin/ld: lib/libmy.a(my.cpp.o): relocation R_X86_64_PC32 against symbol `_ZTISt9'
+        "exception' can not be used when making a shared object; recompile with -fPIC"
+    )
+    text = f"""/usr/bin/ld: lib/libmy.a(my.cpp.o): warning: relocation against `_ZTISt9exception'
+{error}
+/usr/bin/ld: final link failed: bad value
+collect2: error: ld returned 1 exit status
+gmake[2]: *** [CMakeFiles/my.dir/build.make:100: my.so] Error 1"""
+    assert lines_that_matter(text) == [error]
 
 
 def test_without_known_lines_the_last_ones_are_kept():
@@ -498,11 +515,20 @@ def test_what_ros2_run_would_say(built, capsys):
 def test_waiting_is_bounded_and_says_what_was_printed(built):
     with built.run('talker_pkg', 'talker') as talker:
         talker.wait_for('Publishing')
-        with pytest.raises(TimeoutError, match=r"1 line.s. with 'never' of talker. Its .*Publish"):
+        with pytest.raises(TimeoutError, match="a line with 'never' of talker. Its .*Publish"):
             talker.wait_for('never', timeout_s=0.1)
         talker._process.send_signal(signal.SIGKILL)
-        with pytest.raises(RuntimeError, match='^talker ended with code -9 before 1 line'):
+        with pytest.raises(RuntimeError, match='^talker ended with code -9 before a line'):
             talker.wait_for('never')
+
+
+def test_of_a_traceback_the_last_line_is_told(built):
+    command = [sys.executable, '-c', 'int("a" + str(1))']
+    wrong = module.Process('wrong', command, dict(os.environ), built.path)
+    with pytest.raises(RuntimeError) as failure:
+        wrong.wait_for('up')
+    told = "Its last line: ValueError: invalid literal for int() with base 10: 'a1'"
+    assert str(failure.value) == f"wrong ended with code 1 before a line with 'up'. {told}"
 
 
 def test_a_process_that_ignores_ctrl_c_is_killed(built, monkeypatch):

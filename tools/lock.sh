@@ -1,5 +1,6 @@
 #!/bin/sh
 # Write requirements.lock: every dependency of pyproject.toml, pinned, with the hashes of its files.
+# And requirements-GROUP.lock for each of its groups: what that needs besides.
 # usage: tools/lock.sh UV [--upgrade]
 # Without --upgrade a version that still fits stays as it is.
 set -eu
@@ -8,12 +9,19 @@ uv=$1
 shift
 
 new=.requirements.lock.new
-[ ! -f requirements.lock ] || cp requirements.lock "$new" # uv keeps the versions it finds here
 trap 'rm -f "$new" "$new.checked"' EXIT
-# empy has no wheel: tools/set_up.sh builds its one module.
-"$uv" pip compile pyproject.toml --all-extras --universal --python-version 3.11 \
-    --only-binary :all: --no-binary empy --generate-hashes --no-annotate --no-header \
-    --no-emit-index-url --no-emit-find-links --quiet --output-file "$new" "$@" > /dev/null
+
+resolve() { # LOCK, and what uv resolves; uv keeps the versions that it finds in the file
+    rm -f "$new"
+    [ ! -f "$1" ] || cp "$1" "$new"
+    shift
+    # empy has no wheel: tools/set_up.sh builds its one module.
+    "$uv" pip compile --universal --python-version 3.11 \
+        --only-binary :all: --no-binary empy --generate-hashes --no-annotate --no-header \
+        --no-emit-index-url --no-emit-find-links --quiet --output-file "$new" "$@" > /dev/null
+}
+
+resolve requirements.lock pyproject.toml --all-extras "$@"
 
 # The lock fits several Pythons, but a package may lack the wheel of one. tools/set_up.sh reads the
 # result in the second line, and need not ask the package index.
@@ -37,3 +45,13 @@ fi
     cat "$new"
 } > requirements.lock
 echo "requirements.lock: $(grep -c '^[a-z].*==' requirements.lock) pins, Python$pythons"
+
+constraints='--constraint requirements.lock'
+for group in browser hub; do
+    resolve "requirements-$group.lock" --group "$group" $constraints "$@"
+    {
+        echo "# Made by \`make lock\` from the group \`$group\` of pyproject.toml. Do not edit."
+        cat "$new"
+    } > "requirements-$group.lock"
+    constraints="$constraints --constraint requirements-$group.lock" # .venv may hold all of them
+done

@@ -2,11 +2,13 @@
 
     python tools/notebooks.py                      all lessons
     python tools/notebooks.py --lesson 02 03       some of them
+    python tools/notebooks.py --clean-only         all lessons, without executing them
 
 Each notebook gets a fresh kernel of the interpreter that runs this tool, started as nbval starts
 it. What is saved is what this one run gave, pictures included. A picture kept from an earlier run
 would make smaller diffs, but it would also hide a change in `helpers`, and it could contradict
-the text beside it. To keep a diff small, run only the lessons that you changed.
+the text beside it. To keep a diff small, run only the lessons that you changed. Every cell gets
+its slide type from the rule of tools/slides.py.
 """
 
 import argparse
@@ -31,6 +33,8 @@ from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernel
 from nbformat import NotebookNode
 from traitlets import default
 
+from tools.slides import slide_types
+
 FOLDER = Path(__file__).resolve().parent.parent / 'notebooks'
 CELL_TIMEOUT_S = 60
 # The README and lesson 00 show these: the id of a cell, and the file for its picture.
@@ -50,7 +54,8 @@ OVERWRITTEN = re.compile(r'^.*\r(?=[^\n])', re.MULTILINE)
 def clean(notebook: NotebookNode) -> NotebookNode:
     """Return a copy of a notebook without what changes by itself from run to run.
 
-    Kept are sources, tags, hidden sources, slide types, cell ids, execution counts and outputs.
+    Kept are sources, tags, hidden sources, cell ids, execution counts and outputs. The slide types
+    are made anew.
     Neighbouring pieces of one stream become one, because where a stream is cut is chance. The
     model of a widget lives only as long as its kernel: of its view, the text is kept.
     """
@@ -65,6 +70,8 @@ def clean(notebook: NotebookNode) -> NotebookNode:
         cell.metadata = nbformat.from_dict(dict(_kept_metadata(cell.metadata)))
         if cell.cell_type == 'code':
             cell.outputs = _clean_outputs(cell)
+    for cell, slide_type in zip(notebook.cells, slide_types(notebook), strict=True):
+        cell.metadata.slideshow = nbformat.from_dict({'slide_type': slide_type})
     return notebook
 
 
@@ -73,8 +80,6 @@ def _kept_metadata(metadata: NotebookNode) -> Iterator[tuple[str, object]]:
         yield 'tags', metadata['tags']
     if metadata.get('jupyter', {}).get('source_hidden'):
         yield 'jupyter', {'source_hidden': True}
-    if metadata.get('slideshow', {}).get('slide_type'):
-        yield 'slideshow', {'slide_type': metadata['slideshow']['slide_type']}
 
 
 def _clean_outputs(cell: NotebookNode) -> list[NotebookNode]:
@@ -170,13 +175,14 @@ def pictures(notebook: NotebookNode) -> dict[str, bytes]:
     }
 
 
-def update(path: Path) -> bool:
-    """Execute a notebook's file in place; return True where that changed the file.
+def update(path: Path, clean_only: bool = False) -> bool:
+    """Execute and clean a notebook's file in place; return True where that changed the file.
 
     Raises RuntimeError as `execute` does; the file is then as it was before.
     """
     before = path.read_text(encoding='utf-8')
-    notebook = execute(nbformat.reads(before, as_version=4), path.parent)
+    notebook = nbformat.reads(before, as_version=4)
+    notebook = clean(notebook) if clean_only else execute(notebook, path.parent)
     after = text_of(notebook)
     for name, picture in pictures(notebook).items():
         (path.parent / name).parent.mkdir(exist_ok=True)
@@ -211,12 +217,14 @@ def main(arguments: list[str] | None = None, folder: Path = FOLDER) -> int:
     """Run the tool; return its exit status."""
     parser = argparse.ArgumentParser(description='Execute lessons in place and clean them.')
     parser.add_argument('--lesson', nargs='+', default=[], metavar='NN', help='for example 02')
-    numbers = ' '.join(parser.parse_args(arguments).lesson).split()
+    parser.add_argument('--clean-only', action='store_true', help='keep the outputs as they are')
+    options = parser.parse_args(arguments)
+    numbers = ' '.join(options.lesson).split()
     try:
         for path in lessons(numbers, folder):
             start = time.monotonic()
             try:
-                changed = update(path)
+                changed = update(path, options.clean_only)
             except (RuntimeError, ValueError) as error:
                 raise ValueError(f'{path.name}: {error} (the file is as it was)') from None
             seconds = time.monotonic() - start

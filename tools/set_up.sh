@@ -1,6 +1,8 @@
 #!/bin/sh
 # Make .venv and install requirements.lock and this project into it. Where .venv is up to date,
 # this does nothing. After an interruption the next call repairs what the last one left.
+# usage: tools/set_up.sh [GROUP]
+# The group, `browser` or `hub`, adds its requirements-GROUP.lock. Later calls keep it up to date.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -13,13 +15,20 @@ fail() {
 exec 9< tools/set_up.sh
 ! command -v flock > /dev/null || flock 9 # two calls at once: the second waits
 
+locks=requirements.lock groups=
+for group in browser hub; do
+    if [ "${1-}" = "$group" ] || [ -f ".venv/with_$group" ]; then
+        locks="$locks requirements-$group.lock" groups="$groups .venv/with_$group"
+    fi
+done
+
 # The stamp is written last. It holds all that .venv depends on, so that a changed lock, a moved
 # folder and a Python that went away or became another one are noticed.
 stamp=.venv/set_up.stamp
 wanted() {
     version=$(.venv/bin/python -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null) || return 0
     printf '%s\n' "Python $version" "$(pwd -P)" \
-        "$(cat requirements.lock pyproject.toml tools/set_up.sh tools/jupyterlab_settings.json | cksum)"
+        "$(cat $locks pyproject.toml tools/set_up.sh tools/jupyterlab_settings.json | cksum)"
 }
 [ "$(cat "$stamp" 2> /dev/null)" != "$(wanted)" ] || [ ! -f "$stamp" ] || exit 0
 
@@ -103,13 +112,14 @@ quiet=
 rm -rf .venv/lib/python*/site-packages/*.egg-info
 # Wheels only, except empy, which has none: one module, from its pinned source. Without isolation uv
 # builds it with the setuptools above, and fetches nothing that is not in the lock.
-say "Installing $(grep -c '^[a-z].*==' requirements.lock) packages, about 190 MB the first time"
+say "Installing $(cat $locks | grep -c '^[a-z].*==') packages, about 190 MB the first time"
 .venv/bin/uv pip sync $quiet $no_index --python .venv/bin/python --require-hashes \
-    --only-binary :all: --no-binary empy --no-build-isolation requirements.lock ||
+    --only-binary :all: --no-binary empy --no-build-isolation $locks ||
     fail 'uv could not install requirements.lock: check the network, or name your package index with UV_DEFAULT_INDEX, then try again.'
 .venv/bin/uv pip install --quiet --offline --python .venv/bin/python --no-deps --no-build-isolation --editable .
 
 mkdir -p .venv/share/jupyter/lab/settings
 cp tools/jupyterlab_settings.json .venv/share/jupyter/lab/settings/overrides.json
+[ -z "$groups" ] || touch $groups
 wanted > .venv/set_up.new
 mv .venv/set_up.new "$stamp"

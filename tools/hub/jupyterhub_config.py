@@ -17,7 +17,9 @@ c.JupyterHub.bind_url = 'http://127.0.0.1:8000'
 c.JupyterHub.db_url = f'sqlite:///{STATE}/jupyterhub.sqlite'
 c.JupyterHub.cookie_secret_file = str(STATE / 'cookie_secret')
 c.ConfigurableHTTPProxy.pid_file = str(STATE / 'proxy.pid')
-c.ConfigurableHTTPProxy.command = f'{sys.prefix}/hub/node_modules/.bin/configurable-http-proxy'
+c.ConfigurableHTTPProxy.command = (
+    f'{sys.prefix}/hub_proxy/node_modules/.bin/configurable-http-proxy'
+)
 c.Authenticator.allow_all = True
 
 c.Spawner.cmd = [str(ROOT / 'tools/hub/start_student.sh')]

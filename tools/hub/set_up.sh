@@ -1,11 +1,11 @@
 #!/bin/sh
 # Make .venv ready for a class: JupyterHub, its proxy, and what a student who cannot write here needs.
-# usage: tools/hub/set_up.sh, after tools/set_up.sh. Where it is up to date, this does little.
+# usage: tools/hub/set_up.sh. Where it is up to date, this does little.
 set -eu
 cd "$(dirname "$0")/../.."
-tools/add_group.sh hub
+tools/set_up.sh hub
 
-proxy=.venv/hub
+proxy=.venv/hub_proxy
 if ! cmp -s tools/hub/package-lock.json "$proxy/package-lock.json"; then
     command -v npm > /dev/null || {
         echo 'JupyterHub needs a proxy that npm installs: run `sudo apt install npm`, then try again.' >&2

@@ -1,0 +1,98 @@
+"""The servers and the browser of these tests."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from lab_page import LabPage
+from lab_server import Server, server
+from playwright.sync_api import Browser, sync_playwright
+
+ARTEFACTS = Path(
+    os.environ.get('BROWSER_ARTEFACTS') or Path(tempfile.gettempdir(), 'ros2_notebooks_browser')
+)
+# No sandbox, because root may run this; and nothing that asks the network.
+CHROMIUM_OPTIONS = [
+    '--no-sandbox',
+    '--disable-gpu',
+    '--disable-quic',
+    '--no-first-run',
+    '--disable-background-networking',
+    '--disable-component-update',
+    '--disable-sync',
+]
+LOCAL = ('http://localhost:', 'http://127.0.0.1:', 'data:', 'blob:')
+
+
+@pytest.fixture(scope='session')
+def student_server(tmp_path_factory) -> Iterator[Server]:
+    """Yield what `make lab` starts."""
+    with server(tmp_path_factory.mktemp('lab'), 'lab') as running:
+        yield running
+
+
+@pytest.fixture(scope='session')
+def instructor_server(tmp_path_factory) -> Iterator[Server]:
+    """Yield what `make present LESSON=02` starts."""
+    with server(tmp_path_factory.mktemp('present'), 'present', 'LESSON=02') as running:
+        yield running
+
+
+@pytest.fixture(scope='session')
+def artefacts() -> Path:
+    """Return the folder of the screenshots."""
+    ARTEFACTS.mkdir(parents=True, exist_ok=True)
+    return ARTEFACTS
+
+
+@pytest.fixture(scope='session')
+def chromium() -> Iterator[Browser]:
+    """Yield the Chromium that `make test-browser` found."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=os.environ.get('CHROMIUM', '/usr/bin/chromium'), args=CHROMIUM_OPTIONS
+        )
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def page(chromium: Browser, running: Server, name: str) -> Iterator[LabPage]:
+    """Open a tab of 1280 x 720. No request may leave this machine."""
+    context = chromium.new_context(viewport={'width': 1280, 'height': 720})
+    tab = context.new_page()
+    outside = []
+    tab.on('request', lambda r: r.url.startswith(LOCAL) or outside.append(r.url))
+    lab = LabPage(tab, running, ARTEFACTS)
+    try:
+        yield lab
+    finally:
+        lab.screenshot(re.sub(r'\W+', '_', name).strip('_'))
+        lab.close()
+        context.close()
+    assert outside == []
+
+
+@pytest.fixture
+def lab(chromium, student_server, request) -> Iterator[LabPage]:
+    """Yield a student's page."""
+    with page(chromium, student_server, request.node.name) as opened:
+        yield opened
+
+
+@pytest.fixture
+def deck(chromium, instructor_server, request) -> Iterator[LabPage]:
+    """Yield an instructor's page."""
+    with page(chromium, instructor_server, request.node.name) as opened:
+        yield opened
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    """Say where the screenshots are."""
+    terminalreporter.write_line(f'Screenshots: {ARTEFACTS}')

@@ -1,0 +1,205 @@
+"""A page of JupyterLab, used by keys, clicks and menus as a person does.
+
+What a person sees is waited for, never a time: JupyterLab's own objects say when a kernel is idle,
+a cell has run, a slide is shown. `window.jupyterapp` gives them (--LabApp.expose_app_in_browser).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from lab_server import Server
+from playwright.sync_api import ElementHandle, Page
+
+LIMIT_S = 300  # for what a lesson computes; everything else has Playwright's 30 s
+PANEL = 'window.jupyterapp.shell.currentWidget'
+
+READY = """name => {
+    const panel = window.jupyterapp?.shell.currentWidget;
+    return panel?.context?.path === name && panel.context.isReady
+        && panel.sessionContext.isReady && panel.sessionContext.session?.kernel?.status === 'idle'
+        && document.querySelector('#jp-main-statusbar').textContent.includes('| Idle');
+}"""
+IDLE = f"{PANEL}.sessionContext.session.kernel.status === 'idle'"
+CODE_CELLS = f"[...{PANEL}.content.model.cells].filter(cell => cell.type === 'code')"
+FAILED = "cell => cell.outputs.toJSON().some(output => output.output_type === 'error')"
+ALL_RAN = f"""() => {IDLE} && ({CODE_CELLS}.some({FAILED})
+    || {CODE_CELLS}.every(cell => cell.executionCount !== null))"""
+CELL_RAN = f"""index => {{
+    const cell = {PANEL}.content.model.cells.get(index);
+    return {IDLE} && cell.executionState === 'idle' && cell.executionCount !== null;
+}}"""
+SLIDE_DRAWN = f"""index => {{
+    const widgets = {PANEL}.content.widgets;
+    const slide = widgets.filter(cell => cell.node.classList.contains('jp-deck-mod-onscreen'));
+    const drawn = cell => cell.model.type === 'code'
+        ? cell.inputHidden || cell.node.querySelectorAll('.cm-line').length
+            >= cell.model.sharedModel.getSource().split('\\n').length
+        : cell.rendered && cell.node.querySelector('.jp-RenderedMarkdown').childElementCount;
+    return slide.includes(widgets[index])
+        && widgets[index].node.classList.contains('jp-deck-mod-visible')
+        && widgets[index].node.contains(document.activeElement)
+        && slide.every(drawn)
+        && slide.every(cell => [...cell.node.querySelectorAll('img')].every(img => img.complete))
+        && slide.every(cell => cell.node.getAnimations().length === 0);
+}}"""
+
+
+class LabPage:
+    """One tab of the browser, on a server that `make lab` or `make present` started."""
+
+    def __init__(self, page: Page, server: Server, artefacts: Path) -> None:
+        self.page = page
+        self.server = server
+        self.artefacts = artefacts
+
+    def goto(self, path: str, **wait: Any) -> None:
+        """Open an address of the server."""
+        join = '&' if '?' in path else '?'
+        self.page.goto(f'{self.server.url}{path}{join}token={self.server.token}', **wait)
+
+    def open(self, name: str) -> None:
+        """Open a notebook, and wait for its kernel."""
+        self.goto(f'lab/tree/notebooks/{name}?reset')
+        self.wait_for_notebook(name)
+
+    def present(self, name: str) -> None:
+        """Open a notebook as slides, and wait for its kernel."""
+        self.goto(f'lab/workspaces/present/tree/notebooks/{name}?reset')
+        self.wait_for_notebook(name)
+        self.wait_for_slide(0)
+
+    def wait_for_notebook(self, name: str) -> None:
+        """Wait until a notebook is open and its kernel idle."""
+        self.page.wait_for_function(READY, arg=f'notebooks/{name}', timeout=LIMIT_S * 1000)
+
+    def close(self) -> None:
+        """End the kernels of this page's server."""
+        self.page.evaluate('() => window.jupyterapp?.serviceManager.sessions.shutdownAll()')
+
+    # Menus and commands
+
+    def menu(self, menu: str, item: str) -> None:
+        """Click an item of JupyterLab's menu bar."""
+        self.page.locator('#jp-MainMenu').get_by_text(menu, exact=True).click()
+        self.page.locator('.lm-Menu').get_by_text(item, exact=True).click()
+
+    def run_all(self, menu: str = 'Run', item: str = 'Run All Cells') -> None:
+        """Run all cells, and wait until they have run or one has failed."""
+        self.command('notebook:clear-all-cell-outputs')
+        self.menu(menu, item)
+        if menu == 'Kernel':
+            self.page.locator('.jp-Dialog .jp-mod-accept').click()
+        self.wait_until_all_ran()
+
+    def wait_until_all_ran(self) -> None:
+        """Wait until all cells have run since their outputs were cleared, or one has failed."""
+        self.page.wait_for_function(ALL_RAN, timeout=LIMIT_S * 1000)
+
+    def command(self, name: str) -> None:
+        """Execute a command of JupyterLab and wait for its end."""
+        script = 'name => window.jupyterapp.commands.execute(name).then(() => null)'
+        self.page.evaluate(script, name)
+
+    # Cells
+
+    def cells(self) -> list[dict[str, Any]]:
+        """Return the cells as they are now."""
+        return self.page.evaluate(f'() => {PANEL}.content.model.toJSON().cells')
+
+    def find(self, tag: str, source: str = '') -> int:
+        """Return the index of the first cell with this tag and this in its source."""
+        for index, cell in enumerate(self.cells()):
+            if tag in cell['metadata'].get('tags', []) and source in ''.join(cell['source']):
+                return index
+        raise LookupError(f'There is no cell with the tag {tag} and {source!r} in it.')
+
+    def show(self, index: int) -> ElementHandle:
+        """Scroll to a cell, and return it with its pictures loaded."""
+        script = f'index => {PANEL}.content.scrollToItem(index, "start")'
+        self.page.evaluate(script, index)
+        cell = self.page.wait_for_function(
+            f"""index => {{
+                const cell = {PANEL}.content.widgets[index].node;
+                return cell.isConnected && cell.querySelector('.jp-Cell-inputWrapper')
+                    && [...cell.querySelectorAll('img')].every(img => img.complete) && cell;
+            }}""",
+            arg=index,
+        )
+        return cell.as_element()
+
+    def write(self, index: int, source: str) -> None:
+        """Click into a cell and replace its source."""
+        self.show(index).query_selector('.cm-content').click()
+        self.page.keyboard.press('Control+A')
+        self.page.keyboard.insert_text(source)
+
+    def start(self, index: int) -> None:
+        """Select a cell with a click, and press Ctrl+Enter. It has no number until it has run."""
+        self.page.evaluate(
+            f'index => {PANEL}.content.model.cells.get(index).clearExecution()', index
+        )
+        self.show(index).query_selector('.jp-InputPrompt').click()
+        self.page.keyboard.press('Control+Enter')
+
+    def run(self, index: int) -> str:
+        """Run a cell, wait for its end, and return what it printed."""
+        self.start(index)
+        self.wait_until_ran(index)
+        return printed(self.cells()[index])
+
+    def wait_until_ran(self, index: int) -> None:
+        """Wait until a cell has a number, and its kernel nothing to do."""
+        self.page.wait_for_function(CELL_RAN, arg=index, timeout=LIMIT_S * 1000)
+
+    # Slides
+
+    def active(self) -> int:
+        """Return the index of the active cell."""
+        return self.page.evaluate(f'() => {PANEL}.content.activeCellIndex')
+
+    def on_screen(self) -> list[int]:
+        """Return the indices of the cells of this slide."""
+        return self.page.evaluate(
+            f"""() => {PANEL}.content.widgets.flatMap((cell, index) =>
+                cell.node.classList.contains('jp-deck-mod-onscreen') ? [index] : [])"""
+        )
+
+    def press(self, key: str) -> int:
+        """Press a key that leads to another cell, and return its index once it is shown."""
+        before = self.active()
+        self.page.keyboard.press(key)
+        self.page.wait_for_function(
+            f'before => {PANEL}.content.activeCellIndex !== before', arg=before
+        )
+        active = self.active()
+        self.wait_for_slide(active)
+        return active
+
+    def wait_for_slide(self, index: int) -> None:
+        """Wait until a cell is revealed and has the focus, and all of its slide is drawn."""
+        self.page.wait_for_function(SLIDE_DRAWN, arg=index)
+
+    # What a test keeps
+
+    def screenshot(self, *path: str) -> None:
+        """Save what is seen as a PNG below the folder of the artefacts."""
+        file = Path(self.artefacts, *path).with_suffix('.png')
+        file.parent.mkdir(parents=True, exist_ok=True)
+        self.page.screenshot(path=file)
+
+
+def printed(cell: dict[str, Any]) -> str:
+    """Return what a cell printed."""
+    return ''.join(
+        ''.join(output['text']) for output in cell['outputs'] if output['output_type'] == 'stream'
+    )
+
+
+def complaints(cell: dict[str, Any]) -> list[str]:
+    """Return the errors of a cell, and what it wrote to stderr."""
+    errors = [
+        f'{o["ename"]}: {o["evalue"]}' for o in cell['outputs'] if o['output_type'] == 'error'
+    ]
+    return errors + [''.join(o['text']) for o in cell['outputs'] if o.get('name') == 'stderr']

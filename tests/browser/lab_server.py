@@ -1,0 +1,63 @@
+"""A JupyterLab that `make lab` or `make present` started, for one run of the tests.
+
+The notebooks are a copy, and JupyterLab's state is in a folder of the tests: nothing is written
+into the checkout but what lessons build in `scratch`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+NOTEBOOKS = sorted((ROOT / 'notebooks').glob('*.ipynb'))
+START_LIMIT_S = 60
+
+
+class Server(NamedTuple):
+    """A running JupyterLab."""
+
+    url: str
+    token: str
+
+
+@contextmanager
+def server(folder: Path, *make: str) -> Iterator[Server]:
+    """Run a command of the Makefile that starts JupyterLab, as a process group of its own."""
+    shutil.copytree(ROOT / 'notebooks', folder / 'notebooks')
+    state = [f'{name}={folder / name}' for name in ('JUPYTER_CONFIG_DIR', 'JUPYTER_RUNTIME_DIR')]
+    options = 'LAB_ARGS=--LabApp.expose_app_in_browser=True'
+    with Path(folder, 'log').open('w') as log:
+        process = subprocess.Popen(
+            ['make', *make, 'BROWSER=no', f'ROOT={folder}', options, *state],
+            cwd=ROOT,
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
+        try:
+            yield _address(process, folder)
+        finally:
+            os.killpg(process.pid, signal.SIGTERM)
+            process.wait(START_LIMIT_S)
+
+
+def _address(process: subprocess.Popen, folder: Path) -> Server:
+    """Wait until the server has written the file with its address."""
+    end = time.monotonic() + START_LIMIT_S
+    while time.monotonic() < end and process.poll() is None:
+        for file in Path(folder, 'JUPYTER_RUNTIME_DIR').glob('jpserver-*.json'):
+            found = json.loads(file.read_text() or '{}')
+            if found:
+                return Server(found['url'], found['token'])
+        time.sleep(0.05)
+    raise RuntimeError(f'JupyterLab did not start:\n{Path(folder, "log").read_text()}')

@@ -1,0 +1,76 @@
+"""An instructor's hour: start a lesson as slides, walk through it, run and change cells in it."""
+
+import nbformat
+import pytest
+from lab_page import PANEL, complaints, printed
+from lab_server import NOTEBOOKS
+
+from tools.slides import slide_types
+
+# What of a slide is cut off, or needs a scroll bar.
+CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
+    if (!cell.node.classList.contains('jp-deck-mod-onscreen')) return [];
+    const found = [];
+    const box = cell.node.getBoundingClientRect();
+    if (box.top < 0 || box.bottom > innerHeight || box.left < 0 || box.right > innerWidth)
+        found.push(`cell ${{index}} ends at ${{box.right.toFixed()}}, ${{box.bottom.toFixed()}}`);
+    for (const part of cell.node.querySelectorAll(
+        '.cm-scroller, .jp-RenderedMarkdown, .jp-OutputArea-output, pre, table, img')) {{
+        const inner = part.getBoundingClientRect();
+        if (part.scrollWidth > part.clientWidth + 1 || inner.right > innerWidth
+            || (part.clientHeight && part.scrollHeight > part.clientHeight + 1))
+            found.push(`cell ${{index}}: ${{part.tagName}}.${{part.className}} is cut off`);
+        if (part.tagName === 'IMG' && !part.naturalWidth)
+            found.push(`cell ${{index}}: a picture is missing`);
+    }}
+    return found;
+}})"""
+
+
+@pytest.mark.parametrize('path', NOTEBOOKS, ids=[path.name for path in NOTEBOOKS])
+def test_every_slide_is_reached_and_nothing_is_cut_off(deck, path):
+    notebook = nbformat.read(path, as_version=4)
+    wanted = [i for i, kind in enumerate(slide_types(notebook)) if kind != 'skip']
+    deck.present(path.name)
+    if any('ipywidgets' in cell.source for cell in notebook.cells):
+        deck.command('notebook:run-all-cells')  # a widget is not saved
+        deck.page.evaluate(f'() => {{ {PANEL}.content.activeCellIndex = 0 }}')
+        deck.wait_for_slide(0)
+    visited, cut_off = [deck.active()], []
+    while True:
+        cells = deck.on_screen()
+        if visited[-1] == max(cells):
+            deck.screenshot(path.stem, f'{visited[-1]:02d}')
+            cut_off += deck.page.evaluate(CUT_OFF)
+        if visited[-1] == wanted[-1]:
+            break
+        visited.append(deck.press('Space'))
+    assert visited == wanted
+    assert cut_off == []
+
+
+def test_make_present_opens_its_lesson_as_slides(deck):
+    deck.goto('')
+    deck.wait_for_notebook('02_lose_messages.ipynb')
+    deck.wait_for_slide(0)
+    assert deck.on_screen() == [0]
+
+
+def test_run_and_change_a_cell_in_a_slide(deck):
+    deck.present('00_start_here.ipynb')
+    deck.command('notebook:clear-all-cell-outputs')
+    starter, check = deck.find('exercise', 'robots'), deck.find('check', 'robots')
+    while deck.active() < starter:
+        deck.press('Space')
+    deck.page.keyboard.press('Enter')
+    deck.page.keyboard.press('Control+A')
+    deck.page.keyboard.insert_text('robots = 2')
+    deck.page.keyboard.press('Control+Enter')
+    deck.wait_until_ran(starter)
+    while deck.active() < check:
+        deck.press('Space')
+    deck.page.keyboard.press('Control+Enter')
+    deck.wait_until_ran(check)
+    assert complaints(deck.cells()[check]) == []
+    assert 'All done.' in printed(deck.cells()[check])
+    assert deck.page.evaluate(CUT_OFF) == []

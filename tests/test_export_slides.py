@@ -1,0 +1,42 @@
+"""What the exporter hands to nbconvert, and says without npm. tests/browser opens its decks."""
+
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+from tools import export_slides
+
+NOTE = 'For the instructor: 5 minutes\n\nAsk first.'
+
+
+@pytest.fixture
+def lesson():
+    return new_notebook(
+        cells=[
+            new_markdown_cell('# 02 Lose messages\n\nAfter [01](01_publish_and_subscribe.ipynb).'),
+            new_markdown_cell(NOTE, metadata={'tags': ['notes']}),
+            new_code_cell('\n'.join(['run()'] * 20)),
+            new_code_cell('run()', metadata={'tags': ['solution']}),
+        ]
+    )
+
+
+def test_notes_are_for_the_speaker_and_solutions_for_nobody(lesson):
+    cells = export_slides.for_reveal(lesson).cells
+    types = [cell.metadata.slideshow['slide_type'] for cell in cells]
+    assert types == ['slide', 'notes', 'fragment', 'skip']
+    assert '(01_publish_and_subscribe.html)' in cells[0].source
+    assert cells[2].metadata.tags == ['more-than-8-lines', 'more-than-18-lines']
+    assert 'slideshow' not in lesson.cells[0].metadata  # the argument is left alone
+
+
+def test_without_npm_one_sentence_says_what_to_install(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv('PATH', str(tmp_path))
+    monkeypatch.setattr(export_slides.fetch_packages, '__defaults__', (tmp_path / 'deck',))
+    assert export_slides.main([], output=tmp_path / 'slides') == 1
+    assert capsys.readouterr().err == export_slides.NEEDS_NPM + '\n'
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_lesson_is_reported(tmp_path, capsys):
+    assert export_slides.main(['--lesson', '77'], output=tmp_path) == 1
+    assert capsys.readouterr().err.startswith("There is no single lesson '77'.")

@@ -1,0 +1,96 @@
+"""Which cell starts a slide, on notebooks made for it."""
+
+from base64 import b64encode
+
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+
+from tools.slides import SLIDE, height, slide_types
+
+TITLE = new_markdown_cell('# 02 Lose messages\n\n**You need** lesson 01.')
+STEP = new_markdown_cell('## 1. Build\n\nA node.')
+
+
+def text(source='Look at the output.', *tags):
+    return new_markdown_cell(source, metadata={'tags': list(tags)})
+
+
+def code(lines=3, *tags, outputs=(), **metadata):
+    metadata['tags'] = list(tags)
+    return new_code_cell('\n'.join(['run()'] * lines), metadata=metadata, outputs=list(outputs))
+
+
+def printed(lines):
+    return [new_output('stream', text='heard\n' * lines)]
+
+
+def picture(width, tall):
+    header = b'\x89PNG\r\n\x1a\n\0\0\0\rIHDR' + width.to_bytes(4, 'big') + tall.to_bytes(4, 'big')
+    data = {'image/png': b64encode(header).decode(), 'text/plain': '<Figure>'}
+    return [new_output('display_data', data=data)]
+
+
+def table(rows):
+    data = {'text/html': '<table>' + '<tr><td>1</td></tr>' * rows + '</table>', 'text/plain': '1'}
+    return [new_output('execute_result', data=data)]
+
+
+@pytest.mark.parametrize(
+    ('cells', 'types'),
+    [
+        ([], []),
+        ([code()], 'slide'),
+        ([TITLE, STEP, text(), code(), code()], 'slide slide fragment fragment fragment'),
+        ([TITLE, STEP, text('### Run'), code()], 'slide slide subslide fragment'),
+        # The text moves to the next slide with the code that it leads to,
+        ([TITLE, STEP, code(18), text(), code(16)], 'slide slide fragment subslide fragment'),
+        # except where the two do not fit together either.
+        (
+            [TITLE, STEP, text('word ' * 80), code(25, outputs=printed(8))],
+            'slide slide fragment subslide',
+        ),
+        ([TITLE, code(), text('### Explain\n\nWhy.')], 'slide fragment fragment'),
+        ([TITLE, code(24), text('### Explain\n\n' + 'word ' * 80)], 'slide fragment subslide'),
+        ([TITLE, code(), code(1, 'solution'), code(1)], 'slide fragment subslide fragment'),
+        ([TITLE, text('', 'deck-break'), code()], 'slide subslide fragment'),
+        ([TITLE, code(25, 'deck-skip'), code(16)], 'slide skip fragment'),
+        ([TITLE, text('word ' * 400, 'notes'), code(16)], 'slide skip fragment'),
+        ([text('First.', 'notes'), TITLE, STEP], 'skip slide slide'),
+        ([code(1, 'deck-skip'), code()], 'skip slide'),
+        # A note does not part a text from its code.
+        (
+            [TITLE, code(18), text(), text('Ask.', 'notes'), code(16)],
+            'slide fragment subslide skip fragment',
+        ),
+    ],
+)
+def test_the_rule(cells, types):
+    assert slide_types(new_notebook(cells=cells)) == (types.split() if types else [])
+
+
+def test_no_slide_holds_more_than_its_height():
+    cells = [TITLE, STEP]
+    for lines in range(1, 25):
+        cells += [text('word ' * 7 * lines), code(lines, outputs=printed(25 - lines))]
+    filled = []
+    for cell, slide_type in zip(cells, slide_types(new_notebook(cells=cells)), strict=True):
+        if slide_type != 'fragment':
+            filled.append(0)
+        filled[-1] += height(cell)
+    assert max(filled) <= SLIDE
+    assert sum(filled) / len(filled) > SLIDE / 2
+
+
+def test_what_makes_a_cell_high():
+    assert height(code(20)) > height(code(10)) > height(code(1))
+    assert height(code(20, jupyter={'source_hidden': True})) < height(code(3))
+    assert height(code(1, outputs=printed(20))) > height(code(1, outputs=printed(10)))
+    assert height(code(1, outputs=table(9))) > height(code(1, outputs=table(3)))
+    assert height(code(1, outputs=picture(900, 400))) > height(code(1, outputs=picture(900, 200)))
+    assert height(code(1, outputs=picture(900, 9000))) < SLIDE
+    assert height(code(36)) < SLIDE
+    assert height(text('word ' * 180)) < SLIDE
+    assert height(text('| a | b |\n|---|---|\n' + '| 1 | 2 |\n' * 9)) > height(text('a b ' * 9))
+    assert height(text('- a\n- b\n- c')) > height(text('a\nb\nc'))
+    assert height(text('![A plot.](images/plot.png)')) > height(text('A plot.'))
+    assert height(text('word ' * 400, 'notes')) == 0

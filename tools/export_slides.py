@@ -1,0 +1,119 @@
+"""Export the lessons as slides: HTML files that work without a network.
+
+    python tools/export_slides.py                  all lessons, into slides/
+    python tools/export_slides.py --lesson 02 03   some of them
+
+reveal.js and MathJax come from npm once, into .venv, and are copied beside the decks. The outputs
+are the saved ones. Solutions are left out. The cells with the tag `notes` are the speaker notes: S
+opens them in a window of its own.
+"""
+
+import argparse
+import re
+import shutil
+import subprocess
+import sys
+from copy import deepcopy
+from pathlib import Path
+
+import nbformat
+from nbconvert.exporters import SlidesExporter
+from nbformat import NotebookNode
+
+from tools.notebooks import FOLDER, lessons
+from tools.slides import CODE, slide_types
+
+HERE = Path(__file__).resolve().parent
+TEMPLATE = HERE / 'deck_template'
+OUTPUT = HERE.parent / 'slides'
+PACKAGES = HERE.parent / '.venv' / 'deck'
+LIBRARY = (
+    'reveal.js/dist/reveal.css',
+    'reveal.js/dist/reveal.js',
+    'reveal.js/plugin/notes/notes.js',
+    'mathjax/es5/tex-svg.js',
+)
+NEEDS_NPM = (
+    'Slides need npm, which fetches reveal.js and MathJax once: '
+    'install it, on Debian with `sudo apt install npm`, then try again.'
+)
+
+
+def fetch_packages(folder: Path = PACKAGES) -> Path:
+    """Let npm install the pinned packages into `folder`, once; return where they are.
+
+    Raises ValueError with one sentence where npm is missing or fails.
+    """
+    lock = (TEMPLATE / 'package-lock.json').read_bytes()
+    done = folder / 'done'
+    if done.is_file() and done.read_bytes() == lock:
+        return folder / 'node_modules'
+    npm = shutil.which('npm')
+    if not npm:
+        raise ValueError(NEEDS_NPM)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in ('package.json', 'package-lock.json'):
+        shutil.copy(TEMPLATE / name, folder)
+    command = [npm, 'ci', '--ignore-scripts', '--no-audit', '--no-fund', '--silent']
+    if subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL).returncode:
+        raise ValueError('npm could not fetch reveal.js and MathJax: is there a network?')
+    done.write_bytes(lock)
+    return folder / 'node_modules'
+
+
+def for_reveal(notebook: NotebookNode) -> NotebookNode:
+    """Return a copy of a notebook as nbconvert's slides want it."""
+    notebook = deepcopy(notebook)
+    for cell, slide_type in zip(notebook.cells, slide_types(notebook), strict=True):
+        tags = cell.metadata.setdefault('tags', [])
+        if 'notes' in tags:
+            slide_type = 'notes'
+        elif 'solution' in tags:
+            slide_type = 'skip'
+        cell.metadata.slideshow = {'slide_type': slide_type}
+        if cell.cell_type == 'markdown':
+            cell.source = re.sub(r'\]\((\d\d_\w+)\.ipynb', r'](\1.html', cell.source)
+        else:
+            lines = len(cell.source.splitlines())
+            tags += [f'more-than-{most}-lines' for most in CODE if lines > most]
+    return notebook
+
+
+def export(path: Path, output: Path) -> Path:
+    """Write one lesson as a deck into `output`; return the file."""
+    exporter = SlidesExporter(
+        template_name=TEMPLATE.name,
+        extra_template_basedirs=[str(TEMPLATE.parent)],
+        embed_images=True,
+    )
+    notebook = for_reveal(nbformat.read(path, as_version=4))
+    title = notebook.cells[0].source.splitlines()[0].lstrip('# ')
+    resources = {'metadata': {'title': title, 'path': str(path.parent)}}
+    html, _ = exporter.from_notebook_node(notebook, resources)
+    file = output / path.with_suffix('.html').name
+    file.write_text(html, encoding='utf-8')
+    return file
+
+
+def main(arguments: list[str] | None = None, folder: Path = FOLDER, output: Path = OUTPUT) -> int:
+    """Run the tool; return its exit status."""
+    parser = argparse.ArgumentParser(description='Export the lessons as slides.')
+    parser.add_argument('--lesson', nargs='+', default=[], metavar='NN', help='for example 02')
+    numbers = ' '.join(parser.parse_args(arguments).lesson).split()
+    try:
+        paths = lessons(numbers, folder)
+        packages = fetch_packages()
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 1
+    library = output / 'lib'
+    library.mkdir(parents=True, exist_ok=True)
+    for source in (*(packages / name for name in LIBRARY), HERE / 'deck.css'):
+        shutil.copy(source, library)
+    for path in paths:
+        print(export(path, output).relative_to(output.parent))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,119 @@
+"""Which cell of a lesson starts a slide: a rule, so that nobody keeps it up by hand.
+
+A title and a step (`#`, `##`) start a slide. What follows is revealed on it, cell by cell, as long
+as it fits: `fragment`. A part (`###`), a solution, and what no longer fits start a slide below it:
+`subslide`. A cell stays together with the text that leads to it, where a slide has room for both,
+and `### Explain` with what it explains.
+
+Where the rule is wrong for a cell, a tag of the cell (JupyterLab, Property Inspector) changes it:
+
+    deck-break      starts a slide below, although it would fit
+    deck-skip       is left out of the deck
+    notes           is for the instructor: folded in JupyterLab, left out of the live deck, and
+                    speaker notes in the exported one
+
+jupyterlab-slideshow has traps: it hides a cell of the type `-`, and from one of the type `notes`,
+where Shift+Enter can lead, no key leads on. So no cell gets these types.
+"""
+
+import re
+from base64 import b64decode
+from math import ceil
+
+from nbformat import NotebookNode
+
+SKIPPED = {'deck-skip', 'notes'}
+ALONE = {'deck-break', 'solution'}
+
+# The sizes of deck.css, in hundredths of the slide's height. Letters are taken a little wider than
+# in most fonts. tests/browser measures what they really are.
+SLIDE, WIDTH = 97.0, 148.0
+FOLDED, BORDER = 4.0, 1.5
+PROSE_LINE, PROSE_GAP, PROSE_CHARACTERS, PROSE_PICTURE = 4.2, 3.1, 82, 47.0
+HEADINGS = {'#': 17.0, '##': 12.0, '###': 9.0}
+TABLE_ROW = 4.6
+# Lines of code at most: the size of a letter, the height of a figure.
+CODE = {8: (2.4, 62.0), 18: (2.4, 40.0), 26: (2.15, 28.0), 999: (1.85, 28.0)}
+CODE_LINE, CODE_CHARACTER = 1.3, 0.61  # times the size of a letter
+
+
+def slide_types(notebook: NotebookNode) -> list[str]:
+    """Return the slide type of each cell: slide, subslide, fragment or skip."""
+    types: list[str] = []
+    used = 0.0
+    for group in _groups(notebook):
+        heights = [height(cell) for cell in group]
+        together = [sum(heights) if sum(heights) <= SLIDE else heights[0], *heights[1:]]
+        for cell, own, needed in zip(group, heights, together, strict=True):
+            kind = _slide_type(cell, set(types) <= {'skip'}, used + needed <= SLIDE)
+            used = own + (used if kind in ('fragment', 'skip') else 0)
+            types.append(kind)
+    return types
+
+
+def _groups(notebook: NotebookNode) -> list[list[NotebookNode]]:
+    """Return the cells in groups: text, and the code that it leads to."""
+    groups: list[list[NotebookNode]] = []
+    for cell in notebook.cells:
+        follows = _tags(cell) & SKIPPED or cell.cell_type != 'markdown' and not _tags(cell) & ALONE
+        if groups and follows:
+            groups[-1].append(cell)
+        else:
+            groups.append([cell])
+    return groups
+
+
+def _slide_type(cell: NotebookNode, first: bool, fits: bool) -> str:
+    if _tags(cell) & SKIPPED:
+        return 'skip'
+    if first or re.match(r'##? ', cell.source):
+        return 'slide'
+    if not fits or re.match('### (?!Explain)', cell.source) or _tags(cell) & ALONE:
+        return 'subslide'
+    return 'fragment'
+
+
+def _tags(cell: NotebookNode) -> set[str]:
+    return set(cell.metadata.get('tags', []))
+
+
+def height(cell: NotebookNode) -> float:
+    """Return about how high a cell is with its outputs, in hundredths of the slide's height."""
+    if _tags(cell) & SKIPPED:
+        return 0.0
+    if cell.cell_type == 'markdown':
+        return sum(_height_of_prose(block) for block in re.split(r'\n{2,}', cell.source))
+    lines = len(cell.source.splitlines())
+    letter, figure = next(sizes for most, sizes in CODE.items() if lines <= most)
+    folded = cell.metadata.get('jupyter', {}).get('source_hidden')
+    source = FOLDED if folded else lines * letter * CODE_LINE
+    outputs = sum(_height_of_output(output, letter, figure) for output in cell.outputs)
+    return BORDER + source + outputs + (BORDER if cell.outputs else 0)
+
+
+def _height_of_prose(block: str) -> float:
+    if block.startswith('#'):
+        return HEADINGS.get(block.partition(' ')[0], PROSE_LINE + PROSE_GAP)
+    if block.startswith('!['):
+        return PROSE_PICTURE + PROSE_GAP
+    text = re.sub(r'\]\([^)]*\)|[*`\[]', '', block)
+    lines = text.splitlines()
+    if text.startswith('|'):
+        return (len(lines) - 1) * TABLE_ROW + PROSE_GAP
+    if not re.search(r'^(```|- |\d\. |> )', text, re.MULTILINE):
+        lines = [' '.join(lines)]
+    return PROSE_GAP + PROSE_LINE * sum(ceil(len(line) / PROSE_CHARACTERS) for line in lines)
+
+
+def _height_of_output(output: NotebookNode, letter: float, figure: float) -> float:
+    data = output.get('data', {})
+    if 'image/png' in data:
+        header = b64decode(data['image/png'][:64])
+        width, tall = (int.from_bytes(header[i : i + 4], 'big') for i in (16, 20))
+        return min(figure, WIDTH * tall / max(width, 1)) + BORDER
+    if 'text/html' in data:
+        return data['text/html'].count('<tr') * TABLE_ROW
+    text = output.get('text', '') or data.get('text/plain', '')
+    most = int(WIDTH / letter / CODE_CHARACTER)
+    lines = sum(max(1, ceil(len(line) / most)) for line in text.splitlines())
+    return lines * letter * CODE_LINE
