@@ -124,7 +124,7 @@ class Hub:
                 with contextlib.suppress(OSError, HTTPClientError):
                     return await self.ask('/hub/api/')
                 await asyncio.sleep(0.1)
-        raise RuntimeError('JupyterHub ended at once')
+        raise RuntimeError(f'JupyterHub ended: {self.process.returncode}\n{self.log.read_text()}')
 
     def processes(self) -> list[psutil.Process]:
         """Return all processes of the students that are alive."""
@@ -150,9 +150,22 @@ class Hub:
 class Kernel:
     """The kernel of one notebook that a student has opened."""
 
-    def __init__(self, student: 'Student', model: dict, socket) -> None:
-        self.student, self.id, self._socket = student, model['kernel']['id'], socket
+    def __init__(self, student: 'Student', id_: str) -> None:
+        self.student, self.id = student, id_
         self._session = uuid.uuid4().hex
+        self._messages = asyncio.Queue()
+
+    async def connect(self) -> None:
+        url = f'{self.student.hub.url}/user/{self.student.name}/api/kernels/{self.id}/channels'
+        self._socket = await websocket_connect(
+            HTTPRequest(
+                url.replace('http', 'ws', 1),
+                headers={'Authorization': f'token {self.student.token}'},
+            ),
+            # Messages are taken all the time: otherwise a connection that nobody reads is closed.
+            on_message_callback=self._messages.put_nowait,
+            max_message_size=2**26,
+        )
 
     async def run(self, source: str, limit_s: float = CELL_S) -> list[NotebookNode]:
         """Run a cell as JupyterLab does. Return its outputs as JupyterLab shows them."""
@@ -184,7 +197,7 @@ class Kernel:
         outputs, clear, waited_for = [], False, {'idle', 'execute_reply'}
         async with asyncio.timeout(limit_s):
             while waited_for:
-                message = json.loads(await self._socket.read_message())
+                message = json.loads(await self._messages.get())
                 if message['parent_header'].get('msg_id') != id_:
                     continue
                 kind, content = message['msg_type'], message['content']
@@ -240,14 +253,8 @@ class Student:
             'kernel': {'name': 'python3'},
         }
         model = await self.ask('api/sessions', 'POST', wanted)
-        url = f'{self.hub.url}/user/{self.name}/api/kernels/{model["kernel"]["id"]}/channels'
-        socket = await websocket_connect(
-            HTTPRequest(
-                url.replace('http', 'ws', 1), headers={'Authorization': f'token {self.token}'}
-            ),
-            max_message_size=2**26,
-        )
-        self.kernels[notebook.name] = kernel = Kernel(self, model, socket)
+        self.kernels[notebook.name] = kernel = Kernel(self, model['kernel']['id'])
+        await kernel.connect()
         return kernel
 
     async def log_out(self) -> None:
