@@ -18,6 +18,14 @@ test-browser: ## the real JupyterLab in Chromium, as students and instructors us
 	@tools/set_up.sh browser
 	@CHROMIUM="$(CHROMIUM)" $(PYTHON) -m pytest -n 2 --dist worksteal -o faulthandler_timeout=600 tests/browser $(PYTEST_ARGS)
 
+hub: ## a JupyterHub for a class on this machine; HUB_ARGS=... changes how. See environment.md
+	@tools/hub/set_up.sh
+	@exec .venv/bin/jupyterhub --config tools/hub/jupyterhub_config.py $(HUB_ARGS)
+
+test-hub: ## a class of 12 on a JupyterHub, who run lessons 02 and 03 at the same time; it takes minutes
+	@tools/hub/set_up.sh
+	@$(PYTHON) -m pytest -n 0 -rA -o faulthandler_timeout=1200 tests/hub $(PYTEST_ARGS)
+
 notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
 	@$(PYTHON) tools/notebooks.py $(if $(LESSON),--lesson "$(LESSON)")
 
@@ -40,7 +48,7 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-browser notebooks slides bench lint lock clean set_up
+.PHONY: help lab present test test-browser hub test-hub notebooks slides bench lint lock clean set_up
 
 PYTHON := .venv/bin/python
 

@@ -20,7 +20,8 @@ import pandas as pd
 
 from helpers.recording import COLUMNS, check_table
 
-# A worker may be late, on a busy machine; it may not rest for this part of a callback.
+# A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
+# long as callbacks and timers of the same run were late.
 REST = 0.4
 
 
@@ -102,7 +103,7 @@ class Explanation:
         return '\n'.join(lines + self.contradictions)
 
 
-def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
+def explain(table: pd.DataFrame, depth: int, threads: int, delay_s: float = 0.0) -> Explanation:
     """Explain a recorded table with a KEEP_LAST(`depth`) queue and `threads` workers.
 
     `threads` is the number of callbacks that may run at the same time: 1 for a
@@ -115,10 +116,14 @@ def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
     when such instants exist for all messages and no worker rested while the queue overflowed.
     Times on a busy machine move, and these rules do not.
 
+    `delay_s` is the longest time that a message needed from its publish call to the queue. In one
+    process it is zero: the message has arrived when `publish()` returns.
+
     Raises ValueError or TypeError for a table or a number that cannot be used.
     """
     table = check_table(table)
     depth, threads = _count('depth', depth), _count('threads', threads)
+    delay_s = _nanoseconds('delay_s', delay_s, zero_allowed=True) / 1e9
     heard = table[table['started_s'].notna()]
     contradictions = _impossible_rows(table)
     # A callback that was still running when the record ended has not finished.
@@ -128,9 +133,9 @@ def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
         .groupby('thread', sort=False)['finished_s']
         .shift(fill_value=-math.inf)
     )
-    contradictions += _impossible_takes(table, heard, depth, threads)
+    contradictions += _impossible_takes(table, heard, depth, threads, delay_s)
     contradictions += _too_many_at_once(heard, threads)
-    contradictions += _rests(table, heard, depth, threads)
+    contradictions += _rests(table, heard, depth, threads, delay_s)
     losses = _losses(table, depth)
     for seq in losses.loc[losses['pushed_out_by'].isna(), 'seq']:
         contradictions.append(
@@ -177,7 +182,7 @@ def _impossible_rows(table: pd.DataFrame) -> list[str]:
 
 
 def _impossible_takes(
-    table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int
+    table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int, delay_s: float
 ) -> list[str]:
     """Go through the takes in order, each as early as possible: is it then too late for one?"""
     published = [*table['published_s'], *[math.inf] * (depth + 1)]
@@ -191,7 +196,7 @@ def _impossible_takes(
         full = index + depth
         arrived = full if index > expected else index + 1
         earliest = max(previous_take, published[arrived - 1], busy_until[0], free)
-        latest = min(start, published[full + 1])
+        latest = min(start, published[full + 1] + delay_s)
         if earliest > latest:
             found.append(
                 f'Message {seq} cannot have been the oldest in the queue for a free worker '
@@ -216,7 +221,9 @@ def _too_many_at_once(heard: pd.DataFrame, threads: int) -> list[str]:
     ]
 
 
-def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -> list[str]:
+def _rests(
+    table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int, delay_s: float
+) -> list[str]:
     """Where a worker was free for long while messages waited that were then pushed out."""
     published = table['published_s'].to_numpy()
     lost = np.flatnonzero(table['started_s'].isna())
@@ -240,10 +247,11 @@ def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -
     # A worker that stays free to the end, perhaps one that never worked at all.
     ends = np.append(ends, times[order][-1])[: len(starts)]
     rested = np.interp(ends, edges, waited) - np.interp(starts, edges, waited)
+    allowed = REST * callbacks.median() + np.ptp(callbacks) + np.ptp(periods) + delay_s
     return [
         f'Message {table["seq"].iloc[lost[np.searchsorted(pushed_out, starts[i], "right")]]} was '
         f'pushed out although a worker was free for {ends[i] - starts[i]:.3g} s.'
-        for i in np.flatnonzero(rested > REST * callbacks.median())
+        for i in np.flatnonzero(rested > allowed)
     ]
 
 

@@ -11,6 +11,7 @@ import atexit
 import contextlib
 import gc
 import os
+import socket
 import sys
 import threading
 import time
@@ -39,6 +40,7 @@ except ImportError as error:
 CLOSE_TIMEOUT_S = 5.0
 POLL_S = 0.01
 QUIET_ROUNDS = 20
+DISCOVERY = ('LOCALHOST', 'SUBNET')
 LOG_LEVELS = {10: 'DEBUG', 20: 'INFO', 30: 'WARN', 40: 'ERROR', 50: 'FATAL'}
 
 _reserved = contextlib.ExitStack()
@@ -65,12 +67,38 @@ def reserve_domain_id() -> int:
     return _domain_id
 
 
-def configure_discovery() -> None:
-    """Let the nodes of this process be discovered on this machine only."""
-    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+@contextlib.contextmanager
+def share_domain_id(domain_id: int) -> Iterator[int]:
+    """Keep `reserve_domain_id` of all processes away from this id, which several may share.
+
+    Raises ValueError where a process has reserved it for itself.
+    """
+    from domain_coordinator.impl import PORT_BASE
+
+    # The coordinator holds the port of an id without this option. Two sockets can share a port
+    # only where both have it.
+    with socket.socket() as mark:
+        mark.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            mark.bind(('', PORT_BASE + domain_id))
+        except OSError:
+            raise ValueError(
+                f'Domain {domain_id} is reserved on this machine: agree on another one. '
+                'No kernel reserves 0 and 101.'
+            ) from None
+        yield domain_id
+
+
+def configure_discovery(discovery: str = 'LOCALHOST') -> None:
+    """Let the nodes of this process be discovered on this machine only, or in its network.
+
+    With 'SUBNET', ROS_STATIC_PEERS stays what it is.
+    """
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = discovery
     # Both would widen or replace the range.
     os.environ.pop('ROS_LOCALHOST_ONLY', None)
-    os.environ.pop('ROS_STATIC_PEERS', None)
+    if discovery == 'LOCALHOST':
+        os.environ.pop('ROS_STATIC_PEERS', None)
 
 
 @dataclass
@@ -93,7 +121,9 @@ class SessionClosedError(Exception):
 class Session:
     """An open ROS graph: the context, the threads that spin, and the log. See `ros_session`."""
 
-    def __init__(self) -> None:
+    def __init__(self, domain_id: int | None = None, discovery: str = 'LOCALHOST') -> None:
+        self._domain_id, self._discovery = domain_id, discovery
+        self._shared = contextlib.ExitStack()
         self._context = None
         self._closed = False
         self._executors: list[Executor] = []
@@ -104,7 +134,7 @@ class Session:
         self._log_subscription = None
 
     def open(self) -> Session:
-        """Initialise rclpy in this kernel's own domain. A session that is still open is closed."""
+        """Initialise rclpy in the session's domain. A session that is still open is closed."""
         global _open_session
         if self._closed or self._context is not None:
             raise RuntimeError('A session opens once: make a new one with `ros_session()`.')
@@ -112,12 +142,16 @@ class Session:
             _open_session._clean_up()
         if rclpy.ok():  # a bare rclpy.init() of the notebook
             rclpy.shutdown()
-        configure_discovery()
+        if self._domain_id is None:
+            domain_id = reserve_domain_id()
+        else:
+            domain_id = self._shared.enter_context(share_domain_id(self._domain_id))
+        configure_discovery(self._discovery)
         rclpy.init(
             # The log goes to /rosout only: the console would show it again, and a file would need
             # a home that can be written.
             args=['--ros-args', '--disable-stdout-logs', '--disable-external-lib-logs'],
-            domain_id=reserve_domain_id(),
+            domain_id=domain_id,
             # rclpy's own handlers would shut the context down when the notebook is interrupted.
             signal_handler_options=SignalHandlerOptions.NO,
         )
@@ -368,6 +402,7 @@ class Session:
             with contextlib.suppress(Exception):
                 node.destroy_node()
         rclpy.try_shutdown()
+        self._shared.close()
         self._closed = True
         if _open_session is self:
             _open_session = None
@@ -399,14 +434,31 @@ class Session:
         ]
 
 
-def ros_session() -> Session:
+def ros_session(domain_id: int | None = None, discovery: str = 'LOCALHOST') -> Session:
     """Return a ROS session, to be used as `with ros_session() as session:`.
 
     Inside it, rclpy is initialised, in a domain that no other kernel of this machine hears. At its
     end, and also when a cell is interrupted or run again, all executors, threads, nodes and the
     context are gone. The first exception of a callback is raised at the end of the `with`.
+
+    To talk to others, agree with them on a domain id (0 to 101): `ros_session(domain_id=42)` hears
+    the programs of this machine that use it, `ros_session(domain_id=42, discovery='SUBNET')` also
+    those of other machines. The other side sets ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE.
+
+    Raises TypeError or ValueError for anything else.
     """
-    return Session()
+    if domain_id is not None and (isinstance(domain_id, bool) or not isinstance(domain_id, int)):
+        raise TypeError(f'domain_id must be a whole number from 0 to 101, not {domain_id!r}.')
+    if domain_id is not None and not 0 <= domain_id <= 101:
+        raise ValueError(f'domain_id must be a whole number from 0 to 101, not {domain_id}.')
+    if discovery not in DISCOVERY:
+        raise ValueError(f"discovery must be 'LOCALHOST' or 'SUBNET', not {discovery!r}.")
+    if discovery == 'SUBNET' and domain_id is None:
+        raise ValueError(
+            "discovery='SUBNET' needs the domain id that the other machines use, for example "
+            "ros_session(domain_id=42, discovery='SUBNET')."
+        )
+    return Session(domain_id, discovery)
 
 
 def current_session() -> Session:

@@ -284,6 +284,43 @@ def test_impossible_rows(change, said):
     assert explanation.complete is (said is None)
 
 
+# Recorded on two cores on which 24 kernels ran: in ms, when messages were published, and when the
+# callbacks started and finished that could be late. 87 ms passed between the first two.
+LATE_PUBLISHED = [0, 51, 93, 128, 181, 228, 278, 357, 387, 435, 515, 529, *range(585, 1984, 50)]
+LATE_HEARD = {0: (10, 357), 1: (444, 660), 4: (665, 870), 8: (871, 1076), 12: (1077, 1287)}
+
+
+def test_a_worker_may_be_as_late_as_its_callbacks():
+    published = pd.Series(LATE_PUBLISHED[:23]) / 1e3
+    table = pd.DataFrame({'seq': published.index, 'published_s': published})
+    table[['started_s', 'finished_s']] = np.nan
+    table['thread'] = None
+    for seq, (start, finish) in LATE_HEARD.items():
+        table.loc[seq, CALLBACK] = [start / 1e3, finish / 1e3, 'worker 1']
+    rested = 'Message 2 was pushed out although a worker was free for 0.087 s.'
+    assert rested not in explain(table, 10, 1).contradictions
+    # The same pause on a machine on which all else was in time.
+    table['published_s'] = np.linspace(0, 1.1, len(table))
+    table.loc[0, 'started_s'] = 0.157
+    for seq, start in {1: 0.444, 4: 0.65, 8: 0.86, 12: 1.07}.items():
+        table.loc[seq, ['started_s', 'finished_s']] = start, start + 0.2
+    assert rested in explain(table, 10, 1).contradictions
+
+
+def test_messages_that_need_time_to_the_queue():
+    # Each was published 110 ms before it arrived. A message was taken as soon as it was the oldest:
+    # then the second one behind a full queue had been published for 10 ms.
+    table = predict(0.05, 0.2, 10, 1, 41)
+    table['published_s'] -= 0.11
+    assert reported(table, 10, 1)
+    assert not explain(table, 10, 1, delay_s=0.009).complete
+    assert explain(table, 10, 1, delay_s=0.011).complete
+    # A message less is noticed all the same.
+    assert not explain(without(table, 7), 10, 1, delay_s=0.011).complete
+    with pytest.raises(ValueError, match='delay_s must be a number of seconds, zero or more'):
+        explain(table, 10, 1, delay_s=-1)
+
+
 @pytest.mark.parametrize(('depth', 'threads'), [(11, 1), (10, 2), (10, 4)])
 def test_another_queue_or_executor_contradicts(depth, threads):
     assert reported(predict(0.05, 0.2, 10, 1, 41), depth, threads)

@@ -1,6 +1,7 @@
 import contextlib
 import gc
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import warnings
 
 import pytest
 import rclpy
+from domain_coordinator import domain_id as reserved_domain_id
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle, InvalidNodeNameException
@@ -185,6 +187,78 @@ def test_processes_do_not_hear_each_other():
                 session.wait_until(lambda: len(listener.heard) >= 25, LIMIT_S)
             assert stranger.poll() is None
         assert set(listener.heard) == {'guest'}
+
+
+@pytest.fixture
+def shared_id():
+    """Return a domain id that nobody on this machine has reserved."""
+    with reserved_domain_id(lambda: random.randint(30, 100)) as free:
+        pass
+    return free
+
+
+def is_free(domain):
+    with contextlib.suppress(RuntimeError), reserved_domain_id(lambda: domain):
+        return True
+    return False
+
+
+def test_domain_that_two_processes_share(shared_id):
+    other = f"""
+        from ros_nodes import Talker, spin
+        from helpers.session import ros_session
+        with ros_session(domain_id={shared_id}) as session:
+            spin(session, Talker(10**6))
+            input()
+    """
+    with ros_session(domain_id=shared_id) as session:
+        assert rclpy.get_default_context().get_domain_id() == shared_id
+        assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+        listener = Listener()
+        spin(session, listener)
+        with running(other):
+            session.wait_until(lambda: listener.heard, LIMIT_S)
+        assert not is_free(shared_id)  # no kernel that wants to be alone comes into this domain
+    assert is_free(shared_id)
+
+
+def test_domain_of_somebody_else(shared_id):
+    with reserved_domain_id(lambda: shared_id):
+        with pytest.raises(
+            ValueError, match=f'Domain {shared_id} is reserved on this machine: agr'
+        ):
+            ros_session(domain_id=shared_id).open()
+        assert not rclpy.ok()
+    with ros_session(domain_id=shared_id):
+        pass
+
+
+def test_discovery_in_the_network(shared_id, monkeypatch):
+    monkeypatch.setenv('ROS_LOCALHOST_ONLY', '1')
+    monkeypatch.setenv('ROS_STATIC_PEERS', '192.0.2.1')
+    with ros_session(domain_id=shared_id, discovery='SUBNET'):
+        assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SUBNET'
+        assert os.environ['ROS_STATIC_PEERS'] == '192.0.2.1'
+        assert 'ROS_LOCALHOST_ONLY' not in os.environ
+    with ros_session():
+        assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
+        assert rclpy.get_default_context().get_domain_id() == reserve_domain_id()
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'error', 'said'),
+    [
+        ({'domain_id': '42'}, TypeError, "a whole number from 0 to 101, not '42'"),
+        ({'domain_id': True}, TypeError, 'a whole number from 0 to 101, not True'),
+        ({'domain_id': 102}, ValueError, 'a whole number from 0 to 101, not 102'),
+        ({'domain_id': -1}, ValueError, 'a whole number from 0 to 101, not -1'),
+        ({'discovery': 'subnet'}, ValueError, "'LOCALHOST' or 'SUBNET', not 'subnet'"),
+        ({'discovery': 'SUBNET'}, ValueError, 'needs the domain id that the other machines use'),
+    ],
+)
+def test_bad_domain_or_discovery(arguments, error, said):
+    with pytest.raises(error, match=said):
+        ros_session(**arguments)
 
 
 def test_open_twice():

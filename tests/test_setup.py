@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -17,7 +18,8 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 PYPROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())
 LOCK = (ROOT / 'requirements.lock').read_text()
-BROWSER_LOCK = (ROOT / 'requirements-browser.lock').read_text()
+GROUPS = PYPROJECT['dependency-groups']
+GROUP_LOCKS = {name: (ROOT / f'requirements-{name}.lock').read_text() for name in GROUPS}
 BASE_PYTHON = Path(sys._base_executable)
 HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
 
@@ -46,13 +48,16 @@ def pins(lock: str) -> dict[str, str]:
 
 def test_every_pin_has_a_version_and_a_hash():
     assert len(pins(LOCK)) > 100
-    for name, pin in (pins(LOCK) | pins(BROWSER_LOCK)).items():
-        assert re.match(rf'{re.escape(name)}==\d', pin), pin
-        assert '--hash=sha256:' in pin, name
+    for lock in (LOCK, *GROUP_LOCKS.values()):
+        for name, pin in pins(lock).items():
+            assert re.match(rf'{re.escape(name)}==\d', pin), pin
+            assert '--hash=sha256:' in pin, name
 
 
 def test_the_lock_names_no_index():
-    assert not re.search(r'://|--(extra-)?index|--find-links|file:|@', LOCK + BROWSER_LOCK)
+    assert not re.search(
+        r'://|--(extra-)?index|--find-links|file:|@', ''.join([LOCK, *GROUP_LOCKS.values()])
+    )
 
 
 def test_the_lock_names_the_pythons_it_fits():
@@ -67,12 +72,27 @@ def test_a_direct_dependency_is_locked_and_has_its_reason(name):
     assert_reason(name)
 
 
-def test_the_group_for_the_browser_is_locked_and_agrees_with_the_rest():
-    for requirement in PYPROJECT['dependency-groups']['browser']:
-        assert name_of(requirement) in pins(BROWSER_LOCK)
+@pytest.mark.parametrize('group', GROUPS)
+def test_a_group_is_locked_and_agrees_with_the_rest(group):
+    mine = pins(GROUP_LOCKS[group])
+    for requirement in GROUPS[group]:
+        assert name_of(requirement) in mine
         assert_reason(name_of(requirement))
-    for name in pins(LOCK).keys() & pins(BROWSER_LOCK).keys():
-        assert pins(LOCK)[name].split()[0] == pins(BROWSER_LOCK)[name].split()[0]
+    for other in map(pins, [LOCK, *GROUP_LOCKS.values()]):
+        for name in mine.keys() & other.keys():
+            assert mine[name].split()[0] == other[name].split()[0]
+
+
+def test_the_proxy_of_the_hub_is_locked():
+    lock = json.loads((ROOT / 'tools/hub/package-lock.json').read_text())
+    packages = {name: package for name, package in lock['packages'].items() if name}
+    assert all(package['integrity'].startswith('sha512-') for package in packages.values())
+    assert not any('resolved' in package for package in packages.values())
+    for name, version in json.loads((ROOT / 'tools/hub/package.json').read_text())[
+        'dependencies'
+    ].items():
+        assert packages[f'node_modules/{name}']['version'] == version
+        assert_reason(name)
 
 
 def assert_reason(name: str) -> None:
@@ -333,11 +353,16 @@ def test_a_wrong_hash_installs_nothing_and_the_next_call_repairs(checkout):
     assert checkout.installed() == ALL
 
 
-def test_what_the_browser_needs_is_kept_once_it_was_asked_for(checkout):
-    checkout.lock(pin for name, pin in checkout.pins.items() if name != 'iniconfig')
-    (checkout.root / 'requirements-browser.lock').write_text(checkout.pins['iniconfig'])
+def test_what_a_group_needs_is_kept_once_it_was_asked_for(checkout):
+    checkout.lock(checkout.pins[name] for name in ('setuptools', 'uv'))
+    for group, name in (('browser', 'iniconfig'), ('hub', 'pluggy')):
+        pin = checkout.pins.get(name) or wheel_of(name, checkout.wheels)
+        (checkout.root / f'requirements-{group}.lock').write_text(pin)
     without = [name for name in ALL if name != 'iniconfig']
-    for arguments, expected in (([], without), (['browser'], ALL), ([], ALL)):
+    with_both = sorted([*ALL, 'pluggy'])
+    for arguments, expected in (
+        ([], without), (['browser'], ALL), ([], ALL), (['hub'], with_both), ([], with_both)
+    ):  # fmt: skip
         answer = checkout.set_up(*arguments)
         assert answer.returncode == 0, answer.stderr
         assert checkout.installed() == expected

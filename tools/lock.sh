@@ -1,6 +1,6 @@
 #!/bin/sh
 # Write requirements.lock: every dependency of pyproject.toml, pinned, with the hashes of its files.
-# And requirements-browser.lock: what its group `browser` needs besides.
+# And requirements-GROUP.lock for each of its groups: what that needs besides.
 # usage: tools/lock.sh UV [--upgrade]
 # Without --upgrade a version that still fits stays as it is.
 set -eu
@@ -46,8 +46,12 @@ fi
 } > requirements.lock
 echo "requirements.lock: $(grep -c '^[a-z].*==' requirements.lock) pins, Python$pythons"
 
-resolve requirements-browser.lock --group browser --constraint requirements.lock "$@"
-{
-    echo '# Made by `make lock` from the group `browser` of pyproject.toml. Do not edit.'
-    cat "$new"
-} > requirements-browser.lock
+constraints='--constraint requirements.lock'
+for group in browser hub; do
+    resolve "requirements-$group.lock" --group "$group" $constraints "$@"
+    {
+        echo "# Made by \`make lock\` from the group \`$group\` of pyproject.toml. Do not edit."
+        cat "$new"
+    } > "requirements-$group.lock"
+    constraints="$constraints --constraint requirements-$group.lock" # .venv may hold all of them
+done

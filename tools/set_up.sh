@@ -1,8 +1,8 @@
 #!/bin/sh
 # Make .venv and install requirements.lock and this project into it. Where .venv is up to date,
 # this does nothing. After an interruption the next call repairs what the last one left.
-# usage: tools/set_up.sh [browser]
-# `browser` adds requirements-browser.lock, and later calls keep it up to date.
+# usage: tools/set_up.sh [GROUP]
+# The group, `browser` or `hub`, adds its requirements-GROUP.lock. Later calls keep it up to date.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -15,8 +15,12 @@ fail() {
 exec 9< tools/set_up.sh
 ! command -v flock > /dev/null || flock 9 # two calls at once: the second waits
 
-locks=requirements.lock
-if [ "${1-}" = browser ] || [ -f .venv/browser ]; then locks="$locks requirements-browser.lock"; fi
+locks=requirements.lock groups=
+for group in browser hub; do
+    if [ "${1-}" = "$group" ] || [ -f ".venv/with_$group" ]; then
+        locks="$locks requirements-$group.lock" groups="$groups .venv/with_$group"
+    fi
+done
 
 # The stamp is written last. It holds all that .venv depends on, so that a changed lock, a moved
 # folder and a Python that went away or became another one are noticed.
@@ -116,6 +120,6 @@ say "Installing $(cat $locks | grep -c '^[a-z].*==') packages, about 190 MB the 
 
 mkdir -p .venv/share/jupyter/lab/settings
 cp tools/jupyterlab_settings.json .venv/share/jupyter/lab/settings/overrides.json
-[ "$locks" = requirements.lock ] || touch .venv/browser
+[ -z "$groups" ] || touch $groups
 wanted > .venv/set_up.new
 mv .venv/set_up.new "$stamp"

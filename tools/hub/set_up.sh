@@ -1,0 +1,26 @@
+#!/bin/sh
+# Make .venv ready for a class: JupyterHub, its proxy, and what a student who cannot write here needs.
+# usage: tools/hub/set_up.sh. Where it is up to date, this does little.
+set -eu
+cd "$(dirname "$0")/../.."
+tools/set_up.sh hub
+
+proxy=.venv/hub_proxy
+if ! cmp -s tools/hub/package-lock.json "$proxy/package-lock.json"; then
+    command -v npm > /dev/null || {
+        echo 'JupyterHub needs a proxy that npm installs: run `sudo apt install npm`, then try again.' >&2
+        exit 1
+    }
+    echo "Installing JupyterHub's proxy" >&2
+    rm -rf "$proxy" "$proxy.new"
+    mkdir -p "$proxy.new"
+    cp tools/hub/package.json tools/hub/package-lock.json "$proxy.new"
+    npm ci --prefix "$proxy.new" --ignore-scripts --no-audit --no-fund --silent || {
+        echo 'npm could not install the proxy: check the network, then try again.' >&2
+        exit 1
+    }
+    mv "$proxy.new" "$proxy"
+fi
+
+# The build of lesson 07 would do this, but a student may not write into .venv.
+.venv/bin/python -c 'from helpers.workspace import mend_wheels; mend_wheels()'

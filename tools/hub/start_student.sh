@@ -1,0 +1,19 @@
+#!/bin/sh
+# JupyterHub starts this as the student: their own copy of the notebooks, then their server.
+set -eu
+root=$(dirname "$0")/../..
+mine=$HOME/ros2_notebooks
+if [ ! -d "$mine" ]; then
+    rm -rf "$mine.new"
+    cp -R "$root/notebooks" "$mine.new"
+    mv "$mine.new" "$mine"
+fi
+
+# The path of a socket file is limited to 107 bytes, and a home folder may have a long name.
+JUPYTER_RUNTIME_DIR=${TMPDIR:-/tmp}/jupyter-$(id -u)
+mkdir -m 700 "$JUPYTER_RUNTIME_DIR" 2> /dev/null || [ -O "$JUPYTER_RUNTIME_DIR" ] || {
+    echo "$JUPYTER_RUNTIME_DIR belongs to somebody else: remove it." >&2
+    exit 1
+}
+export JUPYTER_RUNTIME_DIR
+exec "$root/.venv/bin/jupyterhub-singleuser" "$@"
