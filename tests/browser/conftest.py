@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -72,7 +73,7 @@ def page(chromium: Browser, running: Server, name: str) -> Iterator[LabPage]:
     try:
         yield lab
     finally:
-        lab.screenshot(name)
+        lab.screenshot(re.sub(r'\W+', '_', name).strip('_'))
         lab.close()
         context.close()
     assert outside == []
