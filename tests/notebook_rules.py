@@ -388,12 +388,11 @@ def on_its_slide(notebook: NotebookNode) -> list[str]:
 
 
 def notes_name_the_reader(notebook: NotebookNode) -> list[str]:
-    """JupyterLab shows the first line of a folded cell: it says who may open it."""
+    """JupyterLab shows the first line of a folded cell, and unfolds Markdown when it runs it."""
     return [
-        f'Cell {index} is a note: text that begins with `{NOTE}`.'
+        f'Cell {index} is a note: make it a raw cell that begins with `{NOTE}`.'
         for index, cell in enumerate(notebook.cells, 1)
-        if 'notes' in tags(cell)
-        and not (cell.cell_type == 'markdown' and cell.source.startswith(NOTE))
+        if 'notes' in tags(cell) and not (cell.cell_type == 'raw' and cell.source.startswith(NOTE))
     ]
 
 

@@ -1,11 +1,21 @@
 """What the exporter hands to nbconvert, and says without npm. tests/browser opens its decks."""
 
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from nbformat.v4 import (
+    new_code_cell,
+    new_markdown_cell,
+    new_notebook,
+    new_output,
+    new_raw_cell,
+)
 
 from tools import export_slides
 
 NOTE = 'For the instructor: 5 minutes\n\nAsk first.'
+
+
+def shown(text):
+    return new_output('execute_result', data={'text/plain': text})
 
 
 @pytest.fixture
@@ -13,9 +23,11 @@ def lesson():
     return new_notebook(
         cells=[
             new_markdown_cell('# 02 Lose messages\n\nAfter [01](01_publish_and_subscribe.ipynb).'),
-            new_markdown_cell(NOTE, metadata={'tags': ['notes']}),
+            new_raw_cell(NOTE, metadata={'tags': ['notes']}),
             new_code_cell('\n'.join(['run()'] * 20)),
             new_code_cell('run()', metadata={'tags': ['solution']}),
+            new_code_cell('sliders', outputs=[shown('VBox(children=(IntSlider(value=1),))')]),
+            new_code_cell('number', outputs=[shown('1')]),
         ]
     )
 
@@ -23,9 +35,11 @@ def lesson():
 def test_notes_are_for_the_speaker_and_solutions_for_nobody(lesson):
     cells = export_slides.for_reveal(lesson).cells
     types = [cell.metadata.slideshow['slide_type'] for cell in cells]
-    assert types == ['slide', 'notes', 'fragment', 'skip']
+    assert types == ['slide', 'notes', 'fragment', 'skip', 'fragment', 'fragment']
+    assert cells[1].cell_type == 'markdown'
     assert '(01_publish_and_subscribe.html)' in cells[0].source
     assert cells[2].metadata.tags == ['more-than-8-lines', 'more-than-18-lines']
+    assert [len(cell.outputs) for cell in cells[4:]] == [0, 1]
     assert 'slideshow' not in lesson.cells[0].metadata  # the argument is left alone
 
 

@@ -9,7 +9,13 @@ from pathlib import Path
 import nbformat
 import notebook_rules as rules
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from nbformat.v4 import (
+    new_code_cell,
+    new_markdown_cell,
+    new_notebook,
+    new_output,
+    new_raw_cell,
+)
 from nbval.plugin import get_sanitize_patterns
 
 from tools import notebooks as tool
@@ -122,7 +128,7 @@ def test_a_correct_notebook_is_let_pass(correct, group):
 
 def note(text):
     metadata = {'tags': ['notes'], 'jupyter': {'source_hidden': True}}
-    return new_markdown_cell(text, metadata=nbformat.from_dict(metadata))
+    return new_raw_cell(text, metadata=nbformat.from_dict(metadata))
 
 
 def with_source(index, old, new):

@@ -3,7 +3,13 @@
 from base64 import b64encode
 
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from nbformat.v4 import (
+    new_code_cell,
+    new_markdown_cell,
+    new_notebook,
+    new_output,
+    new_raw_cell,
+)
 
 from tools.slides import SLIDE, height, slide_types
 
@@ -13,6 +19,10 @@ STEP = new_markdown_cell('## 1. Build\n\nA node.')
 
 def text(source='Look at the output.', *tags):
     return new_markdown_cell(source, metadata={'tags': list(tags)})
+
+
+def note(source='Ask.'):
+    return new_raw_cell(source, metadata={'tags': ['notes']})
 
 
 def code(lines=3, *tags, outputs=(), **metadata):
@@ -54,12 +64,12 @@ def table(rows):
         ([TITLE, code(), code(1, 'solution'), code(1)], 'slide fragment subslide fragment'),
         ([TITLE, text('', 'deck-break'), code()], 'slide subslide fragment'),
         ([TITLE, code(25, 'deck-skip'), code(16)], 'slide skip fragment'),
-        ([TITLE, text('word ' * 400, 'notes'), code(16)], 'slide skip fragment'),
-        ([text('First.', 'notes'), TITLE, STEP], 'skip slide slide'),
+        ([TITLE, note('word ' * 400), code(16)], 'slide skip fragment'),
+        ([note(), TITLE, STEP], 'skip slide slide'),
         ([code(1, 'deck-skip'), code()], 'skip slide'),
         # A note does not part a text from its code.
         (
-            [TITLE, code(18), text(), text('Ask.', 'notes'), code(16)],
+            [TITLE, code(18), text(), note(), code(16)],
             'slide fragment subslide skip fragment',
         ),
     ],
@@ -93,4 +103,4 @@ def test_what_makes_a_cell_high():
     assert height(text('| a | b |\n|---|---|\n' + '| 1 | 2 |\n' * 9)) > height(text('a b ' * 9))
     assert height(text('- a\n- b\n- c')) > height(text('a\nb\nc'))
     assert height(text('![A plot.](images/plot.png)')) > height(text('A plot.'))
-    assert height(text('word ' * 400, 'notes')) == 0
+    assert height(note('word ' * 400)) == 0

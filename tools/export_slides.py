@@ -67,7 +67,7 @@ def for_reveal(notebook: NotebookNode) -> NotebookNode:
     for cell, slide_type in zip(notebook.cells, slide_types(notebook), strict=True):
         tags = cell.metadata.setdefault('tags', [])
         if 'notes' in tags:
-            slide_type = 'notes'
+            slide_type, cell.cell_type = 'notes', 'markdown'
         elif 'solution' in tags:
             slide_type = 'skip'
         cell.metadata.slideshow = {'slide_type': slide_type}
@@ -76,7 +76,14 @@ def for_reveal(notebook: NotebookNode) -> NotebookNode:
         else:
             lines = len(cell.source.splitlines())
             tags += [f'more-than-{most}-lines' for most in CODE if lines > most]
+            cell.outputs = [output for output in cell.outputs if not _is_widget(output)]
     return notebook
+
+
+def _is_widget(output: NotebookNode) -> bool:
+    """Say whether an output is the text of a widget, such as `VBox(children=(...))`."""
+    data = output.get('data', {})
+    return set(data) == {'text/plain'} and bool(re.match(r'\w+\(children=', data['text/plain']))
 
 
 def export(path: Path, output: Path) -> Path:

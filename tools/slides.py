@@ -9,8 +9,8 @@ Where the rule is wrong for a cell, a tag of the cell (JupyterLab, Property Insp
 
     deck-break      starts a slide below, although it would fit
     deck-skip       is left out of the deck
-    notes           is for the instructor: folded in JupyterLab, left out of the live deck, and
-                    speaker notes in the exported one
+    notes           is for the instructor: a raw cell, folded in JupyterLab, left out of the live
+                    deck, and speaker notes in the exported one
 
 jupyterlab-slideshow has traps: it hides a cell of the type `-`, and from one of the type `notes`,
 where Shift+Enter can lead, no key leads on. So no cell gets these types.

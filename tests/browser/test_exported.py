@@ -5,14 +5,15 @@ import shutil
 import nbformat
 import pytest
 from lab_server import NOTEBOOKS
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
 
 from tools import export_slides
 
 FORMULA = r'A law: $x_{k+1} = F x_k$, and $$\int_0^1 x^2 \, dx = \frac{1}{3}.$$'
-NOTE = 'For the instructor: 5 minutes\n\nAsk **first**.'
+NOTE = 'For the instructor: 5 minutes\n\nAsk first.'
 AT_THE_END = '() => Reveal.isLastSlide() && !Reveal.availableFragments().next'
 SLIDE_COMPLETE = '() => !Reveal.availableFragments().next'
+FADED_IN = """() => !document.querySelector('.slides').getAnimations({ subtree: true }).length"""
 STATE = '() => JSON.stringify(Reveal.getState())'
 CUT_OFF = """() => [...Reveal.getCurrentSlide().querySelectorAll('.jp-Cell, .jp-Cell *')].filter(
     part => {
@@ -33,7 +34,7 @@ def folder(tmp_path_factory):
     source, output = tmp_path_factory.mktemp('source'), tmp_path_factory.mktemp('slides')
     cells = [
         new_markdown_cell('# 99 Try formulas\n\n' + FORMULA),
-        new_markdown_cell(NOTE, metadata={'tags': ['notes']}),
+        new_raw_cell(NOTE, metadata={'tags': ['notes']}),
         new_markdown_cell('## 1. Again\n\n' + FORMULA),
         new_code_cell('x = 1'),
         new_code_cell('secret = 1', metadata={'tags': ['solution']}),
@@ -75,6 +76,7 @@ def test_every_slide_is_reached_and_nothing_is_cut_off(open_deck, artefacts, pat
     while True:
         if page.evaluate(SLIDE_COMPLETE):
             slides += 1
+            page.wait_for_function(FADED_IN)
             page.screenshot(path=artefacts / f'{path.stem}_exported' / f'{slides:02d}.png')
             cut_off += page.evaluate(CUT_OFF)
         if page.evaluate(AT_THE_END):
