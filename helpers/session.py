@@ -468,6 +468,20 @@ def current_session() -> Session:
     return _open_session
 
 
+def graph_environment() -> dict[str, str]:
+    """Return the variables with which another process joins the open session.
+
+    Without a session they are those of the next `ros_session()` of this kernel.
+    """
+    session = _open_session
+    domain_id = session._context.get_domain_id() if session else reserve_domain_id()
+    discovery = session._discovery if session else 'LOCALHOST'
+    environment = {'ROS_DOMAIN_ID': str(domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': discovery}
+    if discovery == 'SUBNET' and 'ROS_STATIC_PEERS' in os.environ:
+        environment['ROS_STATIC_PEERS'] = os.environ['ROS_STATIC_PEERS']
+    return environment
+
+
 @atexit.register
 def _close_at_exit() -> None:
     if _open_session is not None:

@@ -30,7 +30,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
 from helpers.progress import ProgressBar
-from helpers.session import configure_discovery, reserve_domain_id
+from helpers.session import graph_environment
 from helpers.text import wrap
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -751,7 +751,8 @@ class Workspace:
     def run(self, package: str, executable: str, *arguments: str, sourced: bool = True) -> Process:
         """Start an executable as `ros2 run` does, and return the running process.
 
-        It has the sourced environment and this kernel's domain id. What it prints is collected.
+        It has the sourced environment, and the open session's domain id and discovery range (this
+        kernel's, where no session is open). What it prints is collected.
         It ends with its `with` block, with `stop()`, when the same is run again, when a cell is
         interrupted, and with the kernel. `sourced=False` leaves `install/setup.bash` out.
 
@@ -759,10 +760,7 @@ class Workspace:
         prints, and has ended with 1.
         """
         environment = self.environment() if sourced else _environment()
-        configure_discovery()
-        environment |= {
-            'ROS_DOMAIN_ID': str(reserve_domain_id()),
-            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+        environment |= graph_environment() | {
             'ROS_LOG_DIR': str(self.path / 'log' / 'ros'),  # not the home: it may be read-only
             'PYTHONUNBUFFERED': '1',
             # Without the time stamp.

@@ -23,7 +23,13 @@ from ros_nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 from std_msgs.msg import String
 
 from helpers import session as module
-from helpers.session import configure_discovery, current_session, reserve_domain_id, ros_session
+from helpers.session import (
+    configure_discovery,
+    current_session,
+    graph_environment,
+    reserve_domain_id,
+    ros_session,
+)
 
 EXECUTORS = pytest.mark.parametrize('threads', [1, 3], ids=['single', 'multi'])
 
@@ -240,7 +246,18 @@ def test_discovery_in_the_network(shared_id, monkeypatch):
         assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'SUBNET'
         assert os.environ['ROS_STATIC_PEERS'] == '192.0.2.1'
         assert 'ROS_LOCALHOST_ONLY' not in os.environ
+        assert graph_environment() == {
+            'ROS_DOMAIN_ID': str(shared_id),
+            'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
+            'ROS_STATIC_PEERS': '192.0.2.1',
+        }
+    alone = {
+        'ROS_DOMAIN_ID': str(reserve_domain_id()),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+    }
+    assert graph_environment() == alone
     with ros_session():
+        assert graph_environment() == alone
         assert os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] == 'LOCALHOST'
         assert rclpy.get_default_context().get_domain_id() == reserve_domain_id()
 

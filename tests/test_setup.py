@@ -370,6 +370,8 @@ def test_what_a_group_needs_is_kept_once_it_was_asked_for(checkout):
 
 
 def test_a_moved_checkout_is_noticed(checkout, path):
+    checkout.lock(checkout.pins.values())
+    assert checkout.set_up().returncode == 0
     assert checkout.set_up().stderr == ''
     before = checkout.root
     checkout.root = before.rename(before.with_name('two'))

@@ -460,13 +460,14 @@ def wait_until(predicate, timeout_s=10.0) -> bool:
     return predicate()
 
 
-def test_a_running_node_is_heard_by_this_kernel_and_ends(built):
+@pytest.mark.parametrize('shared_id', [None, 101])
+def test_a_running_node_is_heard_by_this_kernel_and_ends(built, shared_id):
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.node import Node
     from std_msgs.msg import String
 
     heard = []
-    with ros_session() as session, built.run('talker_pkg', 'talker') as talker:
+    with ros_session(shared_id) as session, built.run('talker_pkg', 'talker') as talker:
         node = Node('listener')
         node.create_subscription(String, 'topic', heard.append, 10)
         executor = SingleThreadedExecutor()
@@ -477,7 +478,7 @@ def test_a_running_node_is_heard_by_this_kernel_and_ends(built):
         assert talker.running
         assert repr(talker) == 'talker: running'
         environment = Path(f'/proc/{talker._process.pid}/environ').read_bytes().split(b'\0')
-        assert f'ROS_DOMAIN_ID={reserve_domain_id()}'.encode() in environment
+        assert f'ROS_DOMAIN_ID={shared_id or reserve_domain_id()}'.encode() in environment
         assert not [x for x in environment if b'humble' in x or b'rmw_no_such' in x]
     assert not talker.running
     # It was interrupted as with Ctrl+C, and could say its last words.
