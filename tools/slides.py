@@ -105,9 +105,7 @@ def _height_of_prose(block: str) -> float:
         return (len(lines) - 1) * TABLE_ROW + PROSE_GAP
     if not re.search(r'^(```|- |\d\. |> )', text, re.MULTILINE):
         lines = [' '.join(lines)]
-    gap = (
-        0 if re.match('</?details>', block) else PROSE_GAP
-    )  # an answer of a quiz, its reason follows
+    gap = 0 if re.match('</?details>', block) else PROSE_GAP  # a reason follows its answer at once
     return gap + PROSE_LINE * sum(ceil(len(line) / PROSE_CHARACTERS) for line in lines)
 
 

@@ -7,8 +7,8 @@ import IPython.display
 import pytest
 from jupyter_client.manager import KernelManager
 
-from helpers import progress
-from helpers.progress import ProgressBar
+from helpers import progress_bar
+from helpers.progress_bar import ProgressBar
 
 
 class Shell:
@@ -82,9 +82,9 @@ def test_no_progress_is_known(calls):
 
 
 CELL = """
-    import helpers.progress
-    helpers.progress.SHOW_AFTER_S = helpers.progress.REFRESH_S = 0.0
-    with helpers.progress.ProgressBar(lambda: 0.5) as bar:
+    import helpers.progress_bar
+    helpers.progress_bar.SHOW_AFTER_S = helpers.progress_bar.REFRESH_S = 0.0
+    with helpers.progress_bar.ProgressBar(lambda: 0.5) as bar:
         bar.update(0.1)
         bar.update(0.2)
     print('heard 41')
@@ -93,7 +93,7 @@ CELL = """
 
 def test_real_kernel():
     """JupyterLab lets a cell ask for input, nbval and nbclient do not."""
-    assert progress.SHOW_AFTER_S == 2.0
+    assert progress_bar.SHOW_AFTER_S == 2.0
     manager = KernelManager(kernel_name='python3')
     manager.start_kernel()
     client = manager.client()
