@@ -17,6 +17,7 @@ from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
 from nbval.plugin import comment_markers, metadata_tags
 
+from helpers.progress import title_of
 from tools.notebooks import clean, text_of
 from tools.slides import SKIPPED, SLIDE, height, slide_types
 
@@ -459,6 +460,19 @@ def exercises_checked(notebook: NotebookNode) -> list[str]:
     return found
 
 
+def exercises_recorded(notebook: NotebookNode) -> list[str]:
+    """The check has the title that counts as the reader's progress, the solution has not."""
+    found = []
+    for count, (name, cells) in enumerate(exercises(notebook).items(), 1):
+        title = title_of(number(notebook), count)
+        counting = [cell for cell in cells if printed(cell, f'{title}: ')]
+        if not any('check' in tags(cell) for cell in counting):
+            found.append(f'{name!r}: give its check the title {title!r}.')
+        if any('solution' in tags(cell) for cell in counting):
+            found.append(f'{name!r}: give its solution another title than {title!r}.')
+    return found
+
+
 # The quiz
 
 
@@ -521,7 +535,7 @@ GROUPS: dict[str, list[Rule]] = {
     'compared': [nothing_ignored, known_tags],
     'file': [saved_clean, hides_solutions_and_notes_only, folded_solutions_keep_their_secret],
     'spine': [has_title, has_labels, has_steps, headings_in_order, recap_answers_opening, predicts],
-    'exercises': [enough_exercises, exercises_complete, exercises_checked],
+    'exercises': [enough_exercises, exercises_complete, exercises_checked, exercises_recorded],
     'quiz': [enough_questions, answers_with_reasons, right_answers_vary],
     'slides': [fits_a_slide, on_its_slide, notes_name_the_reader],
 }

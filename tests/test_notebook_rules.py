@@ -45,8 +45,8 @@ for number in random.sample(range(1000), k=random.randint(5, 15)):
     print(f'[INFO] [slow_subscriber]: I heard: "Hello World: {number}"')"""
 ANSWERS = ['It keeps the newest.', 'It keeps the oldest.', 'It keeps none.']
 SOLUTION = '# Solution of exercise 1\ndepth = 20\ncheck_depth(depth)'
-PASSED = '[ok] depth is 20\n[ok] none is lost\nExercise 1: 2 of 2. All done.\n'
-FAILED = '[missing] depth is 20\n[ok] none is lost\nExercise 1: 1 of 2.\n'
+PASSED = '[ok] depth is 20\n[ok] none is lost\nSolution: 2 of 2. All done.\n'
+FAILED = '[missing] depth is 20\n[ok] none is lost\nExercise {} of lesson 02: 1 of 2.\n'
 
 
 def printed(text, name='stdout'):
@@ -70,7 +70,7 @@ def exercise(count):
     return [
         new_markdown_cell(f'### Exercise {count}: choose the depth\n\nChange the depth.'),
         code('depth = 10', 'exercise'),
-        code('check_depth(depth)', 'check', outputs=printed(FAILED)),
+        code('check_depth(depth)', 'check', outputs=printed(FAILED.format(count))),
         code(SOLUTION, 'solution', outputs=printed(PASSED)),
     ]
 
@@ -292,6 +292,9 @@ BROKEN = [
     (rules.exercises_checked, with_cell(9, outputs=printed(FAILED))),
     (rules.exercises_checked, with_cell(9, outputs=printed('[ok] depth is 20\n'))),
     (rules.exercises_checked, with_cell(9, outputs=[])),
+    (rules.exercises_recorded, with_cell(8, outputs=printed(FAILED.format(2)))),
+    (rules.exercises_recorded, with_cell(9, outputs=printed(FAILED.format(1)))),
+    (rules.exercises_recorded, with_source(0, '# 02 Lose', '# 03 Lose')),
     (rules.enough_questions, without(len(lesson().cells) - 2)),
     (rules.enough_questions, with_source(-2, 'Question 3', 'Question 4')),
     (rules.enough_questions, with_source(-2, '### Question 3', 'Question 3')),

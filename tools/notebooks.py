@@ -33,6 +33,7 @@ from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernel
 from nbformat import NotebookNode
 from traitlets import default
 
+from helpers.progress import FILE_VARIABLE
 from tools.slides import slide_types
 
 FOLDER = Path(__file__).resolve().parent.parent / 'notebooks'
@@ -149,8 +150,11 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     )
     # nbval knows no widgets: what is printed into an Output widget is output of the cell.
     client.widget_registry = {}
-    # Under nbval ipykernel sees this variable, and leaves output written at C level alone.
-    environment = os.environ | {'PYTEST_CURRENT_TEST': 'tools/notebooks.py'}
+    environment = os.environ | {
+        # Under nbval ipykernel sees this variable, and leaves output written at C level alone.
+        'PYTEST_CURRENT_TEST': 'tools/notebooks.py',
+        FILE_VARIABLE: '',  # what is saved is the table of a reader who has solved nothing
+    }
     try:
         client.execute(env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     except CellExecutionError as error:
