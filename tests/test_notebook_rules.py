@@ -82,7 +82,7 @@ def question(count, right='ABC', answers=ANSWERS):
         verdict = 'Right' if letter == right[count - 1] else 'No'
         text += f'<details><summary>{letter}. {answer}</summary>\n\n**{verdict}.** See step 1.'
         text += '\n\n</details>\n'
-    return new_markdown_cell(text.strip())
+    return new_markdown_cell(text.strip(), metadata={'editable': False})
 
 
 def lesson(*cells, before=()):
@@ -242,6 +242,7 @@ BROKEN = [
     (rules.saved_clean, with_metadata(1, execution={'iopub.status.idle': '2025-01-01'})),
     (rules.saved_clean, with_metadata(1, jupyter={'outputs_hidden': True})),
     (rules.saved_clean, with_metadata(0, editable=False)),
+    (rules.saved_clean, with_metadata(-2, editable=True)),
     (rules.saved_clean, with_notebook_metadata(widgets={})),
     (
         rules.saved_clean,

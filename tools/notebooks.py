@@ -56,7 +56,7 @@ def clean(notebook: NotebookNode) -> NotebookNode:
     """Return a copy of a notebook without what changes by itself from run to run.
 
     Kept are sources, tags, hidden sources, cell ids, execution counts and outputs. The slide types
-    are made anew.
+    are made anew, and so is which cells JupyterLab does not let edit: answers that unfold.
     Neighbouring pieces of one stream become one, because where a stream is cut is chance. The
     model of a widget lives only as long as its kernel: of its view, the text is kept.
     """
@@ -69,6 +69,8 @@ def clean(notebook: NotebookNode) -> NotebookNode:
             cell.id = hashlib.sha256(f'{number} {cell.source}'.encode()).hexdigest()[:8]
         ids.add(cell.id)
         cell.metadata = nbformat.from_dict(dict(_kept_metadata(cell.metadata)))
+        if cell.cell_type == 'markdown' and '<details>' in cell.source:
+            cell.metadata.editable = False  # a double click on an answer must not show the source
         if cell.cell_type == 'code':
             cell.outputs = _clean_outputs(cell)
     for cell, slide_type in zip(notebook.cells, slide_types(notebook), strict=True):
