@@ -35,8 +35,9 @@ def test_progress_knows_every_exercise():
     found = {}
     for path in PATHS:
         notebook = nbformat.read(path, as_version=4)
-        title = notebook.cells[0].source.splitlines()[0].removeprefix('# ')
-        found[title[:2]] = title[3:], len(rules.exercises(notebook))
+        if exercises := rules.exercises(notebook):
+            title = notebook.cells[0].source.splitlines()[0].removeprefix('# ')
+            found[title[:2]] = title[3:], len(exercises)
     assert found == progress.LESSONS
 
 

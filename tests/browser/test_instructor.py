@@ -7,10 +7,9 @@ from lab_server import NOTEBOOKS
 
 from tools.slides import slide_types
 
-# What of a slide is cut off, or needs a scroll bar, also when all answers of a quiz are open.
+# What of a slide is cut off, or needs a scroll bar.
 CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
     if (!cell.node.classList.contains('jp-deck-mod-onscreen')) return [];
-    cell.node.querySelectorAll('details').forEach(answer => answer.open = true);
     const found = [];
     const box = cell.node.getBoundingClientRect();
     if (box.top < 0 || box.bottom > innerHeight || box.left < 0 || box.right > innerWidth)
