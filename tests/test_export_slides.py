@@ -1,5 +1,8 @@
 """What the exporter hands to nbconvert, and says without npm. tests/browser opens its decks."""
 
+import re
+
+import nbformat
 import pytest
 from nbformat.v4 import (
     new_code_cell,
@@ -41,6 +44,15 @@ def test_notes_are_for_the_speaker_and_solutions_for_nobody(lesson):
     assert cells[2].metadata.tags == ['more-than-8-lines', 'more-than-18-lines']
     assert [len(cell.outputs) for cell in cells[4:]] == [0, 1]
     assert 'slideshow' not in lesson.cells[0].metadata  # the argument is left alone
+
+
+def test_the_reason_of_an_answer_is_folded_with_it(tmp_path):
+    answer = '<details><summary>A. Yes.</summary>\n\nA reason.\n\n</details>'
+    path = tmp_path / '02_lose_messages.ipynb'
+    nbformat.write(new_notebook(cells=[new_markdown_cell(f'# 02 Lose messages\n\n{answer}')]), path)
+    html = export_slides.export(path, tmp_path).read_text(encoding='utf-8')
+    folded = r'<details><summary>A\. Yes\.</summary>\s*<p>A reason\.</p>\s*</details>'
+    assert re.search(folded, html)
 
 
 def test_without_npm_one_sentence_says_what_to_install(tmp_path, monkeypatch, capsys):
