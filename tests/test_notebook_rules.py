@@ -40,7 +40,7 @@ RECAP = """\
 - **what a queue keeps**: as many as its depth.
 - **what it loses**: those that newer ones pushed out."""
 FOLDED = '\n\n'.join(
-    f'<details lang="{lang}">\n<summary>{lang}</summary>\n\n{"word " * 100}\n\n</details>'
+    f'<details lang="{lang}">\n<summary>{lang}</summary>\n{"word " * 100}\n</details>'
     for lang in ('fr', 'ur', 'vi')
 )
 RANDOM_LOG = """\

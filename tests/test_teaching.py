@@ -23,7 +23,7 @@ TEACHING = Path(__file__).parents[1] / 'teaching.md'
 LETTERS = {'fr': 'éèêàç', 'ur': 'ٹڈڑںے', 'vi': 'ăđơưạảấầẩậắặẻẽẹếềểệỉịọỏốồộớờợụủứữựỳ'}
 FOLDED = re.compile(
     r'<details lang="(?P<lang>\w+)"(?P<rtl> dir="rtl")?>\n'
-    r'<summary>[^<]+</summary>\n\n(?P<text>[^\n]+)\n\n</details>'
+    r'<summary>[^<]+</summary>\n(?P<text>[^\n]+)\n</details>'
 )
 ROW = re.compile(
     r'\| \*\*(?P<term>[^*]+)\*\* \| (?P<meaning>[^|]+) \| <span lang="fr">(?P<fr>[^|]+)</span>'
@@ -170,14 +170,12 @@ def test_timetables():
 # The functions above find what is broken on purpose.
 
 TITLE = '# 02 Lose messages\n\n**Time** 7 minutes'
-FRENCH = '<details lang="fr">\n<summary>Français</summary>\n\nUne file gardée.\n\n</details>'
+FRENCH = '<details lang="fr">\n<summary>Français</summary>\nUne file gardée.\n</details>'
 URDU = (
-    '<details lang="ur" dir="rtl">\n<summary>اردو</summary>\n\n'
-    'قطار میں پیغام ہے <bdi dir="ltr">C++</bdi>۔\n\n</details>'
+    '<details lang="ur" dir="rtl">\n<summary>اردو</summary>\n'
+    'قطار میں پیغام ہے <bdi dir="ltr">C++</bdi>۔\n</details>'
 )
-VIETNAMESE = (
-    '<details lang="vi">\n<summary>Tiếng Việt</summary>\n\nMột nút (node) ở đây.\n\n</details>'
-)
+VIETNAMESE = '<details lang="vi">\n<summary>Tiếng Việt</summary>\nMột nút (node) ở đây.\n</details>'
 SUMMARY = '\n\n'.join(['**In short**: A queue.', FRENCH, URDU, VIETNAMESE])
 TERM = (
     '| **node** | a part | <span lang="fr">nœud</span> | <span dir="rtl" lang="ur">نوڈ</span> '

@@ -91,7 +91,6 @@ def export(path: Path, output: Path) -> Path:
     exporter = SlidesExporter(
         template_name=TEMPLATE.name,
         extra_template_basedirs=[str(TEMPLATE.parent)],
-        embed_images=True,
     )
     notebook = for_reveal(nbformat.read(path, as_version=4))
     title = notebook.cells[0].source.splitlines()[0].lstrip('# ')
@@ -117,6 +116,9 @@ def main(arguments: list[str] | None = None, folder: Path = FOLDER, output: Path
     library.mkdir(parents=True, exist_ok=True)
     for source in (*(packages / name for name in LIBRARY), HERE / 'deck.css'):
         shutil.copy(source, library)
+    # Beside the decks: nbconvert's `embed_images` would close each HTML tag of the text at once.
+    if (images := folder / 'images').is_dir():
+        shutil.copytree(images, output / images.name, dirs_exist_ok=True)
     for path in paths:
         print(export(path, output).relative_to(output.parent))
     return 0
