@@ -19,7 +19,7 @@ LESSONS = [number for number in NOTEBOOKS if number not in rules.NO_LESSON]
 GLOSSARY = NOTEBOOKS['99']
 TEACHING = Path(__file__).parents[1] / 'teaching.md'
 
-# Letters that English, and the other two languages, do not have.
+# Letters that English does not have, and of which every text in this language has one.
 LETTERS = {'fr': 'éèêàç', 'ur': 'ٹڈڑںے', 'vi': 'ăđơưạảấầẩậắặẻẽẹếềểệỉịọỏốồộớờợụủứữựỳ'}
 FOLDED = re.compile(
     r'<details lang="(?P<lang>\w+)"(?P<rtl> dir="rtl")?>\n'
