@@ -27,11 +27,12 @@ MAX_WORDS = 180
 EXERCISES = {'01': 1, '02': 2, '03': 2, '04': 2, '05': 2}  # at least; one in any other lesson
 TAGS = {'predict', 'exercise', 'check', 'solution', 'nbval-ignore-output', 'deck-break', *SKIPPED}
 LABELS = ['You will do', 'You will learn', 'You need', 'Time']
-LABELS_OF_START = ['You will do', 'You need', 'Time']
 QUESTIONS = 3  # in each lesson's quiz
 ANSWER = re.compile(
     r'<details><summary>([A-D])\. \S.*</summary>\n\n\*\*(Right|No)\.\*\* \S.*\n\n</details>'
 )
+NO_LESSON = {'00': 'the start', '99': 'the glossary'}
+LABELS_OF_NO_LESSON = ['You will do', 'You need', 'Time']
 REASON = '# Not compared: '
 NOTE = 'For the instructor'
 PATH_OF_A_MACHINE = re.compile(
@@ -290,7 +291,7 @@ def has_title(notebook: NotebookNode) -> list[str]:
 
 
 def has_labels(notebook: NotebookNode) -> list[str]:
-    wanted = LABELS_OF_START if number(notebook) == '00' else LABELS
+    wanted = LABELS_OF_NO_LESSON if number(notebook) in NO_LESSON else LABELS
     found = [name for line in sections(notebook)[''] if (name := label(line))]
     if [name for name in found if name in wanted] == wanted:
         return []
@@ -299,7 +300,7 @@ def has_labels(notebook: NotebookNode) -> list[str]:
 
 def has_steps(notebook: NotebookNode) -> list[str]:
     """`## 1. ...` and so on, perhaps Exercises, then Recap, Quiz and In practice."""
-    if number(notebook) == '00':
+    if number(notebook) in NO_LESSON:
         return []
     names = [text for _, level, text in headings(notebook) if level == 2]
     steps = [name for name in names if re.match(r'\d+\. \S', name)]
@@ -331,7 +332,7 @@ def headings_in_order(notebook: NotebookNode) -> list[str]:
 
 
 def recap_answers_opening(notebook: NotebookNode) -> list[str]:
-    if number(notebook) == '00':
+    if number(notebook) in NO_LESSON:
         return []
     parts = sections(notebook)
     opening, name = [], ''
@@ -351,7 +352,7 @@ def predicts(notebook: NotebookNode) -> list[str]:
     """A lesson asks for a guess, and every guess is compared in a later cell."""
     cells = code_cells(notebook)
     guesses = [count for count, (_, cell) in enumerate(cells) if 'predict' in tags(cell)]
-    if not guesses and number(notebook) != '00':
+    if not guesses and number(notebook) not in NO_LESSON:
         return ['There is no cell with the tag "predict".']
     found = []
     for count in guesses:
@@ -368,10 +369,16 @@ def predicts(notebook: NotebookNode) -> list[str]:
     return found
 
 
+def words_to_read(source: str) -> int:
+    """Return the number of words without markup; of texts in several languages, the longest."""
+    texts = re.split(r'<details[^>]*>', source)
+    return max(len(re.sub(r'<[^>]+>|\|', ' ', text).split()) for text in texts)
+
+
 def fits_a_slide(notebook: NotebookNode) -> list[str]:
     found = []
     for index, cell in enumerate(notebook.cells, 1):
-        lines, words = len(cell.source.splitlines()), len(cell.source.split())
+        lines, words = len(cell.source.splitlines()), words_to_read(cell.source)
         most = MAX_FILE_LINES if cell.source.startswith('%%write ') else MAX_CODE_LINES
         if cell.cell_type == 'code' and lines > most:
             found.append(f'Cell {index} has {lines} lines of code, more than {most}.')
@@ -418,7 +425,7 @@ def exercises(notebook: NotebookNode) -> dict[str, list[NotebookNode]]:
 
 def enough_exercises(notebook: NotebookNode) -> list[str]:
     names = list(exercises(notebook))
-    least = 0 if number(notebook) == '00' else EXERCISES.get(number(notebook), 1)
+    least = 0 if number(notebook) in NO_LESSON else EXERCISES.get(number(notebook), 1)
     found = []
     if len(names) < least:
         found.append(f'There are {len(names)} exercises, fewer than {least}.')

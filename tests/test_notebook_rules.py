@@ -39,6 +39,10 @@ RECAP = """\
 
 - **what a queue keeps**: as many as its depth.
 - **what it loses**: those that newer ones pushed out."""
+FOLDED = '\n\n'.join(
+    f'<details lang="{lang}">\n<summary>{lang}</summary>\n{"word " * 100}\n</details>'
+    for lang in ('fr', 'ur', 'vi')
+)
 RANDOM_LOG = """\
 import random
 for number in random.sample(range(1000), k=random.randint(5, 15)):
@@ -131,8 +135,14 @@ def start():
     return with_file_metadata(notebook)
 
 
+def glossary():
+    notebook = start()
+    notebook.cells[0].source = notebook.cells[0].source.replace('00 Start here', '99 Look up')
+    return with_file_metadata(notebook)
+
+
 @pytest.mark.parametrize('group', rules.GROUPS)
-@pytest.mark.parametrize('correct', [lesson, start])
+@pytest.mark.parametrize('correct', [lesson, start, glossary])
 def test_a_correct_notebook_is_let_pass(correct, group):
     notebook = correct()
     nbformat.validate(notebook)
@@ -345,6 +355,8 @@ def test_every_rule_is_tried_on_a_broken_notebook():
         (rules.has_steps, lesson(new_markdown_cell('## Exercises'))),
         (rules.answers_with_reasons, with_quiz('BDA', [*ANSWERS, 'All.'])),
         (rules.right_answers_vary, with_quiz('BBA')),
+        (rules.fits_a_slide, lesson(new_markdown_cell('| word <b>|</b>' * (rules.MAX_WORDS)))),
+        (rules.fits_a_slide, lesson(new_markdown_cell(FOLDED))),
         (rules.fits_a_slide, lesson(code('%%write a\n' + 'run()\n' * rules.MAX_CODE_LINES))),
         (rules.notes_name_the_reader, lesson(note('For the instructor: 5 minutes'))),
         (rules.hides_solutions_and_notes_only, lesson(note('For the instructor: 5 minutes'))),

@@ -102,5 +102,10 @@ def test_what_makes_a_cell_high():
     assert height(text('word ' * 180)) < SLIDE
     assert height(text('| a | b |\n|---|---|\n' + '| 1 | 2 |\n' * 9)) > height(text('a b ' * 9))
     assert height(text('- a\n- b\n- c')) > height(text('a\nb\nc'))
+    row = '| ' + 'a b ' * 20 + '|'
+    assert height(text(f'{row}\n|---|\n{row * 2}')) > height(text(f'{row}\n|---|\n{row}'))
+    folded = '<details>\n<summary>Urdu</summary>\n{}\n</details>'
+    assert height(text(folded.format('word ' * 90))) == height(text('Urdu'))
+    assert height(text('<span lang="fr">mot</span> ' * 20)) == height(text('mot ' * 20))
     assert height(text('![A plot.](images/plot.png)')) > height(text('A plot.'))
     assert height(note('word ' * 400)) == 0

@@ -69,7 +69,7 @@ def clean(notebook: NotebookNode) -> NotebookNode:
             cell.id = hashlib.sha256(f'{number} {cell.source}'.encode()).hexdigest()[:8]
         ids.add(cell.id)
         cell.metadata = nbformat.from_dict(dict(_kept_metadata(cell.metadata)))
-        if cell.cell_type == 'markdown' and '<details>' in cell.source:
+        if cell.cell_type == 'markdown' and '<details' in cell.source:
             cell.metadata.editable = False  # a double click on an answer must not show the source
         if cell.cell_type == 'code':
             cell.outputs = _clean_outputs(cell)

@@ -31,7 +31,9 @@ SLIDE, WIDTH = 97.0, 148.0
 FOLDED, BORDER = 4.0, 1.5
 PROSE_LINE, PROSE_GAP, PROSE_CHARACTERS, PROSE_PICTURE = 4.2, 3.1, 82, 47.0
 HEADINGS = {'#': 17.0, '##': 12.0, '###': 9.0}
-TABLE_ROW = 4.6
+TABLE_ROW, TABLE_CHARACTERS = 4.6, 120
+UNFOLDED = re.compile(r'<summary>(.*?)</summary>.*?</details>', re.DOTALL)
+MARKUP = re.compile(r'<[^>]+>|\]\([^)]*\)|[*`\[]')
 # Lines of code at most: the size of a letter, the height of a figure.
 CODE = {8: (2.4, 62.0), 18: (2.4, 40.0), 26: (2.15, 28.0), 999: (1.85, 28.0)}
 CODE_LINE, CODE_CHARACTER = 1.3, 0.61  # times the size of a letter
@@ -82,7 +84,8 @@ def height(cell: NotebookNode) -> float:
     if _tags(cell) & SKIPPED:
         return 0.0
     if cell.cell_type == 'markdown':
-        return sum(_height_of_prose(block) for block in re.split(r'\n{2,}', cell.source))
+        source = UNFOLDED.sub(r'\1', cell.source)  # a reader unfolds one part at a time
+        return sum(_height_of_prose(block) for block in re.split(r'\n{2,}', source))
     lines = len(cell.source.splitlines())
     letter, figure = next(sizes for most, sizes in CODE.items() if lines <= most)
     folded = cell.metadata.get('jupyter', {}).get('source_hidden')
@@ -96,10 +99,11 @@ def _height_of_prose(block: str) -> float:
         return HEADINGS.get(block.partition(' ')[0], PROSE_LINE + PROSE_GAP)
     if block.startswith('!['):
         return PROSE_PICTURE + PROSE_GAP
-    text = re.sub(r'\]\([^)]*\)|[*`\[]', '', block)
+    text = MARKUP.sub('', block)
     lines = text.splitlines()
     if text.startswith('|'):
-        return (len(lines) - 1) * TABLE_ROW + PROSE_GAP
+        rows = [TABLE_ROW * ceil(len(line) / TABLE_CHARACTERS) for line in lines]
+        return sum(rows) - TABLE_ROW + PROSE_GAP
     if not re.search(r'^(```|- |\d\. |> )', text, re.MULTILINE):
         lines = [' '.join(lines)]
     return PROSE_GAP + PROSE_LINE * sum(ceil(len(line) / PROSE_CHARACTERS) for line in lines)

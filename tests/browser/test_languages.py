@@ -1,0 +1,38 @@
+"""The summaries in four languages, unfolded by a student and on a slide."""
+
+LONGEST = '09_fuse_odometry_imu_and_gps.ipynb'
+# The empty space to the left and to the right of the name of a language.
+SPACE = """summary => {
+    const name = document.createRange(), line = summary.getBoundingClientRect();
+    name.selectNodeContents(summary);
+    const box = name.getBoundingClientRect();
+    return [box.left - line.left, line.right - box.right];
+}"""
+
+
+def test_a_student_unfolds_a_summary_with_keys(lab):
+    lab.open(LONGEST)
+    cell = lab.show(1)
+    for language in ('fr', 'ur', 'vi'):
+        details = cell.query_selector(f'details[lang={language}]')
+        summary = details.query_selector('summary')
+        summary.focus()
+        lab.page.keyboard.press('Space')
+        lab.page.wait_for_function('details => details.open', arg=details)
+        left, right = summary.evaluate(SPACE)
+        assert (right < left) == (language == 'ur')
+    lab.screenshot('summaries_unfolded')
+
+
+def test_each_unfolded_summary_fits_its_slide(deck):
+    deck.present(LONGEST)
+    deck.press('Space')
+    for language in ('fr', 'ur', 'vi'):
+        details = deck.page.locator(f'.jp-deck-mod-onscreen details[lang={language}]')
+        details.locator('summary').click()
+        deck.screenshot(f'summary_{language}')
+        assert details.evaluate('details => details.open')
+        box = deck.page.locator('.jp-deck-mod-onscreen').bounding_box()
+        assert box['y'] >= 0
+        assert box['y'] + box['height'] <= 720
+        details.locator('summary').click()
