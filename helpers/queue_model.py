@@ -237,15 +237,7 @@ def _rests(
     total = np.cumsum(pushed_out - arrived)
     edges = np.column_stack([arrived, pushed_out]).ravel()
     waited = np.column_stack([total - (pushed_out - arrived), total]).ravel()
-    # From when to when was a worker free? Before the first callback nothing is known.
-    times = np.concatenate([heard['started_s'], heard['finished_s']])
-    change = np.repeat([1, -1], len(heard))
-    order = np.lexsort([change, times])
-    free = np.cumsum(change[order]) < threads
-    flips = times[order][np.flatnonzero(np.diff(free, prepend=False))]
-    starts, ends = flips[::2], flips[1::2]
-    # A worker that stays free to the end, perhaps one that never worked at all.
-    ends = np.append(ends, times[order][-1])[: len(starts)]
+    starts, ends = _pauses(heard, threads, until=published[-1])
     rested = np.interp(ends, edges, waited) - np.interp(starts, edges, waited)
     allowed = REST * callbacks.median() + np.ptp(callbacks) + np.ptp(periods) + delay_s
     return [
@@ -253,6 +245,22 @@ def _rests(
         f'pushed out although a worker was free for {ends[i] - starts[i]:.3g} s.'
         for i in np.flatnonzero(rested > allowed)
     ]
+
+
+def _pauses(heard: pd.DataFrame, threads: int, until: float) -> tuple[np.ndarray, np.ndarray]:
+    """From when to when each worker was free. Before the first callback nothing is known."""
+    ordered = heard.sort_values(['started_s', 'seq'])
+    # A worker is a thread; those of an exclusive group are more, and work one after the other.
+    worker = ordered['thread'].to_numpy()
+    if ordered['thread'].nunique() > threads:
+        worker = np.arange(len(ordered)) % threads
+    finished = ordered['finished_s'].groupby(worker)
+    first = ordered['started_s'].iloc[0]
+    starts = [*finished.shift(fill_value=first), *finished.last()]
+    ends = [*ordered['started_s'], *[until] * len(finished)]
+    if len(finished) < threads:  # one that never worked
+        starts, ends = [*starts, first], [*ends, until]
+    return np.array(starts), np.maximum(starts, ends)
 
 
 def _regular(durations: pd.Series) -> bool:
