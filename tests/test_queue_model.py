@@ -303,7 +303,7 @@ def test_explain_bad_count(value, error):
 @pytest.mark.parametrize(
     ('change', 'error', 'said'),
     [
-        (lambda t: None, TypeError, 'A table of messages is needed'),
+        (lambda t: None, TypeError, 'The table must be a DataFrame, not NoneType'),
         (lambda t: t.drop(columns='started_s'), ValueError, r'lacks the column\(s\) started_s'),
         (lambda t: pd.concat([t, t['seq']], axis=1), ValueError, r'column\(s\) seq more than once'),
         (lambda t: t.iloc[:0], ValueError, 'The table is empty'),
