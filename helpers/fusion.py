@@ -21,7 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from pandas.api.types import is_complex_dtype, is_numeric_dtype
+
+from helpers.values import MOST, check_columns, column_of_numbers, is_number, items, shown
 
 STATE = ('x', 'y', 'yaw', 'vx', 'vy', 'vyaw', 'ax', 'ay')
 
@@ -60,6 +61,7 @@ SENSORS = tuple(MESSAGES)
 
 POSE, TWIST = STATE[:3], STATE[3:6]
 INITIAL_VARIANCE = 1e-9
+MOST_ROWS = 10**6
 
 _YAW = STATE.index('yaw')
 _TURN = np.where(np.array(STATE) == 'yaw', math.tau, 0.0)
@@ -133,7 +135,7 @@ class ExtendedKalmanFilter:
         """Move the estimate `dt` seconds on. Raises ValueError if `dt` is negative."""
         dt = _number('dt', dt)
         if dt < 0:
-            raise ValueError(f'dt must be zero or more seconds, not {dt!r}.')
+            raise ValueError(f'dt must be zero or more seconds, not {shown(dt)}.')
         self._predict(dt)
         if self.t is not None:
             self.t += dt
@@ -304,9 +306,11 @@ def covariances(estimate: pd.DataFrame, names: Sequence[str] = ('x', 'y')) -> np
 
     The names are parts of the pose (x, y, yaw) or of the twist (vx, vy, vyaw), not of both.
     """
-    if not (names and (set(names) <= set(POSE) or set(names) <= set(TWIST))):
+    chosen = items(names)
+    if not chosen or not any(all(n in block for n in chosen) for block in (POSE, TWIST)):
         raise ValueError(
-            f'names must be some of {", ".join(POSE)} or some of {", ".join(TWIST)}, not {names!r}.'
+            f'names must be some of {", ".join(POSE)} or some of {", ".join(TWIST)}, '
+            f'not {shown(names)}.'
         )
     columns = _columns(estimate, {_column(a, b) for a in names for b in names})
     return np.array([[columns[_column(a, b)] for b in names] for a in names]).transpose(2, 0, 1)
@@ -345,8 +349,8 @@ def nees(
     In a consistent filter it is chi-square with len(names) degrees of freedom. `names` are parts
     of the pose.
     """
-    if not set(names) <= set(POSE):
-        raise ValueError(f'names must be some of {", ".join(POSE)}, not {names!r}.')
+    if not all(name in POSE for name in items(names) or [None]):
+        raise ValueError(f'names must be some of {", ".join(POSE)}, not {shown(names)}.')
     matrices = covariances(estimate, names)
     off = errors(estimate, truth)[list(names)].to_numpy()
     try:
@@ -364,8 +368,10 @@ def chi_square_bounds(dof: int, runs: int = 1, probability: float = 0.95) -> tup
     """
     for name, value in (('dof', dof), ('runs', runs)):
         _positive(name, _whole(name, value))
+    if dof * runs > MOST_ROWS:
+        raise ValueError(f'dof times runs must be at most {MOST_ROWS}, not {shown(dof * runs)}.')
     if not 0 < _number('probability', probability) < 1:
-        raise ValueError(f'probability must be between 0 and 1, not {probability!r}.')
+        raise ValueError(f'probability must be between 0 and 1, not {shown(probability)}.')
     outside = (1 - probability) / 2
     return tuple(_chi_square(dof * runs, p) / runs for p in (outside, 1 - outside))
 
@@ -416,9 +422,11 @@ def simulate(
     Raises ValueError or TypeError for a setting that cannot be used.
     """
     if _whole('seed', seed) < 0:
-        raise ValueError(f'seed must be zero or more, not {seed!r}.')
+        raise ValueError(f'seed must be zero or more, not {shown(seed)}.')
     for name, value in (('seconds', seconds), ('rate', rate), ('gps_period', gps_period)):
         _positive(name, value)
+    if seconds * rate > MOST_ROWS:
+        raise ValueError(f'seconds times rate must be at most {MOST_ROWS}: so many rows it makes.')
     for name, value in (
         ('wheel_scale', wheel_scale),
         ('turn_scale', turn_scale),
@@ -452,7 +460,7 @@ def simulate(
     fix = (np.arange(len(t)) % max(1, round(gps_period * rate)) == 0) & ~gap
     later = np.flatnonzero(fix)[1:]
     if not 0 <= _whole('gps_outliers', gps_outliers) <= len(later):
-        raise ValueError(f'gps_outliers must be 0 to {len(later)}, not {gps_outliers!r}.')
+        raise ValueError(f'gps_outliers must be 0 to {len(later)}, not {shown(gps_outliers)}.')
     direction = rng.uniform(-math.pi, math.pi, gps_outliers)
     measurements.loc[rng.choice(later, gps_outliers, replace=False), ['gps_x', 'gps_y']] += (
         gps_jump * np.column_stack([np.cos(direction), np.sin(direction)])
@@ -467,7 +475,7 @@ def _during(name: str, interval: tuple[float, float] | None, t: np.ndarray) -> n
         return np.zeros(len(t), bool)
     start, end = _vector(name, interval, 2)
     if not start < end:
-        raise ValueError(f'{name} must be (from, to) in seconds, not {interval!r}.')
+        raise ValueError(f'{name} must be (from, to) in seconds, not {shown(interval)}.')
     return (start <= t) & (t < end)
 
 
@@ -581,11 +589,12 @@ def _present(index, values, covariance):
 def _index(measured) -> np.ndarray:
     allowed = (
         f'measured must be {len(STATE)} booleans or some of the names {", ".join(STATE)}, '
-        f'not {measured!r}.'
+        f'not {shown(measured)}.'
     )
-    if not isinstance(measured, Iterable):
+    given = measured
+    measured = items(given)
+    if measured is None:
         raise TypeError(allowed)
-    measured = list(measured)
     if len(measured) == len(STATE) and all(isinstance(m, bool | np.bool_) for m in measured):
         index = np.flatnonzero(measured)
     elif all(isinstance(name, str) and name in STATE for name in measured):
@@ -593,35 +602,48 @@ def _index(measured) -> np.ndarray:
     else:
         raise ValueError(allowed)
     if len(index) == 0 or len(set(index)) < len(index):
-        raise ValueError(f'measured must name at least one part, and each once, not {measured!r}.')
+        raise ValueError(
+            f'measured must name at least one part, and each once, not {shown(given)}.'
+        )
     return index
 
 
-def _vector(name: str, values, size: int, nan_allowed: bool = False) -> np.ndarray:
+def _array(values) -> np.ndarray | None:
+    """Return an array of floats, or None for what cannot be one."""
     try:
-        vector = np.array(values, float)
-    except (TypeError, ValueError):
-        raise TypeError(f'{name} must be {size} numbers, not {values!r}.') from None
+        return np.array(values, float)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
+def _bound(array) -> str:
+    """What the numbers must be that are too large."""
+    return f'at most {MOST:g}' if np.isfinite(array).all() else 'finite'
+
+
+def _vector(name: str, values, size: int, nan_allowed: bool = False) -> np.ndarray:
+    vector = _array(values)
+    if vector is None:
+        raise TypeError(f'{name} must be {size} numbers, not {shown(values)}.')
     if vector.shape != (size,):
-        raise ValueError(f'{name} must be {size} numbers, not {values!r}.')
-    if np.isinf(vector).any() or (np.isnan(vector).any() and not nan_allowed):
-        raise ValueError(f'{name} must be finite, not {values!r}.')
+        raise ValueError(f'{name} must be {size} numbers, not {shown(values)}.')
+    if (np.abs(vector) > MOST).any() or (np.isnan(vector).any() and not nan_allowed):
+        raise ValueError(f'{name} must be {_bound(vector)}, not {shown(values)}.')
     return vector
 
 
 def _symmetric(name: str, matrix, size: int) -> np.ndarray:
-    try:
-        matrix = np.array(matrix, float)
-    except (TypeError, ValueError):
-        raise TypeError(f'{name} must be a matrix or variances, not {matrix!r}.') from None
+    given, matrix = matrix, _array(matrix)
+    if matrix is None:
+        raise TypeError(f'{name} must be a matrix or variances, not {shown(given)}.')
     if matrix.shape == (size,):
         matrix = np.diag(matrix)
     if matrix.shape != (size, size):
         raise ValueError(
             f'{name} must be {size} by {size}, or {size} variances, not {matrix.shape}.'
         )
-    if not np.isfinite(matrix).all():
-        raise ValueError(f'{name} must be finite.')
+    if not (np.abs(matrix) <= MOST).all():
+        raise ValueError(f'{name} must be {_bound(matrix)}.')
     if np.abs(matrix - matrix.T).max() > 1e-9 * np.abs(matrix).max():
         raise ValueError(f'{name} must be symmetric.')
     return matrix
@@ -652,7 +674,7 @@ def _process_noise(noise) -> np.ndarray:
 def _merged(name: str, given: Mapping | None, defaults: Mapping) -> dict[str, float]:
     """The defaults, some of them replaced."""
     if not isinstance(given, Mapping | None):
-        raise TypeError(f'{name} must be a dict, not {given!r}.')
+        raise TypeError(f'{name} must be a dict, not {shown(given)}.')
     return dict(defaults) | {
         _known(name, key, defaults): _number(f'{name}[{key!r}]', value)
         for key, value in (given or {}).items()
@@ -665,9 +687,9 @@ def _variances(given: Mapping | None) -> dict[str, float]:
 
 
 def _sensors(sensors) -> list[str]:
-    if isinstance(sensors, str) or not isinstance(sensors, Iterable):
-        raise TypeError(f'sensors must be a tuple of {", ".join(SENSORS)}, not {sensors!r}.')
-    chosen = [_known('sensors', sensor, SENSORS) for sensor in sensors]
+    if isinstance(sensors, str) or items(sensors) is None:
+        raise TypeError(f'sensors must be a tuple of {", ".join(SENSORS)}, not {shown(sensors)}.')
+    chosen = [_known('sensors', sensor, SENSORS) for sensor in items(sensors)]
     if not chosen:
         raise ValueError(f'sensors must be at least one of {", ".join(SENSORS)}.')
     return [sensor for sensor in SENSORS if sensor in chosen]
@@ -676,7 +698,7 @@ def _sensors(sensors) -> list[str]:
 def _messages(sensors: list[str], config) -> list[tuple[str, dict[str, str]]]:
     """The messages of the sensors, without the parts that are not to be used."""
     if not isinstance(config, Mapping | None):
-        raise TypeError(f'config must be a dict, not {config!r}.')
+        raise TypeError(f'config must be a dict, not {shown(config)}.')
     used = {sensor: {name for parts in MESSAGES[sensor] for name in parts} for sensor in SENSORS}
     for sensor, measured in (config or {}).items():
         can = used[_known('config', sensor, SENSORS)]
@@ -697,28 +719,29 @@ def _gate(gate) -> float | None:
 
 
 def _known(name: str, key, allowed: Iterable[str]) -> str:
-    if key not in allowed:
-        raise ValueError(f'{name} can name {", ".join(allowed)}, not {key!r}.')
+    if not isinstance(key, str) or key not in allowed:
+        raise ValueError(f'{name} can name {", ".join(allowed)}, not {shown(key)}.')
     return key
 
 
 def _positive(name: str, value) -> float:
     if _number(name, value) <= 0:
-        raise ValueError(f'{name} must be positive, not {value!r}.')
+        raise ValueError(f'{name} must be positive, not {shown(value)}.')
     return float(value)
 
 
 def _whole(name: str, value) -> int:
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise TypeError(f'{name} must be a whole number, not {value!r}.')
+        raise TypeError(f'{name} must be a whole number, not {shown(value)}.')
     return int(value)
 
 
 def _number(name: str, value) -> float:
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise TypeError(f'{name} must be a number, not {value!r}.')
-    if not math.isfinite(value):
-        raise ValueError(f'{name} must be finite, not {value!r}.')
+        raise TypeError(f'{name} must be a number, not {shown(value)}.')
+    if not is_number(value):
+        bound = f'at most {MOST:g}' if abs(value) < math.inf else 'finite'
+        raise ValueError(f'{name} must be {bound}, not {shown(value)}.')
     return float(value)
 
 
@@ -730,13 +753,10 @@ def _table(measurements: pd.DataFrame, columns: list[str]) -> dict[str, np.ndarr
     table = _columns(measurements, needed)
     if len(measurements) == 0:
         raise ValueError('The table is empty.')
-    if not np.isfinite(table['t']).all():
-        raise ValueError('Every row needs its time: the column t must be finite.')
+    if np.isnan(table['t']).any():
+        raise ValueError('Every row needs its time: the column t has a NaN.')
     if (np.diff(table['t']) <= 0).any():
         raise ValueError('The times must increase from row to row: sort t, and join equal times.')
-    for name in needed:
-        if np.isinf(table[name]).any():
-            raise ValueError(f'The column {name} must be finite, or NaN where it is silent.')
     if 'vy' in columns:
         silent = np.isnan(table['vx']) & np.isnan(table['vyaw'])
         table['vy'] = np.where(silent, np.nan, 0.0)
@@ -745,20 +765,6 @@ def _table(measurements: pd.DataFrame, columns: list[str]) -> dict[str, np.ndarr
 
 def _columns(table: pd.DataFrame, names: Iterable[str]) -> dict[str, np.ndarray]:
     """Return the columns as arrays of numbers."""
-    if not isinstance(table, pd.DataFrame):
-        raise TypeError(f'A table (pandas.DataFrame) is needed, not {type(table).__name__}.')
     names = list(names)
-    missing = [name for name in names if name not in table.columns]
-    if missing:
-        raise ValueError(f'The table lacks the column(s) {", ".join(missing)}.')
-    arrays = {}
-    for name in names:
-        if isinstance(table[name], pd.DataFrame):
-            raise ValueError(f'The table has the column {name} more than once.')
-        column = table[name].infer_objects()
-        if column.isna().all():
-            column = column.astype(float)
-        if not is_numeric_dtype(column) or is_complex_dtype(column):
-            raise TypeError(f'The column {name} must hold numbers.')
-        arrays[name] = column.to_numpy(float, na_value=np.nan)
-    return arrays
+    check_columns(table, names)
+    return {name: column_of_numbers(table, name) for name in names}

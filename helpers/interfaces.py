@@ -28,6 +28,7 @@ from rosidl_adapter import parser
 
 from helpers.cmake_lists import GENERATE, CMakeLists, CMakeListsError
 from helpers.text import wrap
+from helpers.values import shown
 
 KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
 COMMENTS = ('default', 'all', 'none')
@@ -49,8 +50,8 @@ def show(name: str, comments: str = 'default') -> None:
     Raises TypeError if `name` is no text, and ValueError if there is no such interface or if
     `comments` is none of the three.
     """
-    if comments not in COMMENTS:
-        raise ValueError(f'comments must be one of {", ".join(COMMENTS)}, not {comments!r}.')
+    if not isinstance(comments, str) or comments not in COMMENTS:
+        raise ValueError(f'comments must be one of {", ".join(COMMENTS)}, not {shown(comments)}.')
     print(''.join(_listing(name, comments != 'none', comments == 'all')), end='')
 
 
@@ -63,7 +64,7 @@ def list_interfaces(containing: str = '') -> None:
     Raises TypeError if `containing` is no text.
     """
     if not isinstance(containing, str):
-        raise TypeError(f'containing must be a text, not {containing!r}.')
+        raise TypeError(f'containing must be a text, not {shown(containing)}.')
     names = _names()
     for kind, heading in KINDS.items():
         own = [f'    {name}' for name in names if name.split('/')[1] == kind]
@@ -137,7 +138,8 @@ class Findings(tuple):
         for finding in self:
             lines += wrap(f'[missing] {finding.file}: {finding.missing}', rest=indent)
             lines += wrap(f'Without it: {finding.error}', first=indent, rest=indent)
-        return '\n'.join(lines)
+        # The name of a file need not be UTF-8.
+        return '\n'.join(lines).encode('utf-8', 'backslashreplace').decode()
 
 
 def check_package(path: str | os.PathLike) -> Findings:
@@ -151,9 +153,9 @@ def check_package(path: str | os.PathLike) -> Findings:
     an ament_python package without interfaces.
     """
     if not isinstance(path, (str, os.PathLike)):
-        raise TypeError(f'path must be a folder, not {path!r}.')
+        raise TypeError(f'path must be a folder, not {shown(path)}.')
     folder = Path(path)
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise ValueError(f'There is no folder {str(path)!r}. Give the folder with package.xml.')
     check = _Check(folder)
     findings = Findings(dict.fromkeys(check.findings()))
@@ -177,7 +179,7 @@ def _prefixes() -> list[Path]:
 def _share(package: str) -> Path | None:
     """The share folder of an installed package."""
     for prefix in _prefixes():
-        if (prefix / INDEX / 'packages' / package).is_file():
+        if os.path.isfile(prefix / INDEX / 'packages' / package):
             return prefix / 'share' / package
     return None
 
@@ -207,13 +209,15 @@ def _names() -> list[str]:
 def _find(name: str) -> Path:
     """The file of an interface: .msg, .srv or .action, or else .idl."""
     if not isinstance(name, str):
-        raise TypeError(f'An interface has a name such as "sensor_msgs/msg/Image", not {name!r}.')
+        raise TypeError(
+            f'An interface has a name such as "sensor_msgs/msg/Image", not {shown(name)}.'
+        )
     match = re.fullmatch(r'(\w+)/(msg|srv|action)/(\w+)', name)
     share = match and _share(match[1])
     if share:
         for suffix in (match[2], 'idl'):
             file = share / match[2] / f'{match[3]}.{suffix}'
-            if file.is_file():
+            if os.path.isfile(file):
                 return file
     names = _names()
     if not names:
@@ -350,7 +354,8 @@ class _Check:
         self.manifest: Package | None = None
         self.cmake: CMakeLists | None = None
         self.uses: dict[str, str] = {}  # package of a field's type -> the file that uses it first
-        files = (self._relative(f) for f in folder.glob('*/*') if f.parent.name in KINDS)
+        files = (f for f in folder.glob('*/*') if f.parent.name in KINDS and os.path.isfile(f))
+        files = (self._relative(f) for f in files)
         self.on_disk = sorted(f for f in files if Path(f).suffix == f'.{Path(f).parent}')
 
     def findings(self) -> Iterator[Finding]:
@@ -390,6 +395,9 @@ class _Check:
             text = (self.folder / name).read_bytes()
         except FileNotFoundError:
             yield Finding(name, 'the file itself', 'colcon does not see a ROS package here')
+            return
+        except OSError as error:  # a folder, a link to nothing, ...
+            yield _unreadable(name, error)
             return
         try:
             self.manifest = parse_package_string(text, name, warnings=[])
@@ -456,6 +464,9 @@ class _Check:
         except FileNotFoundError:
             error = 'CMake stops: the source directory "does not appear to contain CMakeLists.txt"'
             yield Finding(name, 'the file itself', error)
+            return
+        except OSError as error:
+            yield _unreadable(name, error)
             return
         try:
             self.cmake = CMakeLists(text)
@@ -536,7 +547,7 @@ class _Check:
                     f'"{GENERATE}() called without any interface files"',
                 )  # fmt: skip
         for file in self._listed():
-            if not (self.folder / file).is_file():
+            if not os.path.isfile(self.folder / file):
                 yield Finding(
                     file, f'the file, which CMakeLists.txt line {first} names',
                     f'"{GENERATE}() the passed file \'{file}\' doesn\'t exist"',
@@ -595,7 +606,7 @@ class _Check:
     def _check_interface(self, file: str) -> Iterator[Finding]:
         path = self.folder / file
         kind, short = Path(file).parent.name, Path(file).stem
-        if path.suffix == '.idl' or not path.is_file():
+        if path.suffix == '.idl' or not os.path.isfile(path):
             return
         if path.suffix != f'.{kind}':
             error = 'it builds, but "ros2 interface list" does not show it'
@@ -653,7 +664,7 @@ class _Check:
         where = self._where(package)
         if not where:
             yield from self._not_found(package)
-        elif not any((where / f'{message}.{suffix}').is_file() for suffix in ('msg', 'idl')):
+        elif not any(os.path.isfile(where / f'{message}.{suffix}') for suffix in ('msg', 'idl')):
             near = _nearest(f'{package}/{message}', [n for n in _names() if '/msg/' in n], 1)
             hint = f'. The nearest is {near[0].replace("/msg/", "/")}' if near else ''
             yield Finding(
@@ -716,6 +727,10 @@ def _unknown(file: str) -> bool:
 
 def _no_file(name: str) -> str:
     return f"FileNotFoundError: [Errno 2] No such file or directory: '.../{name}'"
+
+
+def _unreadable(file: str, error: OSError) -> Finding:
+    return Finding(file, 'a file that can be read', f'{type(error).__name__}: {error.strerror}')
 
 
 def _described(error: Exception) -> str:

@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle
-from numbers import Integral, Real
+from numbers import Integral
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -32,6 +32,14 @@ from matplotlib.ticker import MaxNLocator
 
 from helpers.alt_text import describe
 from helpers.recording import check_table
+from helpers.values import (
+    check_columns,
+    column_of_numbers,
+    column_of_text,
+    column_of_whole_numbers,
+    is_number,
+    shown,
+)
 
 PUBLISHED, HEARD, LOST = '#9aa5ae', '#0072B2', '#D55E00'
 LOST_TEXT = '#9c4300'  # a darker vermillion: letters need more contrast than marks
@@ -55,6 +63,7 @@ SMALL, NORMAL, LARGE = 12, 13, 15  # font sizes in points, readable from the las
 SIZE, WIDE = (9, 4), (11, 4.4)  # inches
 CHARACTER = 0.1 / SIZE[0]  # the width of one in SMALL, a part of the figure's
 DPI = 110
+HIGHEST = 400  # inches; no picture file can be higher than 2**16 pixels
 MOST_SEQ_LABELS, MOST_GAP_LABELS, MOST_BAR_LABELS = 25, 15, 300
 TIME_LABEL = 'time since the first publish (s)'
 
@@ -87,8 +96,10 @@ def before_and_after(
     Raises TypeError or ValueError for a bad table, and ValueError unless there are two labels.
     """
     tables = [check_table(before), check_table(after)]
-    if isinstance(labels, str) or len(labels) != 2:
-        raise ValueError(f'labels must be two names, such as ("before", "after"), not {labels!r}.')
+    if not (isinstance(labels, Sequence) and len(labels) == 2) or isinstance(labels, str):
+        raise ValueError(
+            f'labels must be two names, such as ("before", "after"), not {shown(labels)}.'
+        )
     figure = plt.figure(figsize=WIDE, dpi=DPI, layout='constrained')
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     for ax, table, label in zip(panels, tables, labels, strict=True):
@@ -174,10 +185,10 @@ def queue_length(
     of at least 1.
     """
     table = check_table(table)
-    if isinstance(depth, bool) or not isinstance(depth, Integral) or depth < 1:
-        raise ValueError(f'depth must be a whole number of at least 1, not {depth!r}.')
+    if not (is_number(depth) and isinstance(depth, Integral) and depth >= 1):
+        raise ValueError(f'depth must be a whole number of at least 1, not {shown(depth)}.')
     entered, started = table.published_s.to_numpy(float), table.started_s.to_numpy(float)
-    pushed_out = table.published_s.shift(-depth).to_numpy(float)
+    pushed_out = table.published_s.shift(-min(depth, len(table))).to_numpy(float)
     # A message is taken a little before its callback starts, so a newer one may come in between.
     left = np.fmax(entered, np.fmin(started, pushed_out))
     left = left[~(np.isnan(started) & np.isnan(pushed_out))]  # the others still wait at the end
@@ -223,8 +234,8 @@ def latency(
     Raises TypeError or ValueError for a bad table, and ValueError unless `period_s` is above 0.
     """
     table = check_table(table)
-    if period_s is not None and not (_is_finite(period_s) and period_s > 0):
-        raise ValueError(f'period_s must be a number of seconds above 0, not {period_s!r}.')
+    if period_s is not None:
+        _check_seconds('period_s', period_s)
     heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
 
     ax = _axes(ax)
@@ -273,10 +284,17 @@ def sweep(
 
     Raises ValueError where `results` has no row or no column.
     """
+    check_columns(results, [], 'The results of a sweep')
     if results.empty:
         raise ValueError('The results of a sweep need at least one row and one column.')
+    check_columns(results, results.columns, 'The results of a sweep')
+    results = results.assign(**{name: column_of_numbers(results, name) for name in results})
+    results.index = pd.Index(_numbers(results.index.to_series()), name=results.index.name)
+    if limit is not None and not is_number(limit):
+        raise TypeError(f'limit must be a number, not {shown(limit)}.')
     figure = plt.figure(figsize=WIDE, dpi=DPI, layout='constrained')
     figure.suptitle(title, fontsize=LARGE, x=0.01, ha='left')
+    varied = [f'{value:g}' for value in results.index]
     panels = figure.subplots(1, results.shape[1], squeeze=False)[0]
     for ax, (name, values) in zip(panels, results.items(), strict=True):
         ax.plot(results.index, values, 'o-', color=HEARD, lw=2, ms=8)
@@ -288,7 +306,7 @@ def sweep(
         if limit is not None:
             line = ax.axvline(limit, color=LIMIT, ls='--', lw=1.8, label=limit_label)
             marked = f' A dashed line marks {limit}: {limit_label}.'
-        describe(ax, f'One dot for each of {_list(results.index)}, joined by a line.{marked}')
+        describe(ax, f'One dot for each of {_list(varied)}, joined by a line.{marked}')
     if limit is not None:
         figure.legend(handles=[line], loc='upper right', fontsize=SMALL, frameon=False)
     return figure
@@ -299,8 +317,11 @@ def bars(values: pd.Series, xlabel: str, title: str | None = None) -> Axes:
 
     Raises ValueError where there is nothing to draw.
     """
+    if not isinstance(values, pd.Series):
+        raise TypeError(f'values must be a Series, not {type(values).__name__}.')
     if values.empty:
         raise ValueError('There are no values to draw.')
+    values = pd.Series(_numbers(values), values.index)
     ax = _axes(None, height=1.3 + 0.6 * len(values))
     drawn = ax.barh(values.index.astype(str), values.to_numpy(), color=HEARD, height=0.6)
     texts = [f'{value:.0f}' if value >= 10 else f'{value:.2g}' for value in values]
@@ -321,9 +342,7 @@ def topic_graph(endpoints: pd.DataFrame, title: str | None = None) -> Axes:
 
     Raises ValueError for a missing column, an empty table or an unknown role.
     """
-    missing = {'node', 'role', 'topic', 'type', 'qos'} - set(endpoints.columns)
-    if missing or endpoints.empty:
-        raise ValueError('endpoints needs rows with the columns node, role, topic, type and qos.')
+    endpoints = _checked('endpoints', endpoints, texts=('node', 'role', 'topic', 'type', 'qos'))
     if not endpoints['role'].isin(['publisher', 'subscription']).all():
         raise ValueError("The role of an endpoint is 'publisher' or 'subscription'.")
     publishers = endpoints[endpoints['role'] == 'publisher']
@@ -506,13 +525,15 @@ def path(
 
     Raises TypeError or ValueError for a bad table, and for no or too many estimates.
     """
-    _check_columns('truth', truth, 'x', 'y')
+    truth = _checked('truth', truth, 'x', 'y')
     more = () if ellipses_s is None else ('t', 'var_x', 'cov_x_y', 'var_y')
-    _check_lines('estimate', estimates, 'x', 'y', *more)
+    estimates = _checked_lines('estimate', estimates, 'x', 'y', *more)
     if fixes is not None:
-        _check_columns('fixes', fixes, 'gps_x', 'gps_y')
-    if ellipses_s is not None and not (_is_finite(ellipses_s) and ellipses_s > 0):
-        raise ValueError(f'ellipses_s must be a number of seconds above 0, not {ellipses_s!r}.')
+        fixes = _checked('fixes', fixes, 'gps_x', 'gps_y')
+    if ellipses_s is not None and not (is_number(ellipses_s) and ellipses_s > 0):
+        raise ValueError(
+            f'ellipses_s must be a number of seconds above 0, not {shown(ellipses_s)}.'
+        )
 
     ax = _axes(ax, height=5.6)
     handles = ax.plot(truth.x, truth.y, color=TRUTH, lw=6, label='truth', solid_capstyle='round')
@@ -522,7 +543,7 @@ def path(
     for look, (name, table) in zip(LINE_LOOKS, estimates.items(), strict=False):
         handles += ax.plot(table.x, table.y, lw=1.8, label=name, **look)
         if ellipses_s is not None:
-            for row in table[(table.t // ellipses_s).diff() > 0].itertuples():
+            for row in table[(table.t // ellipses_s).diff() > 0].dropna().itertuples():
                 ax.add_patch(_ellipse(row, look))
     handles += [ax.scatter(truth.x.iloc[0], truth.y.iloc[0], s=70, color=LIMIT, zorder=5,
                            label='start')]  # fmt: skip
@@ -553,7 +574,9 @@ def error(
 
     Raises TypeError or ValueError for a bad table or span, and for no or too many tables.
     """
-    _check_lines('error', errors, 't', 'distance')
+    errors = _checked_lines('error', errors, 't', 'distance')
+    if not isinstance(spans_s, Mapping | None):
+        raise TypeError(f'spans_s must be a dict, not {shown(spans_s)}.')
     spans = {name: _checked_span(span) for name, span in (spans_s or {}).items()}
     ax = _axes(ax)
     handles = []
@@ -583,7 +606,9 @@ def innovation(innovations: pd.DataFrame, title: str | None = None, ax: Axes | N
 
     Raises TypeError or ValueError for a bad table.
     """
-    _check_columns('innovations', innovations, 't', 'innovation', 'sigma', 'accepted')
+    innovations = _checked('innovations', innovations, 't', 'innovation', 'sigma', 'accepted')
+    if not innovations.accepted.isin([0, 1]).all():
+        raise TypeError('The column accepted must hold True or False.')
     accepted = innovations.accepted.to_numpy(bool)
     used, kept_out = innovations[accepted], innovations[~accepted]
     ax = _axes(ax)
@@ -616,7 +641,7 @@ def frame_tree(transforms: pd.DataFrame, title: str | None = None) -> Axes:
     Raises TypeError or ValueError for a bad table, for more than four publishers, and where the
     transforms make no tree: a frame with two parents, two roots, or a circle.
     """
-    _check_columns('transforms', transforms, 'parent', 'child', 'publisher')
+    transforms = _checked('transforms', transforms, texts=('parent', 'child', 'publisher'))
     depths, rows = _tree_layout(transforms)
     publishers = list(dict.fromkeys(transforms.publisher))
     _check_number('publishers', publishers)
@@ -655,21 +680,31 @@ def frame_tree(transforms: pd.DataFrame, title: str | None = None) -> Axes:
     return ax
 
 
-def _check_columns(what: str, table: pd.DataFrame, *columns: str) -> None:
-    """Raise unless `table` is a table that has rows and these columns."""
-    if not isinstance(table, pd.DataFrame):
-        raise TypeError(f'{what} must be a DataFrame, not {type(table).__name__}.')
-    missing = [name for name in columns if name not in table.columns]
-    if missing or table.empty:
-        raise ValueError(f'{what} needs rows with the columns {", ".join(columns)}.')
+def _checked(what: str, table: pd.DataFrame, *numbers: str, texts: Iterable[str] = ()):
+    """Return the columns of a table that has rows, and numbers or text in them, or raise."""
+    check_columns(table, [*numbers, *texts], what)
+    if table.empty:
+        raise ValueError(f'{what} is empty: it needs at least one row.')
+    columns = {name: column_of_numbers(table, name) for name in numbers}
+    return pd.DataFrame(columns | {name: column_of_text(table, name) for name in texts})
 
 
-def _check_lines(what: str, tables: Mapping[str, pd.DataFrame], *columns: str) -> None:
+def _checked_lines(what: str, tables: Mapping[str, pd.DataFrame], *columns: str):
     if not isinstance(tables, Mapping):
         raise TypeError(f'Give each {what} a name: {{"a name": table}}.')
     _check_number(f'{what}s', tables)
-    for name, table in tables.items():
-        _check_columns(f'The {what} {name!r}', table, *columns)
+    return {
+        name: _checked(f'The {what} {name!r}', table, *columns) for name, table in tables.items()
+    }
+
+
+def _check_seconds(name: str, value: float) -> None:
+    if not (is_number(value) and value >= 1e-9):
+        raise ValueError(f'{name} must be a number of seconds above 0, not {shown(value)}.')
+
+
+def _numbers(values: pd.Series) -> np.ndarray:
+    return column_of_numbers(pd.DataFrame({'value': values.to_numpy()}), 'value')
 
 
 def _check_number(what: str, items) -> None:
@@ -731,15 +766,11 @@ def _checked_span(span_s: tuple[float, float]) -> tuple[float, float]:
         first, last = span_s
     except (TypeError, ValueError):
         first = last = None
-    if not (_is_finite(first) and _is_finite(last) and first < last):
+    if not (is_number(first) and is_number(last) and first < last):
         raise ValueError(
-            f'span_s must be two times in seconds, the earlier one first, not {span_s!r}.'
+            f'span_s must be two times in seconds, the earlier one first, not {shown(span_s)}.'
         )
     return first, last
-
-
-def _is_finite(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def _natural(name: str) -> list:
@@ -783,6 +814,8 @@ def _overlap_in_words(bars: pd.DataFrame) -> str:
 def _axes(ax: Axes | None, height: float = SIZE[1]) -> Axes:
     if ax is not None:
         return ax
+    if height > HIGHEST:
+        raise ValueError('This is too much for one picture: draw a part of it.')
     figure = plt.figure(figsize=(SIZE[0], height), dpi=DPI, layout='constrained')
     return figure.add_subplot()
 
@@ -913,21 +946,16 @@ def _label_bars(ax: Axes, bars: pd.DataFrame, lane: Mapping[str, int]) -> None:
 
 def _checked_tree(table: pd.DataFrame) -> pd.DataFrame:
     """Return the tree as it is meant, or raise."""
-    columns = ['depth', 'field', 'type', 'package', 'array']
-    if not isinstance(table, pd.DataFrame):
-        raise TypeError(f'The tree must be a DataFrame, not {type(table).__name__}.')
-    if list(table.columns) != columns:
-        raise ValueError(
-            f'The tree must have the columns {", ".join(columns)}, as interfaces.dependencies '
-            f'returns them, not {", ".join(map(str, table.columns))}.'
-        )
+    texts = ('field', 'type', 'package', 'array')
+    table = _checked('The tree', table, 'depth', texts=texts)
+    table['depth'] = column_of_whole_numbers(table, 'depth')
     depth = table.depth.to_numpy()
-    if not len(depth) or depth[0] != 0 or (depth[1:] < 1).any() or (np.diff(depth) > 1).any():
+    if depth[0] != 0 or (depth[1:] < 1).any() or (np.diff(depth) > 1).any():
         raise ValueError(
             'The tree must start with the interface at depth 0, and each row may be at most one '
             'deeper than the row above it.'
         )
-    return table.reset_index(drop=True)
+    return table
 
 
 def _say(ax: Axes, text: str) -> None:

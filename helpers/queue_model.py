@@ -19,10 +19,12 @@ import numpy as np
 import pandas as pd
 
 from helpers.recording import COLUMNS, check_table
+from helpers.values import MOST, shown
 
 # A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
 # long as callbacks and timers of the same run were late.
 REST = 0.4
+MOST_MESSAGES = 10**7  # a prediction of more does not fit into the memory of a small machine
 
 
 def predict(
@@ -43,6 +45,10 @@ def predict(
         _count(name, value)
         for name, value in (('depth', depth), ('threads', threads), ('messages', messages))
     )
+    if messages * (period + callback) >= 2**63:
+        raise ValueError('This run would take longer than 292 years: choose less of something.')
+    if messages > MOST_MESSAGES:
+        raise ValueError(f'messages must be at most {MOST_MESSAGES}, not {messages}.')
     taken, started = [], []
     oldest = 0
     while oldest < messages:
@@ -124,6 +130,8 @@ def explain(table: pd.DataFrame, depth: int, threads: int, delay_s: float = 0.0)
     table = check_table(table)
     depth, threads = _count('depth', depth), _count('threads', threads)
     delay_s = _nanoseconds('delay_s', delay_s, zero_allowed=True) / 1e9
+    # A queue for more messages than there are never overflows, and more workers find nothing to do.
+    named_depth, depth, threads = depth, min(depth, len(table)), min(threads, len(table))
     heard = table[table['started_s'].notna()]
     contradictions = _impossible_rows(table)
     # A callback that was still running when the record ended has not finished.
@@ -139,7 +147,8 @@ def explain(table: pd.DataFrame, depth: int, threads: int, delay_s: float = 0.0)
     losses = _losses(table, depth)
     for seq in losses.loc[losses['pushed_out_by'].isna(), 'seq']:
         contradictions.append(
-            f'Message {seq} was never heard, and fewer than {depth} newer ones came to push it out.'
+            f'Message {seq} was never heard, and fewer than {named_depth} newer ones came to push '
+            'it out.'
         )
     return Explanation(len(table), losses, contradictions)
 
@@ -237,15 +246,7 @@ def _rests(
     total = np.cumsum(pushed_out - arrived)
     edges = np.column_stack([arrived, pushed_out]).ravel()
     waited = np.column_stack([total - (pushed_out - arrived), total]).ravel()
-    # From when to when was a worker free? Before the first callback nothing is known.
-    times = np.concatenate([heard['started_s'], heard['finished_s']])
-    change = np.repeat([1, -1], len(heard))
-    order = np.lexsort([change, times])
-    free = np.cumsum(change[order]) < threads
-    flips = times[order][np.flatnonzero(np.diff(free, prepend=False))]
-    starts, ends = flips[::2], flips[1::2]
-    # A worker that stays free to the end, perhaps one that never worked at all.
-    ends = np.append(ends, times[order][-1])[: len(starts)]
+    starts, ends = _pauses(heard, threads, until=published[-1])
     rested = np.interp(ends, edges, waited) - np.interp(starts, edges, waited)
     allowed = REST * callbacks.median() + np.ptp(callbacks) + np.ptp(periods) + delay_s
     return [
@@ -255,6 +256,22 @@ def _rests(
     ]
 
 
+def _pauses(heard: pd.DataFrame, threads: int, until: float) -> tuple[np.ndarray, np.ndarray]:
+    """From when to when each worker was free. Before the first callback nothing is known."""
+    ordered = heard.sort_values(['started_s', 'seq'])
+    # A worker is a thread; those of an exclusive group are more, and work one after the other.
+    worker = ordered['thread'].to_numpy()
+    if ordered['thread'].nunique() > threads:
+        worker = np.arange(len(ordered)) % threads
+    finished = ordered['finished_s'].groupby(worker)
+    first = ordered['started_s'].iloc[0]
+    starts = [*finished.shift(fill_value=first), *finished.last()]
+    ends = [*ordered['started_s'], *[until] * len(finished)]
+    if len(finished) < threads:  # one that never worked
+        starts, ends = [*starts, first], [*ends, until]
+    return np.array(starts), np.maximum(starts, ends)
+
+
 def _regular(durations: pd.Series) -> bool:
     """Whether all durations are alike. If not, a late worker proves nothing."""
     return len(durations) > 0 and durations.max() <= 2 * durations.median()
@@ -262,19 +279,21 @@ def _regular(durations: pd.Series) -> bool:
 
 def _count(name: str, value: int) -> int:
     if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise TypeError(f'{name} must be a whole number from 1 up, not {value!r}.')
+        raise TypeError(f'{name} must be a whole number from 1 up, not {shown(value)}.')
     if value < 1:
-        raise ValueError(f'{name} must be a whole number from 1 up, not {value!r}.')
+        raise ValueError(f'{name} must be a whole number from 1 up, not {shown(value)}.')
     return int(value)
 
 
 def _nanoseconds(name: str, value: float, zero_allowed: bool = False) -> int:
     least = 'zero or more' if zero_allowed else 'more than zero'
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise TypeError(f'{name} must be a number of seconds, {least}, not {value!r}.')
-    if not math.isfinite(value) or value < 0 or (value == 0 and not zero_allowed):
-        raise ValueError(f'{name} must be a number of seconds, {least}, not {value!r}.')
-    nanoseconds = round(value * 1e9)
+        raise TypeError(f'{name} must be a number of seconds, {least}, not {shown(value)}.')
+    if not (value > 0 or (value == 0 and zero_allowed)) or value == math.inf:
+        raise ValueError(f'{name} must be a number of seconds, {least}, not {shown(value)}.')
+    if value > MOST:
+        raise ValueError(f'{name} must be at most {MOST:g} seconds, not {shown(value)}.')
+    nanoseconds = round(float(value) * 1e9)
     if nanoseconds == 0 and value > 0:
-        raise ValueError(f'{name} must be at least one nanosecond, not {value!r}.')
+        raise ValueError(f'{name} must be at least one nanosecond, not {shown(value)}.')
     return nanoseconds

@@ -11,6 +11,8 @@ from collections.abc import Callable
 
 import pandas as pd
 
+from helpers.values import check_columns, column_of_numbers, column_of_whole_numbers
+
 COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']
 
 
@@ -237,21 +239,23 @@ def check_table(table: pd.DataFrame) -> pd.DataFrame:
 
     Raises TypeError or ValueError, with one clear sentence, where `table` is not a recording.
     """
-    if not isinstance(table, pd.DataFrame):
-        raise TypeError(f'A table of messages is needed (a DataFrame), not {type(table).__name__}.')
-    columns = list(table.columns)
-    missing = [name for name in COLUMNS if name not in columns]
-    if missing:
-        raise ValueError(f'The table lacks the column(s) {", ".join(missing)}.')
-    duplicate = [name for name in COLUMNS if columns.count(name) > 1]
-    if duplicate:
-        raise ValueError(f'The table has the column(s) {", ".join(duplicate)} more than once.')
+    check_columns(table, COLUMNS)
     if table.empty:
         raise ValueError('The table is empty: record at least one message.')
+    times = {name: column_of_numbers(table, name) for name in COLUMNS[1:4]}
+    seq = column_of_whole_numbers(table, 'seq')
+    thread = table['thread'].astype(object)
+    thread = thread.map(str).where(thread.notna(), None)
+    table = table.assign(seq=seq, thread=thread, **times)
     twice = table.loc[table['seq'].duplicated(), 'seq']
     if len(twice):
         raise ValueError(f'The message {twice.iloc[0]} has more than one row.')
     if table['published_s'].isna().any():
         unknown = table.loc[table['published_s'].isna(), 'seq'].iloc[0]
         raise ValueError(f'It is not known when message {unknown} was published.')
+    unknown = table.loc[table['started_s'].notna() & table['thread'].isna(), 'seq']
+    if len(unknown):
+        raise ValueError(
+            f'It is not known which thread ran the callback of message {unknown.iloc[0]}.'
+        )
     return table.sort_values('seq', ignore_index=True)

@@ -804,8 +804,8 @@ def table(**columns):
 @pytest.mark.parametrize(
     ('measurements', 'error', 'said'),
     [
-        (None, TypeError, 'A table (pandas.DataFrame) is needed, not NoneType.'),
-        ({'t': [0]}, TypeError, 'A table (pandas.DataFrame) is needed, not dict.'),
+        (None, TypeError, 'The table must be a DataFrame, not NoneType.'),
+        ({'t': [0]}, TypeError, 'The table must be a DataFrame, not dict.'),
         (lambda: table()[:0], ValueError, 'The table is empty.'),
         (
             lambda: table().drop(columns=['t', 'ax']),
@@ -815,7 +815,7 @@ def table(**columns):
         (
             lambda: pd.concat([table(), table()['vx']], axis=1),
             ValueError,
-            'The table has the column vx more than once.',
+            'The table has the column(s) vx more than once.',
         ),
         (lambda: table(vx='fast'), TypeError, 'The column vx must hold numbers.'),
         (lambda: table(vx=[[1]] * 5), TypeError, 'The column vx must hold numbers.'),
@@ -828,7 +828,7 @@ def table(**columns):
         (
             lambda: table(t=[0, 0.1, np.nan, 0.2, 0.3]),
             ValueError,
-            'Every row needs its time: the column t must be finite.',
+            'Every row needs its time: the column t has a NaN.',
         ),
         (
             lambda: table(t=[0, 0.2, 0.1, 0.3, 0.4]),
@@ -843,7 +843,7 @@ def table(**columns):
         (
             lambda: table(ax=[0, 1, np.inf, 1, 1]),
             ValueError,
-            'The column ax must be finite, or NaN where it is silent.',
+            'The column ax must be finite, or NaN where it has no value.',
         ),
         (
             lambda: table(**dict.fromkeys(table().columns.drop('t'), np.nan)),
@@ -853,7 +853,7 @@ def table(**columns):
         (
             lambda: table(**dict.fromkeys(table().columns, np.nan)),
             ValueError,
-            'Every row needs its time: the column t must be finite.',
+            'Every row needs its time: the column t has a NaN.',
         ),
     ],
 )
@@ -995,7 +995,7 @@ def test_bad_truth_and_names():
         nees(estimate, truth, ('vx',))
     with pytest.raises(ValueError, match=r'^The covariance of each row must be positive definite'):
         nees(estimate.assign(var_x=0.0, cov_x_y=0.0), truth)
-    with pytest.raises(TypeError, match=r'^A table \(pandas\.DataFrame\) is needed, not dict\.$'):
+    with pytest.raises(TypeError, match=r'^The table must be a DataFrame, not dict\.$'):
         rmse({}, truth)
     for bad in ({'dof': 0}, {'dof': 2, 'runs': -1}, {'dof': 2, 'probability': 1}):
         with pytest.raises(ValueError, match='must be'):

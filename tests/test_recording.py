@@ -299,8 +299,8 @@ GOOD = pd.DataFrame(
 @pytest.mark.parametrize(
     ('table', 'error', 'said'),
     [
-        (None, TypeError, 'A table of messages is needed (a DataFrame), not NoneType.'),
-        ([1, 2], TypeError, 'A table of messages is needed (a DataFrame), not list.'),
+        (None, TypeError, 'The table must be a DataFrame, not NoneType.'),
+        ([1, 2], TypeError, 'The table must be a DataFrame, not list.'),
         (GOOD.drop(columns=['seq']), ValueError, 'The table lacks the column(s) seq.'),
         (
             GOOD.drop(columns=['started_s', 'thread']),
