@@ -179,6 +179,20 @@ def test_little_shared_memory_is_reported(monkeypatch):
     assert '--shm-size' in doctor.check_shared_memory().to_do
 
 
+def test_shared_memory_that_cannot_be_written_is_reported(monkeypatch):
+    monkeypatch.setattr(doctor, 'SHARED_MEMORY', Path('/proc/self'))
+    assert 'cannot be written' in doctor.check_shared_memory().found
+    assert not doctor.check_shared_memory().required
+
+
+def test_a_bus_error_means_that_shared_memory_is_full():
+    code = 'import os, signal; os.kill(os.getpid(), signal.SIGBUS)'
+    trial = doctor._run([sys.executable, '-c', code])
+    found, to_do = doctor._why_import_failed(trial)
+    assert found == 'ended with a bus error'
+    assert to_do.startswith('/dev/shm is full: run')
+
+
 def test_a_compiler_without_its_library_is_reported(monkeypatch, tmp_path):
     compiler = tmp_path / 'c++'
     compiler.write_text('#!/bin/sh\necho "fatal error: string: No such file" >&2\nexit 1\n')
