@@ -55,7 +55,7 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
     with tempfile.TemporaryDirectory(prefix='soak-', ignore_cleanup_errors=True) as name:
         folder = Path(name)
         own = [folder / 'home', folder / 'tmp']
-        for empty in own:
+        for empty in (*own, folder / 'jupyter'):
             empty.mkdir()
         python, before = condition.python(), condition.before(folder)
         report = folder / 'report.jsonl'
