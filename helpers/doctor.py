@@ -114,7 +114,7 @@ def check_message() -> Check:
     from rclpy.task import Future
     from std_msgs.msg import String
 
-    from helpers.session import reserve_domain_id
+    from helpers.session import destroy_nodes, reserve_domain_id
 
     name = 'one message to itself'
     try:
@@ -138,8 +138,8 @@ def check_message() -> Check:
             executor.spin_until_future_complete(heard, timeout_sec=MESSAGE_TIMEOUT_S)
             took_ms = (time.monotonic() - started) * 1000
             executor.shutdown()
-            node.destroy_node()
-        finally:
+        finally:  # also when the cell is interrupted
+            destroy_nodes(context)
             context.try_shutdown()
     except Exception as error:  # whatever the RMW raises is what was found
         return Check(name, _last_line(str(error)), 'see "Trouble" in environment.md')

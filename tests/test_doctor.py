@@ -14,6 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from helpers import doctor
 from helpers.session import ros_session
+from tools.soak.leftovers import left_in_process, state_of_process
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -110,6 +111,17 @@ def test_the_message_leaves_an_open_session_as_it_is():
         assert 'doctor' not in names
     assert doctor.check_message().to_do == ''
     assert not rclpy.ok()
+
+
+def test_an_interrupted_message_leaves_nothing(monkeypatch):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(SingleThreadedExecutor, 'spin_until_future_complete', interrupted)
+    before = state_of_process()
+    with pytest.raises(KeyboardInterrupt):
+        doctor.check_message()
+    assert left_in_process(before, state_of_process()) == []
 
 
 def test_what_the_middleware_raises_is_reported(monkeypatch):

@@ -24,6 +24,7 @@ from std_msgs.msg import String
 
 from helpers import session as module
 from helpers.session import configure_discovery, current_session, reserve_domain_id, ros_session
+from tools.soak.leftovers import left_in_process, state_of_process
 
 EXECUTORS = pytest.mark.parametrize('threads', [1, 3], ids=['single', 'multi'])
 
@@ -863,9 +864,11 @@ def test_interrupt_of_close(thing, name, monkeypatch):
     ],
 )
 def test_interrupt_of_open(thing, name, monkeypatch):
+    before = state_of_process()
     with pytest.raises(KeyboardInterrupt):
         interrupt_once(monkeypatch, thing, name)
         ros_session().open()
+    assert left_in_process(before, state_of_process()) == []
     talk()
 
 
