@@ -92,3 +92,5 @@ export JUPYTER_DATA_DIR := $(CURDIR)/.jupyter/data
 export JUPYTER_RUNTIME_DIR := $(CURDIR)/.jupyter/runtime
 export IPYTHONDIR := $(CURDIR)/.jupyter/ipython
 export ROS_LOG_DIR := $(CURDIR)/.jupyter/ros_log
+# Its list of fonts. In a home that cannot be written each kernel would make it anew, and warn.
+export MPLCONFIGDIR := $(CURDIR)/.jupyter/matplotlib

@@ -19,6 +19,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import thread as thread_pool
 from dataclasses import dataclass
+from traceback import clear_frames
 
 from helpers.progress import ProgressBar
 
@@ -151,7 +152,8 @@ class Session:
         _open_session = self
         try:
             self._initialise(domain_id)
-        except BaseException:  # interrupted: nobody will close it
+        except BaseException as failure:  # interrupted: nobody will close it
+            clear_frames(failure.__traceback__)
             self._clean_up()
             raise
         return self
@@ -181,6 +183,9 @@ class Session:
 
     def __exit__(self, exception_type, exception, traceback) -> None:
         __tracebackhide__ = True
+        if isinstance(exception, KeyboardInterrupt):
+            # What was half made is in the frames alone, and the traceback keeps them.
+            clear_frames(traceback)
         try:
             self.close()
         except BaseException as failure:
@@ -435,9 +440,15 @@ class Session:
 def destroy_nodes(context: rclpy.Context) -> None:
     """Destroy all nodes of a context, also those that nobody knows any more."""
     for node in _find(Node, context):
-        # A node whose __init__ failed has only some of its parts.
-        with contextlib.suppress(Exception):
-            node.destroy_node()
+        for destroy in (
+            node.destroy_node,
+            lambda node=node: Node.destroy_node(node),  # past a mistake in an own destroy_node
+            # A node whose __init__ failed or was interrupted has only some of its parts:
+            # destroy_node misses one before it comes to the handle.
+            lambda node=node: node.handle.destroy_when_not_in_use(),
+        ):
+            with contextlib.suppress(Exception):
+                destroy()
 
 
 def _find(kind: type, context: rclpy.Context) -> Iterator:

@@ -39,7 +39,7 @@ from tools.soak.leftovers import MARK, Watch, processes_of
 RUNS = CACHE / 'runs.jsonl'
 RUN_TIMEOUT_S = 1800.0
 DOCTOR_TIMEOUT_S = 60.0
-LONGEST_TEXT = 600
+LONGEST_TEXT = 1600
 
 
 # --- One run -------------------------------------------------------------------------------------
@@ -77,7 +77,7 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
         left = watch.left(facts.get('domain_ids', {}), set(facts.get('killed_held', ())))
         failures = [[row['item'], row['failed']] for row in rows if row['failed']]
         if status and not failures:
-            failures = [['no cell', f'pytest ended with {status}: {printed[-LONGEST_TEXT:]}']]
+            failures = [['no cell', f'pytest ended with {status}: {printed}']]
         if left:
             failures.append(['after the run', ' '.join(left)])
         if failures and condition.sentence:
@@ -100,7 +100,7 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """Return the variables that give a run a home, a temporary folder and a Jupyter of its own."""
+    """Return what gives a run a home, a temporary folder and a Jupyter of its own."""
     return {
         'HOME': str(folder / 'home'),
         'TMPDIR': str(folder / 'tmp'),
@@ -236,7 +236,7 @@ def table(records: list[dict]) -> str:
             (notebook, len(of_notebook), len(failed), f'{slowest_s:.1f} s, {slowest}', first)
         )
         if failed:
-            texts += ['', f'{notebook}, {_line(failed[0])}', failed[0]['failed'][1]]
+            texts += ['', _line(failed[0]), _short(failed[0]['failed'][1])]
     widths = [max(len(str(row[column])) for row in rows) for column in range(5)]
     lines = [
         '  '.join(str(word).ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
@@ -246,6 +246,15 @@ def table(records: list[dict]) -> str:
     failures = Counter(record['condition'] for record in records if record['failed'])
     conditions = [f'{name} {failures[name]} of {runs[name]}' for name in runs]
     return '\n'.join([*lines, '', f'Failures by condition: {", ".join(conditions)}.', *texts])
+
+
+def _short(text: str) -> str:
+    """Return the beginning and the end of a long text: all of it is in the file of runs."""
+    return (
+        text
+        if len(text) <= LONGEST_TEXT
+        else f'{text[: LONGEST_TEXT // 2]}\n...\n{text[-LONGEST_TEXT // 2 :]}'
+    )
 
 
 def _line(record: dict) -> str:

@@ -14,10 +14,8 @@ line of JSON for each cell goes to the file `--soak-report`.
 from __future__ import annotations
 
 import json
-import os
 import random
 import re
-import signal
 import time
 from contextlib import suppress
 from itertools import groupby
@@ -43,6 +41,8 @@ OUTPUT_TIMEOUT_S = 10.0
 REPLY_TIMEOUT_S = 2.0  # it was sent before the kernel became idle
 # From the second try on, the check of an exercise also prints hints. A fresh run has none.
 HINTS = re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE)
+
+COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -72,9 +72,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 @pytest.hookimpl(trylast=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
     """Look at a kernel before its first cell."""
-    kernel = item.parent.kernel
-    if not hasattr(kernel, 'soak_before'):
-        kernel.soak_before = state_of(kernel)
+    look_at(item.parent.kernel)
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -94,7 +92,7 @@ class _Report:
             row = {
                 'item': _item(report.nodeid.rpartition('::')[2]),
                 'seconds': report.duration,
-                'failed': report.longreprtext if report.failed else None,
+                'failed': COLOURS.sub('', report.longreprtext) if report.failed else None,
             }
             with self.file.open('a', encoding='utf-8') as file:
                 print(json.dumps(row | dict(report.user_properties)), file=file)
@@ -124,6 +122,27 @@ def state_of(kernel: RunningKernel) -> dict:
             text += answer['content']['text']
         if answer['content'].get('execution_state') == 'idle':
             return json.loads(text)
+
+
+def look_at(kernel: RunningKernel) -> None:
+    """Note what a new kernel has."""
+    if not hasattr(kernel, 'soak_before'):
+        kernel.soak_before = state_of(kernel)
+
+
+def run_to(file: IPyNbFile, end: int) -> None:
+    """Run the first `end` code cells of a notebook."""
+    cells = [cell for cell in file.nb.cells if cell.cell_type == 'code']
+    for cell in cells[:end]:
+        message = file.kernel.execute_cell_input(cell.source, allow_stdin=False)
+        await_reply(file.kernel, message, file.config.option.nbval_cell_timeout)
+
+
+def restart(file: IPyNbFile) -> None:
+    """Give a notebook a fresh kernel."""
+    file.kernel.stop()
+    file.setup()
+    look_at(file.kernel)
 
 
 def await_reply(kernel: RunningKernel, message: str, timeout_s: float) -> dict:
@@ -163,21 +182,23 @@ class Interrupted(Again):
         """Run the cell, interrupt it, look what it left, then run it as nbval does."""
         kernel, after_s = self.parent.kernel, random_time_s(chance_of(self))
         message = kernel.execute_cell_input(self.cell.source, allow_stdin=False)
+        traceback = None
         try:
             await_reply(kernel, message, after_s)
         except Empty:
             self.user_properties.append(('interrupted_after_s', after_s))
             kernel.interrupt()
-            self._end(message, after_s)
+            traceback = self._end(message, after_s)
+        kernel = self.parent.kernel
         left = left_in_process(kernel.soak_before, state_of(kernel))
         if left:
-            self.raise_cell_error(f'Run for {after_s:.3f} s. {" ".join(left)}')
+            self.raise_cell_error(f'Run for {after_s:.3f} s. {" ".join(left)}', traceback)
         started = time.monotonic()
         super().runtest()
         self.user_properties.append(('seconds', time.monotonic() - started))
 
-    def _end(self, message: str, after_s: float) -> None:
-        """Wait for the end of the interrupted cell."""
+    def _end(self, message: str, after_s: float) -> str | None:
+        """Wait for the end of the interrupted cell and return its traceback."""
         kernel, start = self.parent.kernel, f'Interrupted after {after_s:.3f} s, it'
         try:
             kernel.await_idle(message, INTERRUPTED_TIMEOUT_S)
@@ -189,10 +210,18 @@ class Interrupted(Again):
             # The signal met ipykernel beside the code of the cell: it then sends no reply, and
             # JupyterLab shows the cell as running until another one runs.
             self.user_properties.append(('no_reply', True))
-            return
-        if reply['status'] == 'error' and reply['ename'] != 'KeyboardInterrupt':
-            told = f'{start} raised {reply["ename"]}: {reply["evalue"]}'
-            self.raise_cell_error(told, traceback='\n'.join(reply['traceback']))
+            return None
+        if reply['status'] != 'error':
+            return None
+        traceback = '\n'.join(reply['traceback'])
+        if '<frozen importlib' in traceback:
+            # Python cannot repeat a half-done import of NumPy: environment.md says to restart.
+            self.user_properties.append(('import_interrupted', True))
+            restart(self.parent)
+            run_to(self.parent, self.cell_num)
+        elif reply['ename'] != 'KeyboardInterrupt':
+            self.raise_cell_error(f'{start} raised {reply["ename"]}: {reply["evalue"]}', traceback)
+        return traceback
 
 
 class _OfNotebook(pytest.Item):
@@ -220,9 +249,7 @@ class Killed(_OfNotebook):
         """Run the cells up to a random one, kill the kernel in it, and start a fresh kernel."""
         chance, kernel = chance_of(self), self.parent.kernel
         last, after_s = chance.randrange(len(self.cells)), random_time_s(chance)
-        for cell in self.cells[:last]:
-            message = kernel.execute_cell_input(cell.cell.source, allow_stdin=False)
-            await_reply(kernel, message, self.config.option.nbval_cell_timeout)
+        run_to(self.parent, last)
         message = kernel.execute_cell_input(self.cells[last].cell.source, allow_stdin=False)
         with suppress(Empty):  # it is in the middle
             await_reply(kernel, message, after_s)
@@ -234,9 +261,8 @@ class Killed(_OfNotebook):
             ('killed_after_s', after_s),
             ('killed_held', sorted(held_by(family))),
         ]
-        os.kill(process.pid, signal.SIGKILL)
-        kernel.stop()
-        self.parent.setup()
+        process.kill()
+        restart(self.parent)
 
 
 class NothingLeft(_OfNotebook):
