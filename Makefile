@@ -32,6 +32,11 @@ notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
 slides: set_up ## write the lessons as HTML slides into slides/, which need no network; LESSON=02 for one
 	@$(PYTHON) tools/export_slides.py $(if $(LESSON),--lesson "$(LESSON)")
 
+soak: set_up ## run the notebooks in hard conditions: N=10 times, CONDITIONS=idle,busy LESSON=02 MINUTES=8 SEED=7; REPORT=yes
+	@$(PYTHON) -m tools.soak $(if $(N),--rounds "$(N)") $(if $(CONDITIONS),--conditions "$(CONDITIONS)") \
+		$(if $(LESSON),--lesson "$(LESSON)") $(if $(MINUTES),--minutes "$(MINUTES)") \
+		$(if $(SEED),--seed "$(SEED)") $(if $(filter yes,$(REPORT)),--report)
+
 bench: set_up ## measure how much faster two computing threads are than one; needs an idle machine
 	@$(PYTHON) -m benchmarks.two_threads
 
@@ -42,13 +47,13 @@ lock: set_up ## write requirements.lock from pyproject.toml; UPGRADE=yes takes n
 	@tools/lock.sh .venv/bin/uv $(if $(filter yes,$(UPGRADE)),--upgrade)
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built
-	rm -rf .venv .jupyter scratch slides .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv .jupyter .soak scratch slides .hypothesis .pytest_cache .ruff_cache
 	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-browser hub test-hub notebooks slides bench lint lock clean set_up
+.PHONY: help lab present test test-browser hub test-hub notebooks slides soak bench lint lock clean set_up
 
 PYTHON := .venv/bin/python
 
@@ -87,3 +92,5 @@ export JUPYTER_DATA_DIR := $(CURDIR)/.jupyter/data
 export JUPYTER_RUNTIME_DIR := $(CURDIR)/.jupyter/runtime
 export IPYTHONDIR := $(CURDIR)/.jupyter/ipython
 export ROS_LOG_DIR := $(CURDIR)/.jupyter/ros_log
+# Its list of fonts. In a home that cannot be written each kernel would make it anew, and warn.
+export MPLCONFIGDIR := $(CURDIR)/.jupyter/matplotlib

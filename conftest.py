@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from functools import partial
 from itertools import count
 from pathlib import Path
 
@@ -23,21 +24,21 @@ settings.register_profile('explore', deadline=None, print_blob=True, max_example
 settings.load_profile('same')
 
 
-@pytest.fixture(scope='session', autouse=True)
-def kernels_without_ports():
+def pytest_configure(config: pytest.Config) -> None:
     """Let kernels talk over socket files.
 
     jupyter_client chooses free TCP ports, closes them, and the kernel opens them again later. When
     several workers start kernels at once, two may choose the same port, and one kernel never
     answers. The folder is a short one, because the path of a socket file is limited to 107 bytes.
+    A fixture would not do: pytest sets none up for the cells of a notebook.
     """
-    with tempfile.TemporaryDirectory(prefix='kernels-') as folder:
-        number = count()
+    folder = tempfile.TemporaryDirectory(prefix='kernels-')
+    config.add_cleanup(folder.cleanup)
+    number = count()
 
-        def kernel_manager(**options) -> KernelManager:
-            file = Path(folder, f'{next(number)}.json')
-            return KernelManager(transport='ipc', connection_file=str(file), **options)
+    def kernel_manager(**options) -> KernelManager:
+        file = Path(folder.name, f'{next(number)}.json')
+        return KernelManager(transport='ipc', connection_file=str(file), **options)
 
-        original, nbval.kernel.KernelManager = nbval.kernel.KernelManager, kernel_manager
-        yield
-        nbval.kernel.KernelManager = original
+    config.add_cleanup(partial(setattr, nbval.kernel, 'KernelManager', nbval.kernel.KernelManager))
+    nbval.kernel.KernelManager = kernel_manager

@@ -12,6 +12,7 @@ import os
 import platform
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import sysconfig
@@ -113,7 +114,7 @@ def check_message() -> Check:
     from rclpy.task import Future
     from std_msgs.msg import String
 
-    from helpers.session import reserve_domain_id
+    from helpers.session import destroy_nodes, reserve_domain_id
 
     name = 'one message to itself'
     try:
@@ -137,8 +138,8 @@ def check_message() -> Check:
             executor.spin_until_future_complete(heard, timeout_sec=MESSAGE_TIMEOUT_S)
             took_ms = (time.monotonic() - started) * 1000
             executor.shutdown()
-            node.destroy_node()
-        finally:
+        finally:  # also when the cell is interrupted
+            destroy_nodes(context)
             context.try_shutdown()
     except Exception as error:  # whatever the RMW raises is what was found
         return Check(name, _last_line(str(error)), 'see "Trouble" in environment.md')
@@ -157,12 +158,24 @@ def check_shared_memory() -> Check:
     if not SHARED_MEMORY.is_dir():
         return Check(name, f'no {SHARED_MEMORY} on this system', required=False)
     free = shutil.disk_usage(SHARED_MEMORY).free
-    to_do = (
-        ''
-        if free >= ENOUGH_SHARED_MEMORY_BYTES
-        else f'remove files from {SHARED_MEMORY}, or start the container with --shm-size=256m'
+    found, to_do = f'{free / 2**20:,.0f} MiB free', ''
+    if not os.access(SHARED_MEMORY, os.W_OK):
+        found = f'{SHARED_MEMORY} cannot be written'
+        to_do = f'let {SHARED_MEMORY} be written; until then Fast DDS uses UDP'
+    elif free < ENOUGH_SHARED_MEMORY_BYTES:
+        to_do = _more_shared_memory()
+    return Check(name, found, to_do, required=False)
+
+
+def _more_shared_memory() -> str:
+    return (
+        f'run `{_fastdds()} shm clean`, remove files from {SHARED_MEMORY}, or start the container '
+        'with --shm-size=256m'
     )
-    return Check(name, f'{free / 2**20:,.0f} MiB free', to_do, required=False)
+
+
+def _fastdds() -> str:
+    return '.venv/bin/fastdds' if _in_wheels('fastdds') else 'fastdds'
 
 
 def stale_segments() -> list[Path]:
@@ -197,11 +210,10 @@ def check_stale_segments() -> Check:
             size += path.stat().st_size
         except FileNotFoundError:  # somebody cleaned up meanwhile
             continue
-    command = 'fastdds' if not _in_wheels('fastdds') else '.venv/bin/fastdds'
     return Check(
         'left by dead processes',
         f'{len(stale)} Fast DDS files, {size / 2**20:.1f} MiB',
-        f'run `{command} shm clean`' if stale else '',
+        f'run `{_fastdds()} shm clean`' if stale else '',
         required=False,
     )
 
@@ -351,6 +363,9 @@ def _table(rows: list[Check]) -> str:
 
 def _why_import_failed(trial: subprocess.CompletedProcess[str]) -> tuple[str, str]:
     """Return what a failed import of rclpy said, in short, and what to do."""
+    if trial.returncode == -signal.SIGBUS:
+        # LTTng, which rclpy is linked with, maps a page of shared memory when it is loaded.
+        return 'ended with a bus error', f'{SHARED_MEMORY} is full: {_more_shared_memory()}'
     told = re.search(
         r"No module named '\S+'|\S+: cannot open shared object file|undefined symbol: \S+"
         r"|RMW implementation identifier of '\S+'",

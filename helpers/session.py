@@ -19,6 +19,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from concurrent.futures import thread as thread_pool
 from dataclasses import dataclass
+from traceback import clear_frames
 
 from helpers.progress_bar import ProgressBar
 
@@ -147,6 +148,17 @@ class Session:
         else:
             domain_id = self._shared.enter_context(share_domain_id(self._domain_id))
         configure_discovery(self._discovery)
+        self._context = rclpy.get_default_context()
+        _open_session = self
+        try:
+            self._initialise(domain_id)
+        except BaseException as failure:  # interrupted: nobody will close it
+            clear_frames(failure.__traceback__)
+            self._clean_up()
+            raise
+        return self
+
+    def _initialise(self, domain_id: int) -> None:
         rclpy.init(
             # The log goes to /rosout only: the console would show it again, and a file would need
             # a home that can be written.
@@ -155,8 +167,6 @@ class Session:
             # rclpy's own handlers would shut the context down when the notebook is interrupted.
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        self._context = rclpy.get_default_context()
-        _open_session = self
         self._log_node = Node('_session_log', enable_rosout=False, start_parameter_services=False)
         self._log_subscription = self._log_node.create_subscription(
             Log,
@@ -167,13 +177,15 @@ class Session:
         # The first log call of a process looks at every imported module, for 0.1 s: not in a
         # callback that is being measured.
         self._log_node.get_logger().info('The session is open.')
-        return self
 
     def __enter__(self) -> Session:
         return self.open()
 
     def __exit__(self, exception_type, exception, traceback) -> None:
         __tracebackhide__ = True
+        if isinstance(exception, KeyboardInterrupt):
+            # What was half made is in the frames alone, and the traceback keeps them.
+            clear_frames(traceback)
         try:
             self.close()
         except BaseException as failure:
@@ -397,10 +409,7 @@ class Session:
             executor.shutdown(timeout_sec=0)
         self.log()
         self._log_subscription = None
-        for node in self._find(Node):
-            # A node whose __init__ failed has only some of its parts.
-            with contextlib.suppress(Exception):
-                node.destroy_node()
+        destroy_nodes(self._context)
         rclpy.try_shutdown()
         self._shared.close()
         self._closed = True
@@ -415,23 +424,38 @@ class Session:
             thread.join(25 * POLL_S)  # less often than POLL_S: to look for calls takes long
 
     def _end_calls(self) -> None:
-        for client in self._find(Client):
+        for client in _find(Client, self._context):
             for future in list(client._pending_requests.values()):
                 with warnings.catch_warnings(action='ignore'):  # a done callback that fails
                     future.set_exception(SessionClosedError('The session closes: no answer.'))
                 future.exception()  # or rclpy says that nobody has read it
-
-    def _find(self, kind: type) -> Iterator:
-        """Yield all nodes or clients of this session, also those that nobody knows any more."""
-        for thing in gc.get_objects():
-            if issubclass(type(thing), kind) and getattr(thing, 'context', None) is self._context:
-                yield thing
 
     def _threads(self) -> list[threading.Thread]:
         pools = [getattr(executor, '_executor', None) for executor in self._executors]
         return self._spin_threads + [
             thread for pool in pools if pool is not None for thread in list(pool._threads)
         ]
+
+
+def destroy_nodes(context: rclpy.Context) -> None:
+    """Destroy all nodes of a context, also those that nobody knows any more."""
+    for node in _find(Node, context):
+        for destroy in (
+            node.destroy_node,
+            lambda node=node: Node.destroy_node(node),  # past a mistake in an own destroy_node
+            # A node whose __init__ failed or was interrupted has only some of its parts:
+            # destroy_node misses one before it comes to the handle.
+            lambda node=node: node.handle.destroy_when_not_in_use(),
+        ):
+            with contextlib.suppress(Exception):
+                destroy()
+
+
+def _find(kind: type, context: rclpy.Context) -> Iterator:
+    """Yield all nodes or clients of a context."""
+    for thing in gc.get_objects():
+        if issubclass(type(thing), kind) and getattr(thing, 'context', None) is context:
+            yield thing
 
 
 def ros_session(domain_id: int | None = None, discovery: str = 'LOCALHOST') -> Session:

@@ -346,6 +346,8 @@ def _start(
         text=True,
         encoding='utf-8',
         errors='replace',
+        # What goes on when the kernel is killed, such as a build, keeps its workspace claimed.
+        pass_fds=tuple(_locks.values()),
         # Interrupting the kernel must not reach it: its owner ends it in order.
         start_new_session=True,
     )

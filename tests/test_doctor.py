@@ -14,6 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from helpers import doctor
 from helpers.session import ros_session
+from tools.soak.leftovers import left_in_process, state_of_process
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -112,6 +113,17 @@ def test_the_message_leaves_an_open_session_as_it_is():
     assert not rclpy.ok()
 
 
+def test_an_interrupted_message_leaves_nothing(monkeypatch):
+    def interrupted(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(SingleThreadedExecutor, 'spin_until_future_complete', interrupted)
+    before = state_of_process()
+    with pytest.raises(KeyboardInterrupt):
+        doctor.check_message()
+    assert left_in_process(before, state_of_process()) == []
+
+
 def test_what_the_middleware_raises_is_reported(monkeypatch):
     monkeypatch.setattr('helpers.session.reserve_domain_id', lambda: -5)
     row = doctor.check_message()
@@ -177,6 +189,20 @@ def test_little_shared_memory_is_reported(monkeypatch):
     assert doctor.check_shared_memory().to_do == ''
     monkeypatch.setattr(doctor, 'ENOUGH_SHARED_MEMORY_BYTES', 2**60)
     assert '--shm-size' in doctor.check_shared_memory().to_do
+
+
+def test_shared_memory_that_cannot_be_written_is_reported(monkeypatch):
+    monkeypatch.setattr(doctor, 'SHARED_MEMORY', Path('/proc/self'))
+    assert 'cannot be written' in doctor.check_shared_memory().found
+    assert not doctor.check_shared_memory().required
+
+
+def test_a_bus_error_means_that_shared_memory_is_full():
+    code = 'import os, signal; os.kill(os.getpid(), signal.SIGBUS)'
+    trial = doctor._run([sys.executable, '-c', code])
+    found, to_do = doctor._why_import_failed(trial)
+    assert found == 'ended with a bus error'
+    assert to_do.startswith('/dev/shm is full: run')
 
 
 def test_a_compiler_without_its_library_is_reported(monkeypatch, tmp_path):

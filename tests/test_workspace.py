@@ -592,6 +592,33 @@ def test_two_kernels_do_not_share_a_folder(built):
     assert built.result.log.is_file()
 
 
+def test_a_build_that_outlives_its_kernel_keeps_its_folder(other):
+    code = """
+from test_workspace import Workspace, write_talker
+workspace = Workspace('test_outlives')
+write_talker(workspace)
+print(workspace.path.name, flush=True)
+workspace.build()
+"""
+    kernel = subprocess.Popen(
+        [sys.executable, '-c', code],
+        env=os.environ | {'PYTHONPATH': str(ROOT / 'tests')},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    name = kernel.stdout.readline().strip()
+    process = psutil.Process(kernel.pid)
+    assert wait_until(process.children)
+    (build,) = process.children()
+    kernel.kill()
+    kernel.communicate()
+    build.suspend()
+    assert module._claim(name).name != name
+    build.resume()
+    build.wait(timeout=20)
+    assert module._claim(name).name == name
+
+
 def test_a_checkout_with_spaces_and_accents(other, monkeypatch, tmp_path):
     checkout = tmp_path / 'élève one'
     checkout.mkdir()

@@ -3,8 +3,15 @@
 # this does nothing. After an interruption the next call repairs what the last one left.
 # usage: tools/set_up.sh [GROUP]
 # The group, `browser` or `hub`, adds its requirements-GROUP.lock. Later calls keep it up to date.
+# usage: tools/set_up.sh --in FOLDER 3.12
+# The same in another folder of this checkout, with this Python.
 set -eu
 cd "$(dirname "$0")/.."
+venv=.venv wanted_version=
+if [ "${1-}" = --in ]; then
+    venv=$2 wanted_version=$3
+    shift 3
+fi
 
 say() { printf '%s\n' "$*" >&2; }
 fail() {
@@ -17,16 +24,16 @@ exec 9< tools/set_up.sh
 
 locks=requirements.lock groups=
 for group in browser hub; do
-    if [ "${1-}" = "$group" ] || [ -f ".venv/with_$group" ]; then
-        locks="$locks requirements-$group.lock" groups="$groups .venv/with_$group"
+    if [ "${1-}" = "$group" ] || [ -f "$venv/with_$group" ]; then
+        locks="$locks requirements-$group.lock" groups="$groups $venv/with_$group"
     fi
 done
 
 # The stamp is written last. It holds all that .venv depends on, so that a changed lock, a moved
 # folder and a Python that went away or became another one are noticed.
-stamp=.venv/set_up.stamp
+stamp=$venv/set_up.stamp
 wanted() {
-    version=$(.venv/bin/python -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null) || return 0
+    version=$($venv/bin/python -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null) || return 0
     printf '%s\n' "Python $version" "$(pwd -P)" \
         "$(cat $locks pyproject.toml tools/set_up.sh tools/jupyterlab_settings.json | cksum)"
 }
@@ -35,6 +42,12 @@ wanted() {
 # The versions for which every pinned package has a wheel, newest first: tools/lock.sh found them.
 versions=$(sed -n 's/^# Every wheel exists for Python //p' requirements.lock)
 [ -n "$versions" ] || fail 'requirements.lock does not name its Python versions: get it again with `git checkout requirements.lock`.'
+if [ -n "$wanted_version" ]; then
+    case " $versions " in
+        *" $wanted_version "*) versions=$wanted_version ;;
+        *) fail "Not every pinned package has a wheel for Python $wanted_version." ;;
+    esac
+fi
 
 # --- The package index ---------------------------------------------------------------------------
 
@@ -59,7 +72,7 @@ pip_setting() { # its value, from the environment or a pip.conf; a list is separ
 }
 
 uv_reads_pip_settings() { # uv does not read them itself
-    pip_config=$(.venv/bin/python -I -m pip config list)
+    pip_config=$($venv/bin/python -I -m pip config list)
     no_index=
     if [ -z "${UV_DEFAULT_INDEX-}${UV_INDEX_URL-}${UV_INDEX-}${UV_EXTRA_INDEX_URL-}${UV_FIND_LINKS-}" ]; then
         index=$(pip_setting index-url) more=$(pip_setting extra-index-url) links=$(pip_setting find-links)
@@ -85,21 +98,21 @@ version=$(printf '%s' "$have" | sed -n 's/^Python //p')
 case " $versions " in *" ${version:-none} "*) usable=yes ;; *) usable= ;; esac
 if [ ! -f "$stamp" ] || [ "$(head -n 2 "$stamp")" != "$have" ] || [ -z "$usable" ]; then
     python=$(tools/find_python.sh "$versions")
-    say "Making .venv with $python"
-    rm -rf .venv
-    "$python" -I -m venv .venv || fail "$python could not make .venv: what it said stands above."
+    say "Making $venv with $python"
+    rm -rf $venv
+    "$python" -I -m venv $venv || fail "$python could not make $venv: what it said stands above."
 fi
 rm -f "$stamp"
 
 # uv comes with its pinned hash from the same lock, and setuptools, with which it builds empy. pip is
 # only there to fetch them.
-sed -n '/^uv==/,/[^\\]$/p; /^setuptools==/,/[^\\]$/p' requirements.lock > .venv/first.lock
-uv_version=$(sed -n 's/^uv==\([^ ]*\).*/\1/p' .venv/first.lock)
-case $(.venv/bin/uv --version 2> /dev/null) in
+sed -n '/^uv==/,/[^\\]$/p; /^setuptools==/,/[^\\]$/p' requirements.lock > $venv/first.lock
+uv_version=$(sed -n 's/^uv==\([^ ]*\).*/\1/p' $venv/first.lock)
+case $($venv/bin/uv --version 2> /dev/null) in
     "uv $uv_version" | "uv $uv_version "*) ;;
     *)
-        .venv/bin/python -I -m pip install --quiet --disable-pip-version-check --no-user --no-deps \
-            --only-binary :all: --require-hashes --requirement .venv/first.lock ||
+        $venv/bin/python -I -m pip install --quiet --disable-pip-version-check --no-user --no-deps \
+            --only-binary :all: --require-hashes --requirement $venv/first.lock ||
             fail 'pip could not install uv: check the network, or name your package index with PIP_INDEX_URL, then try again.'
         ;;
 esac
@@ -109,17 +122,17 @@ quiet=
 [ -t 2 ] || quiet=--quiet
 # A ROS 2 wheel `ros-rclpy` also holds the metadata of an older format, of a package `rclpy`. uv would
 # take that for a package that is not in the lock, and remove rclpy.
-rm -rf .venv/lib/python*/site-packages/*.egg-info
+rm -rf $venv/lib/python*/site-packages/*.egg-info
 # Wheels only, except empy, which has none: one module, from its pinned source. Without isolation uv
 # builds it with the setuptools above, and fetches nothing that is not in the lock.
 say "Installing $(cat $locks | grep -c '^[a-z].*==') packages, about 190 MB the first time"
-.venv/bin/uv pip sync $quiet $no_index --python .venv/bin/python --require-hashes \
+$venv/bin/uv pip sync $quiet $no_index --python $venv/bin/python --require-hashes \
     --only-binary :all: --no-binary empy --no-build-isolation $locks ||
     fail 'uv could not install requirements.lock: check the network, or name your package index with UV_DEFAULT_INDEX, then try again.'
-.venv/bin/uv pip install --quiet --offline --python .venv/bin/python --no-deps --no-build-isolation --editable .
+$venv/bin/uv pip install --quiet --offline --python $venv/bin/python --no-deps --no-build-isolation --editable .
 
-mkdir -p .venv/share/jupyter/lab/settings
-cp tools/jupyterlab_settings.json .venv/share/jupyter/lab/settings/overrides.json
+mkdir -p $venv/share/jupyter/lab/settings
+cp tools/jupyterlab_settings.json $venv/share/jupyter/lab/settings/overrides.json
 [ -z "$groups" ] || touch $groups
-wanted > .venv/set_up.new
-mv .venv/set_up.new "$stamp"
+wanted > $venv/set_up.new
+mv $venv/set_up.new "$stamp"

@@ -1,0 +1,279 @@
+"""The soak: it notices what is left, whoever left it, and runs cells as each mode says."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import nbformat
+import psutil
+import pytest
+
+from helpers.doctor import SHARED_MEMORY
+from tools.soak import __main__ as soak
+from tools.soak import leftovers
+from tools.soak.conditions import CONDITIONS, CannotRunError, Condition, busy_loops, python_of
+from tools.soak.leftovers import MARK, Watch
+from tools.soak.plugin import HINTS
+
+CONDITION = {condition.name: condition for condition in CONDITIONS}
+
+
+# What is left in a kernel
+
+
+def test_what_is_left_in_a_kernel_is_named():
+    script = """
+        import json, subprocess, threading
+        from domain_coordinator import domain_id
+        from helpers.session import ros_session
+        from tools.soak.leftovers import left_in_process, state_of_process
+
+        before, gate = state_of_process(), threading.Event()
+        with ros_session():
+            pass
+        nothing = left_in_process(before, state_of_process())
+        threading.Thread(target=gate.wait, name='mine').start()
+        child = subprocess.Popen(['sleep', '9'])
+        another = domain_id()
+        another.__enter__()
+        ros_session().open()
+        print(json.dumps([nothing, left_in_process(before, state_of_process()), child.pid]))
+        gate.set()
+        child.kill()
+    """
+    answer = subprocess.run(
+        [sys.executable, '-c', textwrap.dedent(script)], capture_output=True, text=True, timeout=30
+    )
+    nothing, left, child = json.loads(answer.stdout)
+    assert nothing == []
+    assert 'The thread mine still runs.' in left
+    assert 'The thread dds.ev.0 still runs.' in left
+    assert f'The process {child} still runs: sleep 9.' in left
+    assert 'The kernel holds 2 domain ids instead of one.' in left
+    assert any(sentence.startswith('The kernel still uses /dev/shm/fastrtps_') for sentence in left)
+
+
+# What is left when the kernel is gone
+
+
+@pytest.fixture
+def folders(tmp_path):
+    for name in ('home', 'checkout', 'checkout/scratch', 'checkout/.git'):
+        (tmp_path / name).mkdir()
+    (tmp_path / 'checkout/lesson').write_text('old')
+    return tmp_path
+
+
+LEAVES_ALL = """
+    import json, os, signal, subprocess, sys, time
+    from helpers.session import reserve_domain_id, ros_session
+    from tools.soak.leftovers import held_by, state_of_process
+    import psutil
+
+    session = ros_session().open()
+    child = os.fork()
+    if child == 0:
+        while True:
+            signal.pause()
+    print(json.dumps([child, state_of_process()]), flush=True)
+    for name in ('home/new', 'checkout/new', 'checkout/scratch/allowed', 'checkout/.git/allowed'):
+        open(name, 'w').close()
+    open('checkout/lesson', 'a').write('new')
+    sys.stdin.read()
+"""
+
+
+def test_what_a_killed_process_leaves_is_named(folders, monkeypatch):
+    """A process that dies hard while its child lives on: every kind of leftover."""
+    monkeypatch.setattr(leftovers, 'END_TIMEOUT_S', 0.2)
+    mark = f'test-{os.getpid()}'
+    with Watch(mark, [folders / 'home'], [folders / 'checkout']) as watch:
+        process = subprocess.Popen(
+            [sys.executable, '-c', textwrap.dedent(LEAVES_ALL)],
+            env=os.environ | {MARK: mark},
+            cwd=folders,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        child, state = json.loads(process.stdout.readline())
+        while not (watch._held and (folders / 'checkout/lesson').read_text() == 'oldnew'):
+            assert process.poll() is None
+        process.kill()
+        process.wait()  # not for the end of its output, which the child holds
+    (domain_id,) = state['domain_ids']
+    with_child = watch.left(state['domain_ids'], killed=set())
+    os.kill(child, signal.SIGKILL)
+    assert sum(f'The process {child} still runs: ' in sentence for sentence in with_child) == 1
+    assert f'The process {child} still reserves domain id {domain_id}.' in with_child
+    files = [sentence for sentence in with_child if sentence.startswith('The file')]
+    assert files == [
+        f'The file {folders}/{name} is new or has changed.'
+        for name in ('checkout/lesson', 'checkout/new', 'home/new')
+    ]
+    (segment,) = [name for name in state['shared_memory'] if 'port' not in name]
+    assert Path(segment).exists()
+    then = watch.left(state['domain_ids'], killed=set())
+    assert f'Shared memory is left: {segment}.' in then
+    assert not Path(segment).exists()
+    assert 'still' not in ' '.join(then)
+
+
+def test_shared_memory_of_a_killed_process_is_removed_and_not_counted(folders):
+    mark = f'test-{os.getpid()}'
+    watch = Watch(mark, [folders / 'home'], [folders / 'checkout'])
+    segment = f'{SHARED_MEMORY}/fastrtps_of_{mark}'
+    for end in ('', '_el'):
+        Path(segment + end).touch()
+    with watch:
+        watch._held.add(segment)
+    assert watch.left({}, killed={segment}) == []
+    assert not Path(f'{segment}_el').exists()
+
+
+def test_other_processes_are_left_alone(folders):
+    with (
+        subprocess.Popen(['sleep', '9'], env=os.environ | {MARK: 'somebody else'}) as other,
+        Watch('mine', [folders / 'home'], [folders / 'checkout']) as watch,
+    ):
+        assert watch.left({}, set()) == []
+        assert other.poll() is None
+        other.kill()
+
+
+# The modes
+
+
+def notebook(folder: Path, *cells: tuple[str, str]) -> Path:
+    """Write a notebook of cells, each a source and what it prints."""
+    node = nbformat.v4.new_notebook()
+    for source, prints in cells:
+        cell = nbformat.v4.new_code_cell(source, execution_count=len(node.cells) + 1)
+        cell.outputs = [nbformat.v4.new_output('stream', text=prints)] if prints else []
+        node.cells.append(cell)
+    path = folder / 'lesson.ipynb'
+    nbformat.write(node, path)
+    return path
+
+
+COUNT = ("count = globals().get('count', 0) + 1\nprint(count)", '1\n')
+WAIT = ('import threading\nthreading.Event().wait(3)\nprint("waited")', 'waited\n')
+LEAVE = ('threading.Thread(target=threading.Event().wait, args=[60], name="left").start()', '')
+
+
+def test_twice_compares_the_second_pass_too(tmp_path):
+    record = soak.run(notebook(tmp_path, COUNT), CONDITION['twice'], seed=1)
+    assert record['failed'][0] == 'code cell 1 again'
+    assert list(record['cells']) == ['code cell 1', 'code cell 1 again']
+
+
+def test_an_interrupted_cell_is_looked_at_and_run_again(tmp_path):
+    path = notebook(tmp_path, ('import threading', ''), WAIT, LEAVE)
+    record = soak.run(path, CONDITION['interrupt'], seed=3)
+    interrupted, left = record['report'][1:3]
+    assert interrupted['interrupted_after_s'] < 3
+    assert interrupted['failed'] is None
+    assert 'The thread left still runs.' in left['failed']
+    assert record['failed'][0] == 'code cell 3'
+
+
+def test_after_a_killed_kernel_all_cells_run_in_a_fresh_one(tmp_path):
+    record = soak.run(notebook(tmp_path, COUNT), CONDITION['kill'], seed=1)
+    assert record['failed'] is None
+    assert list(record['cells']) == ['code cell 1']
+
+
+def test_the_hints_of_a_second_try_are_not_compared():
+    first = '[missing] the depth is 10\n    (NameError: it\n[ok] all\nExercise 1: 1 of 2.\n'
+    hint = '    Hint: count the messages\n          that wait.\n'
+    head, rest = first.split('[ok]')
+    assert HINTS.sub('', f'{head}{hint}[ok]{rest}') == first
+
+
+# The tool
+
+
+def test_conditions_that_this_machine_lacks_say_so(monkeypatch, tmp_path):
+    with pytest.raises(CannotRunError, match=r'Python 3\.9'):
+        python_of('3.9')
+    monkeypatch.setattr(os, 'getuid', lambda: 1000)
+    with pytest.raises(CannotRunError, match='as root'):
+        CONDITION['shm-full'].before(tmp_path)
+
+
+def test_a_full_shared_memory_is_named_by_the_doctor(tmp_path):
+    condition = CONDITION['shm-full-before']
+    try:
+        before = condition.before(tmp_path)
+    except CannotRunError as error:
+        pytest.skip(str(error))
+    answer = subprocess.run(
+        [*before, sys.executable, '-m', 'helpers.doctor'], capture_output=True, text=True
+    )
+    assert answer.returncode == 1
+    assert f'- rclpy: {condition.sentence}: run `' in answer.stdout
+
+
+def test_busy_loops_end():
+    before = set(psutil.Process().children())
+    with busy_loops():
+        assert len(set(psutil.Process().children()) - before) == 4
+    assert set(psutil.Process().children()) <= before
+
+
+def record(notebook: str, condition: str, failed=None) -> dict:
+    cells = {'code cell 1': 0.1, 'code cell 2': 2.0}
+    return {
+        'notebook': notebook,
+        'condition': condition,
+        'seed': 7,
+        'seconds': 3.0,
+        'cells': cells,
+        'failed': failed,
+    }
+
+
+def test_the_table():
+    records = [
+        record('01_a', 'idle'),
+        record('01_a', 'busy', ['code cell 2', 'It differs.\nHere.']),
+        record('02_b', 'idle'),
+    ]
+    lines = [' '.join(line.split()) for line in soak.table(records).splitlines()]
+    assert lines[1] == '01_a 2 1 2.0 s, code cell 2 busy, code cell 2'
+    assert lines[2] == '02_b 1 0 2.0 s, code cell 2'
+    assert 'Failures by condition: idle 0 of 2, busy 1 of 1.' in lines
+    assert lines[-2:] == ['It differs.', 'Here.']
+
+
+def test_sittings_add_up_and_an_interrupt_ends_one(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(soak, 'RUNS', tmp_path / 'new/runs.jsonl')
+    done = []
+
+    def run(path: Path, condition: Condition, seed: int) -> dict:
+        done.append((path.stem[:2], condition.name))
+        if len(done) == 5:
+            raise KeyboardInterrupt
+        if condition.name == 'python3.14':
+            raise CannotRunError('There is none.')
+        return record(path.stem, condition.name)
+
+    monkeypatch.setattr(soak, 'run', run)
+    assert soak.main(['--lesson', '01', '--conditions', 'idle']) == 0
+    soak.main(['--lesson', '00 01', '--conditions', 'idle,python3.14'])
+    assert done[1:] == [('00', 'idle'), ('00', 'python3.14'), ('01', 'idle')]
+    soak.main(['--rounds', '3', '--lesson', '01', '--conditions', 'busy'])
+    assert 'do not count' in capsys.readouterr().out
+    assert soak.main(['--report', '--lesson', '01']) == 0
+    assert '01_publish_and_subscribe  2     0' in capsys.readouterr().out
+
+
+@pytest.mark.parametrize('wrong', [['--conditions', 'idel'], ['--lesson', '77']])
+def test_what_there_is_none_of_is_said(wrong, capsys):
+    with pytest.raises(SystemExit):
+        soak.main(wrong)
+    assert 'There is no' in capsys.readouterr().err

@@ -1,0 +1,277 @@
+"""A plugin for pytest beside nbval: it runs the cells of a notebook in harder ways.
+
+The comparison stays nbval's own, with the settings of pyproject.toml. `--soak-mode` says how:
+
+- `once`       as nbval does
+- `twice`      all cells, then all cells again in the same kernel
+- `interrupt`  each cell is interrupted at a random time, then run again and compared
+- `kill`       the kernel is killed in the middle of a random cell, then all cells in a fresh one
+
+After the last cell, in every mode, the kernel must have nothing that it had not at its start. A
+line of JSON for each cell goes to the file `--soak-report`.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import re
+import time
+from contextlib import suppress
+from itertools import groupby
+from pathlib import Path
+from queue import Empty
+
+import psutil
+import pytest
+from nbval.kernel import RunningKernel
+from nbval.plugin import IPyNbCell, IPyNbFile
+
+from tools.soak.leftovers import held_by, left_in_process
+
+MODES = ('once', 'twice', 'interrupt', 'kill')
+LOOK = """
+import json
+from tools.soak import leftovers
+print(json.dumps(leftovers.state_of_process()))
+"""
+SHORTEST_S, LONGEST_S = 0.001, 10.0
+INTERRUPTED_TIMEOUT_S = 60.0
+OUTPUT_TIMEOUT_S = 10.0
+REPLY_TIMEOUT_S = 2.0  # it was sent before the kernel became idle
+# From the second try on, the check of an exercise also prints hints. A fresh run has none.
+HINTS = re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE)
+
+COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options of this plugin."""
+    group = parser.getgroup('soak')
+    group.addoption('--soak-mode', choices=MODES, default='once')
+    group.addoption('--soak-seed', default='0')
+    group.addoption('--soak-report', type=Path)
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Give each notebook the cells that the mode asks for."""
+    mode, plain, items[:] = config.option.soak_mode, list(items), []
+    for file, cells in groupby(plain, key=lambda item: item.parent):
+        cells = list(cells)
+        if mode == 'kill':
+            items.append(Killed.from_parent(file, name='the kernel that is killed', cells=cells))
+        if mode == 'interrupt':
+            items += [_like(cell, Interrupted, cell.name) for cell in cells]
+        else:
+            items += cells
+        if mode == 'twice':
+            items += [_like(cell, Again, f'{cell.name} again') for cell in cells]
+        items.append(NothingLeft.from_parent(file, name='what is left in the kernel'))
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Look at a kernel before its first cell."""
+    look_at(item.parent.kernel)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Report to a file, where one is named."""
+    if config.option.soak_report:
+        config.pluginmanager.register(_Report(config.option.soak_report))
+
+
+class _Report:
+    """Writes one line of JSON for what was done, and for what failed before and after it."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.when == 'call' or report.failed:
+            row = {
+                'item': _item(report.nodeid.rpartition('::')[2]),
+                'seconds': report.duration,
+                'failed': COLOURS.sub('', report.longreprtext) if report.failed else None,
+            }
+            with self.file.open('a', encoding='utf-8') as file:
+                print(json.dumps(row | dict(report.user_properties)), file=file)
+
+
+def _item(name: str) -> str:
+    """Return the name of an item, with nbval's `Cell 0` as the tests call it: `code cell 1`."""
+    return re.sub(r'^Cell (\d+)', lambda found: f'code cell {int(found[1]) + 1}', name)
+
+
+def _like(cell: IPyNbCell, kind: type[IPyNbCell], name: str) -> IPyNbCell:
+    return kind.from_parent(
+        cell.parent, name=name, cell_num=cell.cell_num, cell=cell.cell, options=cell.options
+    )
+
+
+def state_of(kernel: RunningKernel) -> dict:
+    """Return `state_of_process` of a kernel."""
+    message = kernel.execute_cell_input(LOOK, allow_stdin=False)
+    await_reply(kernel, message, OUTPUT_TIMEOUT_S)
+    text = ''
+    while True:
+        answer = kernel.get_message('iopub', timeout=OUTPUT_TIMEOUT_S)
+        if answer['parent_header'].get('msg_id') != message:
+            continue
+        if answer['msg_type'] == 'stream':
+            text += answer['content']['text']
+        if answer['content'].get('execution_state') == 'idle':
+            return json.loads(text)
+
+
+def look_at(kernel: RunningKernel) -> None:
+    """Note what a new kernel has."""
+    if not hasattr(kernel, 'soak_before'):
+        kernel.soak_before = state_of(kernel)
+
+
+def run_to(file: IPyNbFile, end: int) -> None:
+    """Run the first `end` code cells of a notebook."""
+    cells = [cell for cell in file.nb.cells if cell.cell_type == 'code']
+    for cell in cells[:end]:
+        message = file.kernel.execute_cell_input(cell.source, allow_stdin=False)
+        await_reply(file.kernel, message, file.config.option.nbval_cell_timeout)
+
+
+def restart(file: IPyNbFile) -> None:
+    """Give a notebook a fresh kernel."""
+    file.kernel.stop()
+    file.setup()
+    look_at(file.kernel)
+
+
+def await_reply(kernel: RunningKernel, message: str, timeout_s: float) -> dict:
+    """Wait for a kernel's reply to a message and return its content. Raises queue.Empty."""
+    deadline = time.monotonic() + timeout_s
+    while True:
+        answer = kernel.get_message('shell', timeout=max(0.0, deadline - time.monotonic()))
+        if answer['parent_header'].get('msg_id') == message:
+            return answer['content']
+
+
+def random_time_s(chance: random.Random) -> float:
+    """Return a time from a millisecond to 10 s, of which each magnitude is as likely."""
+    return SHORTEST_S * (LONGEST_S / SHORTEST_S) ** chance.random()
+
+
+def chance_of(item: pytest.Item) -> random.Random:
+    """Return the random numbers of an item: the same for the same seed."""
+    return random.Random(f'{item.config.option.soak_seed} {item.name}')
+
+
+class Again(IPyNbCell):
+    """A cell that has run before in this kernel."""
+
+    def compare_outputs(self, test, ref, skip_compare=None) -> bool:
+        """Compare as nbval does, without the hints that an exercise gives at the second try."""
+        for output in test:
+            if output.output_type == 'stream':
+                output.text = HINTS.sub('', output.text)
+        return super().compare_outputs(test, ref, skip_compare)
+
+
+class Interrupted(Again):
+    """A cell that is interrupted, and then run again."""
+
+    def runtest(self) -> None:
+        """Run the cell, interrupt it, look what it left, then run it as nbval does."""
+        kernel, after_s = self.parent.kernel, random_time_s(chance_of(self))
+        message = kernel.execute_cell_input(self.cell.source, allow_stdin=False)
+        traceback = None
+        try:
+            await_reply(kernel, message, after_s)
+        except Empty:
+            self.user_properties.append(('interrupted_after_s', after_s))
+            kernel.interrupt()
+            traceback = self._end(message, after_s)
+        kernel = self.parent.kernel
+        left = left_in_process(kernel.soak_before, state_of(kernel))
+        if left:
+            self.raise_cell_error(f'Run for {after_s:.3f} s. {" ".join(left)}', traceback)
+        started = time.monotonic()
+        super().runtest()
+        self.user_properties.append(('seconds', time.monotonic() - started))
+
+    def _end(self, message: str, after_s: float) -> str | None:
+        """Wait for the end of the interrupted cell and return its traceback."""
+        kernel, start = self.parent.kernel, f'Interrupted after {after_s:.3f} s, it'
+        try:
+            kernel.await_idle(message, INTERRUPTED_TIMEOUT_S)
+        except Empty:
+            self.raise_cell_error(f'{start} had not ended {INTERRUPTED_TIMEOUT_S:g} s later.')
+        try:
+            reply = await_reply(kernel, message, REPLY_TIMEOUT_S)
+        except Empty:
+            # The signal met ipykernel beside the code of the cell: it then sends no reply, and
+            # JupyterLab shows the cell as running until another one runs.
+            self.user_properties.append(('no_reply', True))
+            return None
+        if reply['status'] != 'error':
+            return None
+        traceback = '\n'.join(reply['traceback'])
+        if '<frozen importlib' in traceback:
+            # Python cannot repeat a half-done import of NumPy: environment.md says to restart.
+            self.user_properties.append(('import_interrupted', True))
+            restart(self.parent)
+            run_to(self.parent, self.cell_num)
+        elif reply['ename'] != 'KeyboardInterrupt':
+            self.raise_cell_error(f'{start} raised {reply["ename"]}: {reply["evalue"]}', traceback)
+        return traceback
+
+
+class _OfNotebook(pytest.Item):
+    """Something done to the kernel of a notebook that is none of its cells."""
+
+    parent: IPyNbFile
+
+    def reportinfo(self) -> tuple[Path, int, str]:
+        """Name this item in pytest's report."""
+        return self.path, 0, self.name
+
+    def repr_failure(self, excinfo) -> str:
+        """Say in one sentence what is wrong."""
+        return f'{excinfo.value}' or repr(excinfo.value)
+
+
+class Killed(_OfNotebook):
+    """A kernel that is killed in the middle of a cell; a fresh one takes its place."""
+
+    def __init__(self, *, cells: list[IPyNbCell], **arguments) -> None:
+        super().__init__(**arguments)
+        self.cells = cells
+
+    def runtest(self) -> None:
+        """Run the cells up to a random one, kill the kernel in it, and start a fresh kernel."""
+        chance, kernel = chance_of(self), self.parent.kernel
+        last, after_s = chance.randrange(len(self.cells)), random_time_s(chance)
+        run_to(self.parent, last)
+        message = kernel.execute_cell_input(self.cells[last].cell.source, allow_stdin=False)
+        with suppress(Empty):  # it is in the middle
+            await_reply(kernel, message, after_s)
+        process = psutil.Process(kernel.km.provisioner.pid)
+        process.suspend()  # so that it holds what is noted
+        family = [process, *process.children(recursive=True)]
+        self.user_properties += [
+            ('killed_in_cell', last + 1),
+            ('killed_after_s', after_s),
+            ('killed_held', sorted(held_by(family))),
+        ]
+        process.kill()
+        restart(self.parent)
+
+
+class NothingLeft(_OfNotebook):
+    """The look at a kernel after its last cell."""
+
+    def runtest(self) -> None:
+        """Fail with a sentence for each thing that is left."""
+        kernel = self.parent.kernel
+        now = state_of(kernel)
+        self.user_properties.append(('domain_ids', now['domain_ids']))
+        if left := left_in_process(kernel.soak_before, now):
+            raise AssertionError(' '.join(left))
