@@ -41,6 +41,11 @@ lint: set_up ## ruff: style and format of modules and notebooks
 lock: set_up ## write requirements.lock from pyproject.toml; UPGRADE=yes takes newer versions
 	@tools/lock.sh .venv/bin/uv $(if $(filter yes,$(UPGRADE)),--upgrade)
 
+licences: ## write licences.md from the lock files and what the packages say
+	@tools/set_up.sh browser
+	@tools/set_up.sh hub
+	@$(PYTHON) -m tools.licences
+
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built
 	rm -rf .venv .jupyter scratch slides .hypothesis .pytest_cache .ruff_cache
 	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
@@ -48,7 +53,7 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-browser hub test-hub notebooks slides bench lint lock clean set_up
+.PHONY: help lab present test test-browser hub test-hub notebooks slides bench lint lock licences clean set_up
 
 PYTHON := .venv/bin/python
 

@@ -117,6 +117,8 @@ def main(arguments: list[str] | None = None, folder: Path = FOLDER, output: Path
     library.mkdir(parents=True, exist_ok=True)
     for source in (*(packages / name for name in LIBRARY), HERE / 'deck.css'):
         shutil.copy(source, library)
+    for name in ('reveal.js', 'mathjax'):  # who passes them on must add their licences
+        shutil.copy(packages / name / 'LICENSE', library / f'{name}.LICENSE')
     for path in paths:
         print(export(path, output).relative_to(output.parent))
     return 0
