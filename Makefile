@@ -32,8 +32,8 @@ notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
 slides: set_up ## write the lessons as HTML slides into slides/, which need no network; LESSON=02 for one
 	@$(PYTHON) tools/export_slides.py $(if $(LESSON),--lesson "$(LESSON)")
 
-bench: set_up ## measure how much faster two computing threads are than one; needs an idle machine
-	@$(PYTHON) -m benchmarks.two_threads
+bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="latency model" for some
+	@$(PYTHON) -m benchmarks $(ONLY)
 
 lint: set_up ## ruff: style and format of modules and notebooks
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
