@@ -1,5 +1,6 @@
 """How nbval starts the kernels of the notebooks."""
 
+import os
 import tempfile
 from itertools import count
 from pathlib import Path
@@ -7,6 +8,11 @@ from pathlib import Path
 import nbval.kernel
 import pytest
 from jupyter_client.manager import KernelManager
+
+from helpers.progress import FILE_VARIABLE
+
+# No test reads or changes what the user of this checkout has solved. Kernels inherit it.
+os.environ[FILE_VARIABLE] = ''
 
 
 @pytest.fixture(scope='session', autouse=True)

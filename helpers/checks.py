@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Set
 from numbers import Integral, Real
 
+from helpers import progress
 from helpers.text import wrap
 
 NO_GUESS = 'No guess yet. Write one in the predict cell, run that cell, then run this one again.'
@@ -67,7 +68,8 @@ def check(title: str, *requirements: tuple[str, bool | Callable[[], object], str
     A requirement is `(what_is_right, test, hint)`. `test` is a truth value, or a function without
     arguments that returns one. If that function raises, the requirement is missing, and its line
     says why. Hints are shown when the exercise is still wrong at the second try. A try that passes
-    starts the counting again. See also `passed`.
+    starts the counting again. See also `passed`. A title such as 'Exercise 1 of lesson 02' is kept
+    in the reader's progress when all is right.
 
     Raises ValueError without requirements, TypeError for one of another form; nothing for a wrong
     answer.
@@ -86,6 +88,8 @@ def check(title: str, *requirements: tuple[str, bool | Callable[[], object], str
         if not met and tries > 1:
             _print(f'    Hint: {hint}')
     _print(f'{title}: {met_ones} of {len(results)}.{" All done." if done else ""}')
+    if done:
+        progress.record(title)
 
 
 def passed(title: str) -> bool:

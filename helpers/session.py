@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import thread as thread_pool
 from dataclasses import dataclass
 
-from helpers.progress import ProgressBar
+from helpers.progress_bar import ProgressBar
 
 try:
     import rclpy

@@ -29,7 +29,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from helpers.progress import ProgressBar
+from helpers.progress_bar import ProgressBar
 from helpers.session import configure_discovery, reserve_domain_id
 from helpers.text import wrap
 

@@ -17,6 +17,7 @@ from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
 from nbval.plugin import comment_markers, metadata_tags
 
+from helpers.progress import title_of
 from tools.notebooks import clean, text_of
 from tools.slides import SKIPPED, SLIDE, height, slide_types
 
@@ -27,6 +28,10 @@ EXERCISES = {'01': 1, '02': 2, '03': 2, '04': 2, '05': 2}  # at least; one in an
 TAGS = {'predict', 'exercise', 'check', 'solution', 'nbval-ignore-output', 'deck-break', *SKIPPED}
 LABELS = ['You will do', 'You will learn', 'You need', 'Time']
 LABELS_OF_START = ['You will do', 'You need', 'Time']
+QUESTIONS = 3  # in each lesson's quiz
+ANSWER = re.compile(
+    r'<details><summary>([A-D])\. \S.*</summary>\n\n\*\*(Right|No)\.\*\* \S.*\n\n</details>'
+)
 REASON = '# Not compared: '
 NOTE = 'For the instructor'
 PATH_OF_A_MACHINE = re.compile(
@@ -293,7 +298,7 @@ def has_labels(notebook: NotebookNode) -> list[str]:
 
 
 def has_steps(notebook: NotebookNode) -> list[str]:
-    """`## 1. ...` and so on, perhaps Exercises, then Recap and In practice."""
+    """`## 1. ...` and so on, perhaps Exercises, then Recap, Quiz and In practice."""
     if number(notebook) == '00':
         return []
     names = [text for _, level, text in headings(notebook) if level == 2]
@@ -306,9 +311,10 @@ def has_steps(notebook: NotebookNode) -> list[str]:
     rest = names[len(steps) :]
     if names[: len(steps)] != steps or [name for name in rest if name != 'Exercises'] != [
         'Recap',
+        'Quiz',
         'In practice',
     ]:
-        found.append('After the steps must come "## Recap" and, last, "## In practice".')
+        found.append('After the steps must come "## Recap", "## Quiz" and, last, "## In practice".')
     return found
 
 
@@ -454,6 +460,69 @@ def exercises_checked(notebook: NotebookNode) -> list[str]:
     return found
 
 
+def exercises_recorded(notebook: NotebookNode) -> list[str]:
+    """The check has the title that counts as the reader's progress, the solution has not."""
+    found = []
+    for count, (name, cells) in enumerate(exercises(notebook).items(), 1):
+        title = title_of(number(notebook), count)
+        counting = [cell for cell in cells if printed(cell, f'{title}: ')]
+        if not any('check' in tags(cell) for cell in counting):
+            found.append(f'{name!r}: give its check the title {title!r}.')
+        if any('solution' in tags(cell) for cell in counting):
+            found.append(f'{name!r}: give its solution another title than {title!r}.')
+    return found
+
+
+# The quiz
+
+
+def questions(notebook: NotebookNode) -> list[str]:
+    """Return the text of each question, with its answers."""
+    found, inside = [], False
+    for cell in notebook.cells:
+        if cell.source.startswith('## '):
+            inside = cell.source.startswith('## Quiz')
+        elif inside and cell.cell_type == 'markdown':
+            found.append(cell.source)
+    return found
+
+
+def enough_questions(notebook: NotebookNode) -> list[str]:
+    found = questions(notebook)
+    if number(notebook) != '00' and len(found) != QUESTIONS:
+        return [f'The quiz has {len(found)} questions, and not {QUESTIONS}, a cell each.']
+    return [
+        f'Question {count} must be called "### Question {count}: ...".'
+        for count, text in enumerate(found, 1)
+        if not re.match(rf'### Question {count}: \S', text)
+    ]
+
+
+def answers_with_reasons(notebook: NotebookNode) -> list[str]:
+    """Three or four answers, one of them right, each with its reason, and nothing behind them."""
+    found = []
+    for count, text in enumerate(questions(notebook), 1):
+        answers = ANSWER.findall(text)
+        letters = ''.join(letter for letter, _ in answers)
+        if letters not in ('ABC', 'ABCD') or not text.endswith('</details>'):
+            found.append(f'Question {count} needs three or four answers, from A on, and no more.')
+        if len(answers) != text.count('<details>'):
+            found.append(
+                f'Question {count}: an answer is not of the form A. answer, Right or No, why.'
+            )
+        if [verdict for _, verdict in answers].count('Right') != 1:
+            found.append(f'Question {count} needs exactly one right answer.')
+    return found
+
+
+def right_answers_vary(notebook: NotebookNode) -> list[str]:
+    """Who always chooses B must not always be right."""
+    right = [
+        letter for text in questions(notebook) for letter, v in ANSWER.findall(text) if v == 'Right'
+    ]
+    return ['The right answers all have the same letter.'] if right and len(set(right)) == 1 else []
+
+
 GROUPS: dict[str, list[Rule]] = {
     'execution': [executed_in_order, no_errors, no_stderr],
     'outputs': [
@@ -466,7 +535,8 @@ GROUPS: dict[str, list[Rule]] = {
     'compared': [nothing_ignored, known_tags],
     'file': [saved_clean, hides_solutions_and_notes_only, folded_solutions_keep_their_secret],
     'spine': [has_title, has_labels, has_steps, headings_in_order, recap_answers_opening, predicts],
-    'exercises': [enough_exercises, exercises_complete, exercises_checked],
+    'exercises': [enough_exercises, exercises_complete, exercises_checked, exercises_recorded],
+    'quiz': [enough_questions, answers_with_reasons, right_answers_vary],
     'slides': [fits_a_slide, on_its_slide, notes_name_the_reader],
 }
 

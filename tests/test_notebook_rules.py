@@ -43,9 +43,10 @@ RANDOM_LOG = """\
 import random
 for number in random.sample(range(1000), k=random.randint(5, 15)):
     print(f'[INFO] [slow_subscriber]: I heard: "Hello World: {number}"')"""
+ANSWERS = ['It keeps the newest.', 'It keeps the oldest.', 'It keeps none.']
 SOLUTION = '# Solution of exercise 1\ndepth = 20\ncheck_depth(depth)'
-PASSED = '[ok] depth is 20\n[ok] none is lost\nExercise 1: 2 of 2. All done.\n'
-FAILED = '[missing] depth is 20\n[ok] none is lost\nExercise 1: 1 of 2.\n'
+PASSED = '[ok] depth is 20\n[ok] none is lost\nSolution: 2 of 2. All done.\n'
+FAILED = '[missing] depth is 20\n[ok] none is lost\nExercise {} of lesson 02: 1 of 2.\n'
 
 
 def printed(text, name='stdout'):
@@ -69,9 +70,19 @@ def exercise(count):
     return [
         new_markdown_cell(f'### Exercise {count}: choose the depth\n\nChange the depth.'),
         code('depth = 10', 'exercise'),
-        code('check_depth(depth)', 'check', outputs=printed(FAILED)),
+        code('check_depth(depth)', 'check', outputs=printed(FAILED.format(count))),
         code(SOLUTION, 'solution', outputs=printed(PASSED)),
     ]
+
+
+def question(count, right='ABC', answers=ANSWERS):
+    """Return question `count`, whose right answer has the letter `right[count - 1]`."""
+    text = f'### Question {count}: what stays\n\nWhat does a queue keep?\n\n'
+    for letter, answer in zip('ABCDE', answers, strict=False):
+        verdict = 'Right' if letter == right[count - 1] else 'No'
+        text += f'<details><summary>{letter}. {answer}</summary>\n\n**{verdict}.** See step 1.'
+        text += '\n\n</details>\n'
+    return new_markdown_cell(text.strip(), metadata={'editable': False})
 
 
 def lesson(*cells, before=()):
@@ -91,6 +102,8 @@ def lesson(*cells, before=()):
             *exercise(1),
             *exercise(2),
             new_markdown_cell(RECAP),
+            new_markdown_cell('## Quiz\n\nThree questions.'),
+            *map(question, (1, 2, 3)),
             new_markdown_cell('## In practice\n\nA real robot has [more](02_lose_messages.ipynb).'),
         ]
     )
@@ -151,6 +164,12 @@ def with_cell(index, **changes):
     return notebook
 
 
+def with_quiz(right, answers=ANSWERS):
+    notebook = lesson()
+    notebook.cells[-4:-1] = [question(count, right, answers) for count in (1, 2, 3)]
+    return notebook
+
+
 def with_metadata(index, **metadata):
     notebook = lesson()
     notebook.cells[index].metadata.update(nbformat.from_dict(metadata))
@@ -179,6 +198,8 @@ TWO_PIECES = printed('1\n') + printed('2\n')
 VIEW = shown('display_data', text_plain='Slider()') + [
     new_output('display_data', data={tool.WIDGET: {'model_id': '1'}})
 ]
+
+RECAP_AT, QUIZ_AT = -6, -5
 
 BROKEN = [
     (rules.executed_in_order, with_cell(1, execution_count=None)),
@@ -221,6 +242,7 @@ BROKEN = [
     (rules.saved_clean, with_metadata(1, execution={'iopub.status.idle': '2025-01-01'})),
     (rules.saved_clean, with_metadata(1, jupyter={'outputs_hidden': True})),
     (rules.saved_clean, with_metadata(0, editable=False)),
+    (rules.saved_clean, with_metadata(-2, editable=True)),
     (rules.saved_clean, with_notebook_metadata(widgets={})),
     (
         rules.saved_clean,
@@ -244,15 +266,19 @@ BROKEN = [
     (rules.has_labels, with_source(0, '**Time**', '## Time')),
     (rules.has_steps, with_source(2, '## 1. Publish', '## Publish')),
     (rules.has_steps, with_source(2, '## 1. Publish', '## 2. Publish')),
-    (rules.has_steps, with_source(-2, '## Recap', '## Summary')),
+    (rules.has_steps, with_source(RECAP_AT, '## Recap', '## Summary')),
+    (rules.has_steps, with_source(QUIZ_AT, '## Quiz', '## Questions')),
     (rules.has_steps, without(-1 + len(lesson().cells))),
     (rules.has_steps, with_source(-1, '## In practice', '## In practice\n\n## 2. Again')),
     (rules.headings_in_order, with_source(2, '## 1. Publish', '## 1. Publish\n\n#### Why')),
     (rules.headings_in_order, with_source(2, '## 1. Publish', '# 1. Publish')),
-    (rules.recap_answers_opening, with_source(-2, 'what it loses', 'what is lost')),
-    (rules.recap_answers_opening, with_source(-2, '- **what it loses**', '- what it loses')),
-    (rules.recap_answers_opening, with_source(-2, '\n- **what it loses**', '\n**what it loses**')),
-    (rules.recap_answers_opening, without(len(lesson().cells) - 2)),
+    (rules.recap_answers_opening, with_source(RECAP_AT, 'what it loses', 'what is lost')),
+    (rules.recap_answers_opening, with_source(RECAP_AT, '- **what it loses**', '- what it loses')),
+    (
+        rules.recap_answers_opening,
+        with_source(RECAP_AT, '\n- **what it loses**', '\n**what it loses**'),
+    ),
+    (rules.recap_answers_opening, without(len(lesson().cells) + RECAP_AT)),
     (rules.predicts, without(3)),
     (rules.predicts, with_source(3, 'my_guess = 41', 'print("guess")')),
     (rules.predicts, with_source(5, 'my_guess', 'your_guess')),
@@ -267,6 +293,22 @@ BROKEN = [
     (rules.exercises_checked, with_cell(9, outputs=printed(FAILED))),
     (rules.exercises_checked, with_cell(9, outputs=printed('[ok] depth is 20\n'))),
     (rules.exercises_checked, with_cell(9, outputs=[])),
+    (rules.exercises_recorded, with_cell(8, outputs=printed(FAILED.format(2)))),
+    (rules.exercises_recorded, with_cell(9, outputs=printed(FAILED.format(1)))),
+    (rules.exercises_recorded, with_source(0, '# 02 Lose', '# 03 Lose')),
+    (rules.enough_questions, without(len(lesson().cells) - 2)),
+    (rules.enough_questions, with_source(-2, 'Question 3', 'Question 4')),
+    (rules.enough_questions, with_source(-2, '### Question 3', 'Question 3')),
+    (rules.answers_with_reasons, with_quiz('ABC', ANSWERS[:2])),
+    (rules.answers_with_reasons, with_quiz('ABC', [*ANSWERS, 'All.', 'Some.'])),
+    (rules.answers_with_reasons, with_source(-2, 'summary>B.', 'summary>C.')),
+    (rules.answers_with_reasons, with_source(-2, '**No.** See step 1.', '**No.**')),
+    (rules.answers_with_reasons, with_source(-2, '**No.**', 'No:')),
+    (rules.answers_with_reasons, with_source(-2, '**No.**', '**Right.**')),
+    (rules.answers_with_reasons, with_source(-2, '**Right.**', '**No.**')),
+    (rules.answers_with_reasons, with_source(-2, '### Question 3', '<details>\n\n### Question 3')),
+    (rules.answers_with_reasons, with_cell(-2, source=question(3).source + '\n\nB is near.')),
+    (rules.right_answers_vary, with_quiz('BBB')),
     (rules.fits_a_slide, lesson(code('\n'.join(['run()'] * (rules.MAX_CODE_LINES + 1))))),
     (rules.fits_a_slide, lesson(code('%%write a\n' + 'run()\n' * rules.MAX_FILE_LINES))),
     (rules.fits_a_slide, lesson(new_markdown_cell('word ' * (rules.MAX_WORDS + 1)))),
@@ -301,6 +343,8 @@ def test_every_rule_is_tried_on_a_broken_notebook():
         (rules.no_object_echo, lesson(code('t', outputs=shown(text_plain='<t>', text_html='t')))),
         (rules.no_last_semicolon, lesson(code('a = draw();'), code('f(";")'), code('%magic'))),
         (rules.has_steps, lesson(new_markdown_cell('## Exercises'))),
+        (rules.answers_with_reasons, with_quiz('BDA', [*ANSWERS, 'All.'])),
+        (rules.right_answers_vary, with_quiz('BBA')),
         (rules.fits_a_slide, lesson(code('%%write a\n' + 'run()\n' * rules.MAX_CODE_LINES))),
         (rules.notes_name_the_reader, lesson(note('For the instructor: 5 minutes'))),
         (rules.hides_solutions_and_notes_only, lesson(note('For the instructor: 5 minutes'))),

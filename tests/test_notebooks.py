@@ -4,6 +4,7 @@ import nbformat
 import notebook_rules as rules
 import pytest
 
+from helpers import progress
 from tools.notebooks import FOLDER, PICTURES, pictures
 
 PATHS = sorted(FOLDER.glob('*.ipynb'))
@@ -28,6 +29,15 @@ def test_lesson_in_its_folder(path):
     assert rules.title_matches(path.name, notebook) == []
     assert rules.links_lead_somewhere(notebook, FOLDER) == []
     assert rules.maps_every_lesson(notebook, NAMES) == []
+
+
+def test_progress_knows_every_exercise():
+    found = {}
+    for path in PATHS:
+        notebook = nbformat.read(path, as_version=4)
+        title = notebook.cells[0].source.splitlines()[0].removeprefix('# ')
+        found[title[:2]] = title[3:], len(rules.exercises(notebook))
+    assert found == progress.LESSONS
 
 
 def test_pictures_are_those_of_the_notebooks():

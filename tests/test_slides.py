@@ -102,5 +102,7 @@ def test_what_makes_a_cell_high():
     assert height(text('word ' * 180)) < SLIDE
     assert height(text('| a | b |\n|---|---|\n' + '| 1 | 2 |\n' * 9)) > height(text('a b ' * 9))
     assert height(text('- a\n- b\n- c')) > height(text('a\nb\nc'))
+    answer = '<details><summary>A. Yes.</summary>\n\nA reason.\n\n</details>'
+    assert height(text(answer)) == pytest.approx(height(text('- A. Yes.\n- A reason.')))
     assert height(text('![A plot.](images/plot.png)')) > height(text('A plot.'))
     assert height(note('word ' * 400)) == 0

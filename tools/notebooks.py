@@ -33,6 +33,7 @@ from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernel
 from nbformat import NotebookNode
 from traitlets import default
 
+from helpers.progress import FILE_VARIABLE
 from tools.slides import slide_types
 
 FOLDER = Path(__file__).resolve().parent.parent / 'notebooks'
@@ -55,7 +56,7 @@ def clean(notebook: NotebookNode) -> NotebookNode:
     """Return a copy of a notebook without what changes by itself from run to run.
 
     Kept are sources, tags, hidden sources, cell ids, execution counts and outputs. The slide types
-    are made anew.
+    are made anew, and so is which cells JupyterLab does not let edit: answers that unfold.
     Neighbouring pieces of one stream become one, because where a stream is cut is chance. The
     model of a widget lives only as long as its kernel: of its view, the text is kept.
     """
@@ -68,6 +69,8 @@ def clean(notebook: NotebookNode) -> NotebookNode:
             cell.id = hashlib.sha256(f'{number} {cell.source}'.encode()).hexdigest()[:8]
         ids.add(cell.id)
         cell.metadata = nbformat.from_dict(dict(_kept_metadata(cell.metadata)))
+        if cell.cell_type == 'markdown' and '<details>' in cell.source:
+            cell.metadata.editable = False  # a double click on an answer must not show the source
         if cell.cell_type == 'code':
             cell.outputs = _clean_outputs(cell)
     for cell, slide_type in zip(notebook.cells, slide_types(notebook), strict=True):
@@ -149,8 +152,11 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     )
     # nbval knows no widgets: what is printed into an Output widget is output of the cell.
     client.widget_registry = {}
-    # Under nbval ipykernel sees this variable, and leaves output written at C level alone.
-    environment = os.environ | {'PYTEST_CURRENT_TEST': 'tools/notebooks.py'}
+    environment = os.environ | {
+        # Under nbval ipykernel sees this variable, and leaves output written at C level alone.
+        'PYTEST_CURRENT_TEST': 'tools/notebooks.py',
+        FILE_VARIABLE: '',  # what is saved is the table of a reader who has solved nothing
+    }
     try:
         client.execute(env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     except CellExecutionError as error:

@@ -78,7 +78,10 @@ def _tags(cell: NotebookNode) -> set[str]:
 
 
 def height(cell: NotebookNode) -> float:
-    """Return about how high a cell is with its outputs, in hundredths of the slide's height."""
+    """Return about how high a cell is with its outputs, in hundredths of the slide's height.
+
+    What a click unfolds (`<details>`, an answer of a quiz) counts as unfolded.
+    """
     if _tags(cell) & SKIPPED:
         return 0.0
     if cell.cell_type == 'markdown':
@@ -96,13 +99,14 @@ def _height_of_prose(block: str) -> float:
         return HEADINGS.get(block.partition(' ')[0], PROSE_LINE + PROSE_GAP)
     if block.startswith('!['):
         return PROSE_PICTURE + PROSE_GAP
-    text = re.sub(r'\]\([^)]*\)|[*`\[]', '', block)
+    text = re.sub(r'\]\([^)]*\)|[*`\[]|</?(?:details|summary|code)>', '', block)
     lines = text.splitlines()
     if text.startswith('|'):
         return (len(lines) - 1) * TABLE_ROW + PROSE_GAP
     if not re.search(r'^(```|- |\d\. |> )', text, re.MULTILINE):
         lines = [' '.join(lines)]
-    return PROSE_GAP + PROSE_LINE * sum(ceil(len(line) / PROSE_CHARACTERS) for line in lines)
+    gap = 0 if re.match('</?details>', block) else PROSE_GAP  # a reason follows its answer at once
+    return gap + PROSE_LINE * sum(ceil(len(line) / PROSE_CHARACTERS) for line in lines)
 
 
 def _height_of_output(output: NotebookNode, letter: float, figure: float) -> float:
