@@ -29,6 +29,9 @@ test-hub: ## a class of 12 on a JupyterHub, who run lessons 02 and 03 at the sam
 notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
 	@$(PYTHON) tools/notebooks.py $(if $(LESSON),--lesson "$(LESSON)")
 
+lesson: set_up ## begin a lesson from the template: NAME=10_count_the_losses. See CONTRIBUTING.md
+	@$(PYTHON) -m tools.new_lesson "$(NAME)"
+
 slides: set_up ## write the lessons as HTML slides into slides/, which need no network; LESSON=02 for one
 	@$(PYTHON) tools/export_slides.py $(if $(LESSON),--lesson "$(LESSON)")
 
@@ -53,7 +56,7 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-browser hub test-hub notebooks slides bench lint lock licences clean set_up
+.PHONY: help lab present test test-browser hub test-hub notebooks lesson slides bench lint lock licences clean set_up
 
 PYTHON := .venv/bin/python
 
