@@ -11,12 +11,12 @@ import sys
 import threading
 import time
 from contextlib import suppress
+from functools import partial
 from statistics import median
 
 from benchmarks.table import Row
 
-RATES_HZ = (20, 200, 1000)
-RUN_S = 4.0
+MESSAGES = {20: 80, 200: 400, 1000: 2000}  # at each rate, in Hz
 ROUNDS = 6
 LIMIT_S = 60.0
 RUN = 'from benchmarks.latency import run_{kind}; run_{kind}({rate}, {messages})'
@@ -102,22 +102,22 @@ def run_session(rate_hz: float, messages: int) -> None:
     print_median(sent, heard)
 
 
-def in_process(kind: str, rate_hz: float) -> float:
+def in_process(kind: str, rate_hz: int) -> float:
     """Return the median latency of one run in a Python of its own."""
-    code = RUN.format(kind=kind, rate=rate_hz, messages=round(rate_hz * RUN_S))
+    code = RUN.format(kind=kind, rate=rate_hz, messages=MESSAGES[rate_hz])
     answer = subprocess.run(
         [sys.executable, '-c', code], stdout=subprocess.PIPE, text=True, check=True
     )
     return float(answer.stdout)
 
 
-def in_kernel(rate_hz: float) -> float:
+def in_kernel(rate_hz: int) -> float:
     """Return the median latency of one run in a notebook's kernel."""
     import nbformat.v4
 
     from tools.notebooks import FOLDER, execute
 
-    code = RUN.format(kind='session', rate=rate_hz, messages=round(rate_hz * RUN_S))
+    code = RUN.format(kind='session', rate=rate_hz, messages=MESSAGES[rate_hz])
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)])
     return float(execute(notebook, FOLDER).cells[0].outputs[0].text)
 
@@ -125,11 +125,11 @@ def in_kernel(rate_hz: float) -> float:
 def measure() -> list[Row]:
     """Return for each rate the session, and the session in a kernel, against the script."""
     rows = []
-    for rate in RATES_HZ:
+    for rate in MESSAGES:
         runs = {
-            'plain rclpy script': lambda rate=rate: in_process('bare', rate),
-            'session and recorder': lambda rate=rate: in_process('session', rate),
-            'the same in a kernel': lambda rate=rate: in_kernel(rate),
+            'plain rclpy script': partial(in_process, 'bare', rate),
+            'session and recorder': partial(in_process, 'session', rate),
+            'the same in a kernel': partial(in_kernel, rate),
         }
         latency = {name: [] for name in runs}
         for turn in range(ROUNDS):
