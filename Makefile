@@ -29,6 +29,9 @@ test-hub: ## a class of 12 on a JupyterHub, who run lessons 02 and 03 at the sam
 notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
 	@$(PYTHON) tools/notebooks.py $(if $(LESSON),--lesson "$(LESSON)")
 
+lesson: set_up ## begin a lesson from the template: NAME=10_count_the_losses. See CONTRIBUTING.md
+	@$(PYTHON) -m tools.new_lesson "$(NAME)"
+
 slides: set_up ## write the lessons as HTML slides into slides/, which need no network; LESSON=02 for one
 	@$(PYTHON) tools/export_slides.py $(if $(LESSON),--lesson "$(LESSON)")
 
@@ -37,14 +40,19 @@ soak: set_up ## run the notebooks in hard conditions: N=10 times, CONDITIONS=idl
 		$(if $(LESSON),--lesson "$(LESSON)") $(if $(MINUTES),--minutes "$(MINUTES)") \
 		$(if $(SEED),--seed "$(SEED)") $(if $(filter yes,$(REPORT)),--report)
 
-bench: set_up ## measure how much faster two computing threads are than one; needs an idle machine
-	@$(PYTHON) -m benchmarks.two_threads
+bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="latency model" for some
+	@$(PYTHON) -m benchmarks $(ONLY)
 
 lint: set_up ## ruff: style and format of modules and notebooks
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
 
 lock: set_up ## write requirements.lock from pyproject.toml; UPGRADE=yes takes newer versions
 	@tools/lock.sh .venv/bin/uv $(if $(filter yes,$(UPGRADE)),--upgrade)
+
+licences: ## write licences.md from the lock files and what the packages say
+	@tools/set_up.sh browser
+	@tools/set_up.sh hub
+	@$(PYTHON) -m tools.licences
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built
 	rm -rf .venv .jupyter .soak scratch slides .hypothesis .pytest_cache .ruff_cache
@@ -53,7 +61,8 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-browser hub test-hub notebooks slides soak bench lint lock clean set_up
+.PHONY: help lab present test test-browser hub test-hub notebooks lesson slides soak bench lint lock licences clean \
+	set_up
 
 PYTHON := .venv/bin/python
 

@@ -119,6 +119,17 @@ class SessionClosedError(Exception):
     """Raised in a callback that still waits for the answer of a service when its session closes."""
 
 
+class _Stop(Future):
+    """Ends the spinning of a session's executors, which the session wakes.
+
+    rclpy adds a callback to the future at each turn of a spin, 2000 a second in a busy one, and all
+    of them would be kept until the session closes.
+    """
+
+    def add_done_callback(self, callback: Callable) -> None:
+        """Keep nothing."""
+
+
 class Session:
     """An open ROS graph: the context, the threads that spin, and the log. See `ros_session`."""
 
@@ -130,7 +141,7 @@ class Session:
         self._executors: list[Executor] = []
         self._spin_threads: list[threading.Thread] = []
         self._failures: list[BaseException] = []
-        self._stop = Future()
+        self._stop = _Stop()
         self._log: list[LogRecord] = []
         self._log_subscription = None
 
@@ -391,6 +402,8 @@ class Session:
         deadline = deadline or time.monotonic() + CLOSE_TIMEOUT_S
         if not self._stop.done():
             self._stop.set_result(None)
+        for executor in self._executors:
+            executor.wake()
         for thread in self._spin_threads:
             self._join(thread, deadline)
         for executor in self._executors:

@@ -326,6 +326,15 @@ def test_spin(threads):
     assert listener.heard == [f'Hello World: {i}' for i in range(5)]
 
 
+@EXECUTORS
+def test_spinning_keeps_nothing(threads):
+    with ros_session() as session:
+        talker, listener = Talker(20), Listener()
+        spin(session, talker, listener, threads=threads)
+        session.wait_until(lambda: len(listener.heard) == 20, LIMIT_S)
+        assert session._stop._callbacks == []
+
+
 @pytest.mark.parametrize('wrong', ['x', None, SingleThreadedExecutor, 4])
 def test_spin_no_executor(wrong):
     with ros_session() as session, pytest.raises(TypeError, match='session.spin needs an executor'):

@@ -10,10 +10,13 @@ import subprocess
 import sys
 import tomllib
 import zipfile
-from importlib.metadata import distribution
+from importlib.metadata import distribution, distributions
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).resolve().parent.parent
 PYPROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())
@@ -83,14 +86,14 @@ def test_a_group_is_locked_and_agrees_with_the_rest(group):
             assert mine[name].split()[0] == other[name].split()[0]
 
 
-def test_the_proxy_of_the_hub_is_locked():
-    lock = json.loads((ROOT / 'tools/hub/package-lock.json').read_text())
+@pytest.mark.parametrize('folder', ['hub', 'deck_template'])
+def test_what_npm_brings_is_locked_and_names_no_index(folder):
+    lock = json.loads((ROOT / 'tools' / folder / 'package-lock.json').read_text())
     packages = {name: package for name, package in lock['packages'].items() if name}
     assert all(package['integrity'].startswith('sha512-') for package in packages.values())
     assert not any('resolved' in package for package in packages.values())
-    for name, version in json.loads((ROOT / 'tools/hub/package.json').read_text())[
-        'dependencies'
-    ].items():
+    wanted = json.loads((ROOT / 'tools' / folder / 'package.json').read_text())['dependencies']
+    for name, version in wanted.items():
         assert packages[f'node_modules/{name}']['version'] == version
         assert_reason(name)
 
@@ -100,9 +103,22 @@ def assert_reason(name: str) -> None:
     assert re.search(rf'^\| `{re.escape(name)}(\[\w+\])?` \| .{{10,}} \|$', reasons, re.MULTILINE)
 
 
-def test_the_environment_holds_what_the_lock_says():
-    for name in direct_dependencies():
-        assert f'{name}=={distribution(name).version} ' in LOCK, name
+def test_the_environment_holds_what_the_lock_says_and_nothing_else():
+    locks = [LOCK, *(GROUP_LOCKS[g] for g in GROUPS if Path(sys.prefix, f'with_{g}').exists())]
+    lines = [line for lock in locks for line in re.findall(r'^[a-z].*(?= \\)', lock, re.MULTILINE)]
+    locked = {
+        (requirement.name, requirement.specifier)
+        for requirement in map(Requirement, lines)
+        if requirement.marker.evaluate()
+    }
+    # A wheel of ROS 2 also holds the metadata of an older format: that is no package of its own.
+    packages = [package for package in distributions() if package.read_text('WHEEL')]
+    installed = {
+        (canonicalize_name(package.name), SpecifierSet(f'=={package.version}'))
+        for package in packages
+        if package.name not in ('pip', 'ros2-notebooks')
+    }
+    assert installed == locked
 
 
 # --- The choice of a Python ----------------------------------------------------------------------

@@ -119,6 +119,8 @@ def main(arguments: list[str] | None = None, folder: Path = FOLDER, output: Path
     # Beside the decks: nbconvert's `embed_images` would close each HTML tag of the text at once.
     if (images := folder / 'images').is_dir():
         shutil.copytree(images, output / images.name, dirs_exist_ok=True)
+    for name in ('reveal.js', 'mathjax'):  # who passes them on must add their licences
+        shutil.copy(packages / name / 'LICENSE', library / f'{name}.LICENSE')
     for path in paths:
         print(export(path, output).relative_to(output.parent))
     return 0

@@ -1,0 +1,52 @@
+"""Run the benchmarks and print one table. Nothing here fails: a reader judges the ratios.
+
+python -m benchmarks                    all of them
+python -m benchmarks latency model      some of them
+"""
+
+import argparse
+import importlib
+import os
+import time
+
+from benchmarks.table import print_table
+
+# In this order: the short ones first. Each has a function `measure` that returns rows.
+NAMES = ('latency', 'recorder', 'model', 'fusion', 'two_threads', 'interface', 'set_up', 'checks')
+IDLE_CORES = 0.1
+
+
+def busy_cores(pause_s: float = 2.0) -> float:
+    """Return how many cores of this machine work while this process sleeps."""
+
+    def idle_and_all() -> tuple[int, int]:
+        with open('/proc/stat') as file:
+            ticks = [int(number) for number in file.readline().split()[1:9]]
+        return ticks[3] + ticks[4], sum(ticks)
+
+    idle, total = idle_and_all()
+    time.sleep(pause_s)
+    idle_later, total_later = idle_and_all()
+    return (1 - (idle_later - idle) / (total_later - total)) * len(os.sched_getaffinity(0))
+
+
+def main() -> None:
+    """Run what the command line names."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('names', nargs='*', choices=[[], *NAMES], metavar='NAME', default=NAMES)
+    rows, disturbed = [], []
+    for name in parser.parse_args().names:
+        print(f'measuring: {name}', flush=True)
+        busy = [busy_cores()]
+        rows += importlib.import_module(f'benchmarks.{name}').measure()
+        busy.append(busy_cores())
+        if max(busy) > IDLE_CORES:
+            disturbed.append(f'{name} ({max(busy):.1f} cores)')
+    print()
+    print_table(rows)
+    if disturbed:
+        print(f'\nNot valid, because something else was running: {", ".join(disturbed)}.')
+
+
+if __name__ == '__main__':
+    main()
