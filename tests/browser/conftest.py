@@ -93,6 +93,16 @@ def deck(chromium, instructor_server, request) -> Iterator[LabPage]:
         yield opened
 
 
+@pytest.fixture
+def own_deck(chromium, tmp_path, request) -> Iterator[LabPage]:
+    """Yield an instructor's page on a server of its own, which remembers that slides have ended."""
+    with (
+        server(tmp_path, 'present', 'LESSON=02') as running,
+        page(chromium, running, request.node.name) as opened,
+    ):
+        yield opened
+
+
 def pytest_terminal_summary(terminalreporter) -> None:
     """Say where the screenshots are."""
     terminalreporter.write_line(f'Screenshots: {ARTEFACTS}')

@@ -153,11 +153,20 @@ class LabPage:
         """Wait until a cell has a number, and its kernel nothing to do."""
         self.page.wait_for_function(CELL_RAN, arg=index, timeout=LIMIT_S * 1000)
 
-    # Slides
-
     def active(self) -> int:
         """Return the index of the active cell."""
         return self.page.evaluate(f'() => {PANEL}.content.activeCellIndex')
+
+    def leave_with(self, key: str) -> int:
+        """Press a key that leads to another cell, and return its index."""
+        before = self.active()
+        self.page.keyboard.press(key)
+        self.page.wait_for_function(
+            f'before => {PANEL}.content.activeCellIndex !== before', arg=before
+        )
+        return self.active()
+
+    # Slides
 
     def on_screen(self) -> list[int]:
         """Return the indices of the cells of this slide."""
@@ -168,12 +177,7 @@ class LabPage:
 
     def press(self, key: str) -> int:
         """Press a key that leads to another cell, and return its index once it is shown."""
-        before = self.active()
-        self.page.keyboard.press(key)
-        self.page.wait_for_function(
-            f'before => {PANEL}.content.activeCellIndex !== before', arg=before
-        )
-        active = self.active()
+        active = self.leave_with(key)
         self.wait_for_slide(active)
         return active
 

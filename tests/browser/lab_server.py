@@ -33,11 +33,15 @@ class Server(NamedTuple):
 def server(folder: Path, *make: str) -> Iterator[Server]:
     """Run a command of the Makefile that starts JupyterLab, as a process group of its own."""
     shutil.copytree(ROOT / 'notebooks', folder / 'notebooks')
-    state = [f'{name}={folder / name}' for name in ('JUPYTER_CONFIG_DIR', 'JUPYTER_RUNTIME_DIR')]
-    options = 'LAB_ARGS=--LabApp.expose_app_in_browser=True'
+    # Two workers start servers at the same moment, and would both find the first free port. The
+    # system gives each a port of its own.
+    command = ['make', *make, 'PORT=0', 'BROWSER=no', f'ROOT={folder}']
+    command += [f'{name}={folder / name}' for name in ('JUPYTER_CONFIG_DIR', 'JUPYTER_RUNTIME_DIR')]
+    command += ['LAB_ARGS=--LabApp.expose_app_in_browser=True']
     with Path(folder, 'log').open('w') as log:
         process = subprocess.Popen(
-            ['make', *make, 'BROWSER=no', f'ROOT={folder}', options, *state],
+            # If this test is killed, the server is told, and ends its kernels.
+            ['setpriv', '--pdeathsig', 'TERM', *command],
             cwd=ROOT,
             stdin=subprocess.DEVNULL,
             stdout=log,

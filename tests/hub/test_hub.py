@@ -47,7 +47,6 @@ folder = Path({folder!r})
 c.JupyterHub.authenticator_class = 'dummy'
 c.JupyterHub.spawner_class = 'simple'
 c.SimpleLocalProcessSpawner.home_dir_template = str(folder / 'home' / '{{username}}')
-c.JupyterHub.bind_url = 'http://127.0.0.1:{port}'
 c.JupyterHub.hub_port = {hub_port}
 c.ConfigurableHTTPProxy.api_url = 'http://127.0.0.1:{proxy_port}'
 c.ConfigurableHTTPProxy.pid_file = str(folder / 'proxy.pid')
@@ -87,7 +86,6 @@ class Hub:
             CONFIG.format(
                 config=str(ROOT / 'tools/hub/jupyterhub_config.py'),
                 folder=str(folder),
-                port=port,
                 hub_port=hub_port,
                 proxy_port=proxy_port,
                 token=self.token,
@@ -95,7 +93,8 @@ class Hub:
         )
         self.process = subprocess.Popen(
             # If this test is killed, the hub is told, and ends the servers and the proxy.
-            ['setpriv', '--pdeathsig', 'TERM', sys.executable, '-m', 'jupyterhub', '-f', config],
+            ['setpriv', '--pdeathsig', 'TERM', sys.executable, '-m', 'jupyterhub']
+            + ['--config', config, '--url', self.url],
             cwd=folder,
             stdout=self.log.open('w'),
             stderr=subprocess.STDOUT,

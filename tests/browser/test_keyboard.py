@@ -1,0 +1,107 @@
+"""The first hour without a mouse: every step is a key that a person presses."""
+
+import pytest
+from lab_page import PANEL, LabPage, printed
+
+FOCUSED = '() => document.activeElement.innerText'
+IN_CELL = f'() => {PANEL}.content.activeCell.node.contains(document.activeElement)'
+FOLDED = f'() => {PANEL}.content.activeCell.inputHidden'
+OPEN = '() => document.activeElement.parentElement.open'
+
+
+def run_to(lab: LabPage, index: int) -> None:
+    """Press Shift+Enter until this cell is the active one, and wait for each cell that runs."""
+    cells = lab.cells()
+    while (active := lab.active()) < index:
+        lab.leave_with('Shift+Enter')
+        if cells[active]['cell_type'] == 'code':
+            lab.wait_until_ran(active)
+
+
+def tab_to(lab: LabPage, text: str) -> None:
+    """Press Tab until what has this text is chosen, without leaving the active cell."""
+    while lab.page.evaluate(FOCUSED) != text:
+        lab.page.keyboard.press('Tab')
+        assert lab.page.evaluate(IN_CELL), f'Tab does not lead to {text!r}'
+
+
+def quiz(lab: LabPage) -> int:
+    """Return the index of the first question whose answers open."""
+    sources = [''.join(cell['source']) for cell in lab.cells()]
+    found = next((i for i, source in enumerate(sources) if '### Question 1' in source), None)
+    if found is None:
+        pytest.skip('This lesson has no quiz.')
+    return found
+
+
+def answers(lab: LabPage) -> list[str]:
+    """Return what can be opened in the active cell."""
+    cell = lab.page.evaluate_handle(f'() => {PANEL}.content.activeCell.node').as_element()
+    return [answer.inner_text() for answer in cell.query_selector_all('summary')]
+
+
+def test_a_student_runs_solves_looks_at_a_solution_and_goes_on(lab):
+    lab.goto('')
+    lab.wait_for_notebook('00_start_here.ipynb')
+    lab.command('notebook:clear-all-cell-outputs')
+    starter, check, solution = (lab.find(tag) for tag in ('exercise', 'check', 'solution'))
+    run_to(lab, starter)
+    lab.page.keyboard.press('Enter')
+    lab.page.keyboard.press('Control+A')
+    lab.page.keyboard.insert_text('robots = 2')
+    run_to(lab, solution)
+    assert 'All done.' in printed(lab.cells()[check])
+    assert lab.page.evaluate(FOLDED)
+    lab.page.keyboard.press('Enter')
+    assert not lab.page.evaluate(FOLDED)
+    lab.screenshot('keyboard_solution')
+    run_to(lab, solution + 1)
+    while '01 Publish and subscribe' not in lab.cells()[lab.active()]['source']:
+        lab.leave_with('ArrowUp')
+    tab_to(lab, '01 Publish and subscribe')
+    lab.page.keyboard.press('Enter')
+    lab.wait_for_notebook('01_publish_and_subscribe.ipynb')
+    run_to(lab, 4)
+
+
+def test_a_student_opens_and_closes_the_answers_of_a_quiz(lab):
+    lab.open('01_publish_and_subscribe.ipynb')
+    question = quiz(lab)
+    while lab.active() < question:
+        lab.leave_with('ArrowDown')
+    assert len(answers(lab)) == 3
+    for answer in answers(lab):
+        tab_to(lab, answer)
+        lab.page.keyboard.press('Enter')
+        assert lab.page.evaluate(OPEN)
+        lab.page.keyboard.press('Space')
+        assert not lab.page.evaluate(OPEN)
+
+
+def test_an_instructor_walks_runs_and_ends_a_deck(own_deck):
+    own_deck.present('01_publish_and_subscribe.ipynb')
+    own_deck.command('notebook:clear-all-cell-outputs')
+    code = next(i for i, cell in enumerate(own_deck.cells()) if cell['cell_type'] == 'code')
+    forth = [own_deck.active()]
+    while forth[-1] < code:
+        forth.append(own_deck.press('Space'))
+    own_deck.page.keyboard.press('Control+Enter')
+    own_deck.wait_until_ran(code)
+    back = [own_deck.active()]
+    while back[-1] > 0:
+        back.append(own_deck.press('Shift+Space'))
+    assert back == forth[::-1]
+    own_deck.page.keyboard.press('Escape')
+    own_deck.page.wait_for_function('() => !document.body.dataset.jpDeckMode')
+
+
+def test_an_instructor_opens_an_answer_and_goes_on(deck):
+    deck.present('01_publish_and_subscribe.ipynb')
+    question = quiz(deck)
+    while deck.active() < question:
+        deck.press('Space')
+    tab_to(deck, answers(deck)[0])
+    deck.page.keyboard.press('Enter')
+    assert deck.page.evaluate(OPEN)
+    deck.screenshot('keyboard_answer')
+    assert deck.press('Space') > question
