@@ -7,14 +7,15 @@ message that was never heard counts as lost. `interface_tree` takes the tables o
 transform. Bad input raises before anything is drawn.
 
 The colours are those of Okabe and Ito ("Color Universal Design", 2008), which people with any kind
-of colour vision can tell apart. No meaning hangs on a colour alone: the shape differs too.
+of colour vision can tell apart. No meaning hangs on a colour alone: the shape differs too. Each
+picture is described in words, too: see `alt_text`.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import cycle
 from numbers import Integral, Real
 
@@ -29,6 +30,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
+from helpers.alt_text import describe
 from helpers.recording import check_table
 
 PUBLISHED, HEARD, LOST = '#9aa5ae', '#0072B2', '#D55E00'
@@ -44,8 +46,8 @@ TREE_MARKERS = 'osD^'
 LINE_LOOKS = (
     {'color': HEARD, 'ls': '-'},
     {'color': LOST, 'ls': (0, (5, 2))},
+    {'color': '#000000', 'ls': (0, (1, 1.2))},
     {'color': '#009E73', 'ls': (0, (5, 2, 1, 2))},
-    {'color': '#CC79A7', 'ls': (0, (1, 1.2))},
 )
 TRUTH = '#c3c9ce'
 
@@ -70,6 +72,7 @@ def sequence_gaps(table: pd.DataFrame, title: str | None = None, ax: Axes | None
     ax = _axes(ax)
     handles = _draw_gaps(ax, table)
     _dress(ax, title or f'Messages: {_loss(table)}', TIME_LABEL, 'sequence number', handles)
+    describe(ax, _gaps_in_words(table), title or 'Messages')
     _label_gaps(ax, table)
     return ax
 
@@ -91,6 +94,7 @@ def before_and_after(
     for ax, table, label in zip(panels, tables, labels, strict=True):
         handles = _draw_gaps(ax, table, scale=0.5)
         _dress(ax, f'{label}: {_loss(table)}', TIME_LABEL, 'sequence number', handles)
+        describe(ax, _gaps_in_words(table), label)
     panels[1].set_ylabel('')
     return figure
 
@@ -139,10 +143,18 @@ def timeline(
         handles.append(Patch(**look))
     ax.set_yticks(range(len(lane)), threads)
     ax.set_ylim(max(len(lane), 1) - 0.5, -0.5)  # the first thread on top
-    ax.set_xlim(*(span_s or (0, None)))
+    # Axes that share their time show the longest run of all.
+    last_s = max(one.dataLim.x1 for one in ax.get_shared_x_axes().get_siblings(ax))
+    ax.set_xlim(span_s or (0, 1.02 * last_s if math.isfinite(last_s) else 1))
     default = 'One bar for each callback, with its sequence number'
     legend = handles if isinstance(table, Mapping) else None
     _dress(ax, title or default, time_label, 'thread', legend, grid='x')
+    named = f' The groups are: {", ".join(groups)}.' if legend else ''
+    describe(
+        ax,
+        'One lane for each thread that ran a callback, one bar for each callback, with its '
+        f'sequence number where it fits.{named} {_overlap_in_words(bars)}',
+    )
     if bars.empty:
         _say(ax, 'no callback was called')
     _label_bars(ax, bars, lane)
@@ -186,6 +198,14 @@ def queue_length(
     ax.set_ylim(-0.04 * depth, 1.12 * depth)  # a line at zero must be seen, too
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     _dress(ax, title or 'How full is the queue?', TIME_LABEL, 'messages waiting', handles)
+    describe(
+        ax,
+        f'A line in steps: how many messages wait. It never goes above {depth}, the depth, which '
+        'is a dashed line. '
+        + (
+            'Crosses mark when a message was pushed out.' if len(lost_at) else 'None is pushed out.'
+        ),
+    )
     return ax
 
 
@@ -232,6 +252,12 @@ def latency(
         right.set_ylabel('latency (periods)', fontsize=NORMAL)
         right.tick_params(labelsize=SMALL)
         right.spines['right'].set_visible(True)
+    periods = ' The axis on the right counts it in periods of the publisher.' if period_s else ''
+    describe(
+        ax,
+        'One dot for each message that was heard: how long it waited.'
+        f'{periods} {_loss_in_words(table, "crosses at the bottom")}',
+    )
     if heard.empty:
         _say(ax, 'no message was heard')
     return ax
@@ -258,8 +284,11 @@ def sweep(
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
         _dress(ax, name, results.index.name or '', '', None)
         ax.title.set_fontsize(NORMAL)
+        marked = ''
         if limit is not None:
             line = ax.axvline(limit, color=LIMIT, ls='--', lw=1.8, label=limit_label)
+            marked = f' A dashed line marks {limit}: {limit_label}.'
+        describe(ax, f'One dot for each of {_list(results.index)}, joined by a line.{marked}')
     if limit is not None:
         figure.legend(handles=[line], loc='upper right', fontsize=SMALL, frameon=False)
     return figure
@@ -279,6 +308,7 @@ def bars(values: pd.Series, xlabel: str, title: str | None = None) -> Axes:
     ax.invert_yaxis()
     ax.margins(x=0.12)
     _dress(ax, title or '', xlabel, '', None, grid='x')
+    describe(ax, f'One horizontal bar, with its value, for each of: {_list(values.index)}.')
     return ax
 
 
@@ -332,6 +362,15 @@ def topic_graph(endpoints: pd.DataFrame, title: str | None = None) -> Axes:
                 arrowprops={'arrowstyle': '-|>', 'lw': 2, 'ls': '-' if both else '--',
                             'color': LIMIT, 'mutation_scale': 18},
             )  # fmt: skip
+    describe(
+        ax,
+        'Boxes for nodes and topics, joined by arrows. '
+        + ' '.join(
+            f'{end.node} {"publishes on" if end.role == "publisher" else "subscribes to"} '
+            f'{end.topic} ({end.type}), {end.qos}.'
+            for end in pd.concat([publishers, subscriptions]).itertuples()
+        ),
+    )
     return ax
 
 
@@ -375,6 +414,16 @@ def who_waits(
         arrow(awaited, needed, 'needs', not free)
         if not free:
             arrow(needed, waiting, 'is held by', True)
+    needs = (
+        f'{name}, which {"is free" if free else f"{callback} holds"}'
+        for name, free in (('a thread', thread_free), ("the client's group", group_free))
+    )
+    circles = ('no circle', 'one circle', 'two circles')[(not thread_free) + (not group_free)]
+    describe(
+        ax,
+        f'Boxes joined by arrows. {callback} waits for {answer}. {answer.capitalize()} needs '
+        f'{" and ".join(needs)}. The arrows close {circles}.',
+    )
     return ax
 
 
@@ -431,6 +480,12 @@ def interface_tree(table: pd.DataFrame, title: str | None = None, ax: Axes | Non
         handles=handles, fontsize=SMALL, ncols=3, loc='upper left', bbox_to_anchor=(0, 0),
         frameon=False,
     )  # fmt: skip
+    describe(
+        ax,
+        f'A tree, one line a field, with its type: {len(table) - 1} fields in {table.depth.max()} '
+        f'levels below {table.field[0]}. The shape and the colour of a mark tell from which '
+        f'package the type comes: {_list(packages)}. Where a branch ends is a primitive type.',
+    )
     return ax
 
 
@@ -468,11 +523,17 @@ def path(
         handles += ax.plot(table.x, table.y, lw=1.8, label=name, **look)
         if ellipses_s is not None:
             for row in table[(table.t // ellipses_s).diff() > 0].itertuples():
-                ax.add_patch(_ellipse(row, look['color']))
+                ax.add_patch(_ellipse(row, look))
     handles += [ax.scatter(truth.x.iloc[0], truth.y.iloc[0], s=70, color=LIMIT, zorder=5,
                            label='start')]  # fmt: skip
     ax.set_aspect('equal', 'datalim')
     _dress(ax, title or 'The path, seen from above', 'x (m)', 'y (m)', handles)
+    describe(
+        ax,
+        f'Seen from above: a wide line for the truth, and a line for each of: {_list(estimates)}.'
+        + (' Plus signs are the positions that GPS gave.' if fixes is not None else '')
+        + (f' Ellipses show 3 sigma every {ellipses_s:g} seconds.' if ellipses_s else ''),
+    )
     return ax
 
 
@@ -507,6 +568,9 @@ def error(
     else:
         ax.set_ylim(bottom=0)
     _dress(ax, title or 'How far off each estimate is', 'time (s)', ylabel, handles)
+    shaded = (f' Shaded: {name}, {first:g} to {last:g} s.' for name, (first, last) in spans.items())
+    scale = ' The vertical axis is logarithmic.' if log else ''
+    describe(ax, f'One line for each of: {_list(errors)}.{scale}{"".join(shaded)}')
     return ax
 
 
@@ -535,6 +599,11 @@ def innovation(innovations: pd.DataFrame, title: str | None = None, ax: Axes | N
         label = f'kept out {len(kept_out)}'
         handles.append(_crosses(ax, kept_out.t, kept_out.innovation, label))
     _dress(ax, title or 'Measured minus expected', 'time (s)', 'innovation (m)', handles)
+    describe(
+        ax,
+        'One dot for each measurement that was used, and a band of 3 sigma around zero. '
+        + ('Crosses were kept out.' if len(kept_out) else 'None was kept out.'),
+    )
     return ax
 
 
@@ -581,6 +650,8 @@ def frame_tree(transforms: pd.DataFrame, title: str | None = None) -> Axes:
     ax.set_ylim(-max(rows.values()) - 0.6, 0.6)
     _dress(ax, title or 'The tree of frames', '', '', handles)
     ax.set_axis_off()
+    edges = (f'{row.parent} to {row.child} by {row.publisher}' for row in transforms.itertuples())
+    describe(ax, f'One arrow for each transform, and who publishes it: {"; ".join(edges)}.')
     return ax
 
 
@@ -606,13 +677,13 @@ def _check_number(what: str, items) -> None:
         raise ValueError(f'One picture can show 1 to {len(LINE_LOOKS)} {what}, not {len(items)}.')
 
 
-def _ellipse(row, colour: str) -> Ellipse:
+def _ellipse(row, look: dict) -> Ellipse:
     """The 3-sigma ellipse of a position, from the eigenvalues of its covariance."""
     covariance = np.array([[row.var_x, row.cov_x_y], [row.cov_x_y, row.var_y]])
     variances, axes = np.linalg.eigh(covariance)
     width, height = 2 * 3 * np.sqrt(variances.clip(min=0))
     angle = math.degrees(math.atan2(axes[1, 0], axes[0, 0]))
-    return Ellipse((row.x, row.y), width, height, angle=angle, fill=False, color=colour, lw=1.2)
+    return Ellipse((row.x, row.y), width, height, angle=angle, fill=False, lw=1.2, **look)
 
 
 def _tree_layout(transforms: pd.DataFrame) -> tuple[dict[str, int], dict[str, float]]:
@@ -679,6 +750,34 @@ def _natural(name: str) -> list:
 def _loss(table: pd.DataFrame) -> str:
     lost = int(table.started_s.isna().sum())
     return f'{lost} of {len(table)} lost' if lost else 'none lost'
+
+
+def _list(names: Iterable) -> str:
+    return ', '.join(map(str, names))
+
+
+# What a picture shows, in words: nbval compares them, so no number that moves may be in them.
+
+
+def _gaps_in_words(table: pd.DataFrame) -> str:
+    return (
+        f'{len(table)} messages. A small dot is a message when it was published, a large dot the '
+        f'start of its callback. {_loss_in_words(table, "crosses")}'
+    )
+
+
+def _loss_in_words(table: pd.DataFrame, marks: str) -> str:
+    lost = table.started_s.isna()
+    if not lost.any():
+        return 'None was lost.'
+    return f'{"All" if lost.all() else "Some"} were lost: {marks}.'
+
+
+def _overlap_in_words(bars: pd.DataFrame) -> str:
+    """Say whether two bars ever overlap: one begins before an earlier one has ended."""
+    bars = bars.sort_values('started_s')
+    overlap = (bars.started_s.iloc[1:].to_numpy() < bars.finished_s.cummax().iloc[:-1]).any()
+    return 'Some callbacks overlap.' if overlap else 'No two callbacks overlap.'
 
 
 def _axes(ax: Axes | None, height: float = SIZE[1]) -> Axes:

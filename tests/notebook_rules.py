@@ -18,11 +18,12 @@ from nbformat import NotebookNode
 from nbval.plugin import comment_markers, metadata_tags
 
 from tools.notebooks import clean, text_of
-from tools.slides import SKIPPED, SLIDE, height, slide_types
+from tools.slides import PICTURE, SKIPPED, SLIDE, height, slide_types
 
 MAX_CODE_LINES = 25
 MAX_FILE_LINES = 36  # of a cell that writes a file, which cannot be cut in two
 MAX_WORDS = 180
+LEAST_WORDS = 6  # of an alternative text
 EXERCISES = {'01': 1, '02': 2, '03': 2, '04': 2, '05': 2}  # at least; one in any other lesson
 TAGS = {'predict', 'exercise', 'check', 'solution', 'nbval-ignore-output', 'deck-break', *SKIPPED}
 LABELS = ['You will do', 'You will learn', 'You need', 'Time']
@@ -111,8 +112,8 @@ def texts(cell: NotebookNode) -> Iterator[str]:
             yield output.text
         yield from output.get('traceback', [])
         for kind, data in output.get('data', {}).items():
-            if kind not in ('image/png', 'image/jpeg'):
-                yield str(data)
+            if not kind.startswith('image/'):
+                yield PICTURE.sub('', str(data))
 
 
 def printed(cell: NotebookNode, start: str) -> int:
@@ -205,6 +206,35 @@ def no_changed_outputs(notebook: NotebookNode) -> list[str]:
         for name, cell in code_cells(notebook)
         if (match := calls.search(cell.source))
     ]
+
+
+def pictures_described(notebook: NotebookNode) -> list[str]:
+    """Every picture has a text of its own, for those who do not see it."""
+    found, known = [], set()
+    for index, cell in enumerate(notebook.cells, 1):
+        for alt in alternative_texts(cell):
+            if len(alt.split()) < LEAST_WORDS:
+                found.append(
+                    f'Cell {index} has a picture without an alternative text of {LEAST_WORDS} '
+                    f'words or more: {alt!r}. helpers.alt_text gives one to a figure.'
+                )
+            elif alt in known:
+                found.append(f'Cell {index}: another picture has the alternative text {alt!r}.')
+            known.add(alt)
+    return found
+
+
+def alternative_texts(cell: NotebookNode) -> Iterator[str]:
+    """Yield the text of each picture in a cell and in its outputs, an empty one if it has none."""
+    if cell.cell_type == 'markdown':
+        yield from re.findall(r'!\[([^\]]*)\]', cell.source)
+    bundles = [output.get('data', {}) for output in cell.get('outputs', [])]
+    yield from ['' for data in bundles for kind in data if kind.startswith('image/')]
+    htmls = [cell.source] if cell.cell_type == 'markdown' else []
+    htmls += [data.get('text/html', '') for data in bundles]
+    for tag in re.findall(r'<img\b[^>]*>', '\n'.join(htmls)):
+        alt = re.search(r'\balt="([^"]*)"', tag)
+        yield alt[1] if alt else ''
 
 
 # What is compared
@@ -462,6 +492,7 @@ GROUPS: dict[str, list[Rule]] = {
         no_object_echo,
         no_last_semicolon,
         no_changed_outputs,
+        pictures_described,
     ],
     'compared': [nothing_ignored, known_tags],
     'file': [saved_clean, hides_solutions_and_notes_only, folded_solutions_keep_their_secret],

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+from html import unescape
 from pathlib import Path
 
 import nbformat
@@ -43,8 +44,16 @@ RANDOM_LOG = """\
 import random
 for number in random.sample(range(1000), k=random.randint(5, 15)):
     print(f'[INFO] [slow_subscriber]: I heard: "Hello World: {number}"')"""
+RANDOM_FIGURE = """\
+import random
+import matplotlib.pyplot as plt
+from helpers.alt_text import describe
+_, axes = plt.subplots()
+line = axes.plot([random.random() for _ in range(9)])
+describe(axes, 'A line through <nine> "points".')"""
 SOLUTION = '# Solution of exercise 1\ndepth = 20\ncheck_depth(depth)'
 PASSED = '[ok] depth is 20\n[ok] none is lost\nExercise 1: 2 of 2. All done.\n'
+ALT = 'One dot for each of 41 messages. Some were lost.'
 FAILED = '[missing] depth is 20\n[ok] none is lost\nExercise 1: 1 of 2.\n'
 
 
@@ -65,6 +74,11 @@ def code(source, *tags, outputs=()):
     return cell
 
 
+def figure(alt):
+    html = f'<img alt="{alt}" src="data:image/png;base64,iVBO+0xabcdef/tmp/AA">'
+    return shown('display_data', text_html=html, text_plain=alt)
+
+
 def exercise(count):
     return [
         new_markdown_cell(f'### Exercise {count}: choose the depth\n\nChange the depth.'),
@@ -83,9 +97,7 @@ def lesson(*cells, before=()):
             new_markdown_cell('## 1. Publish\n\n```python\n# a comment, no heading\n```'),
             *before,
             code('my_guess = 41', 'predict'),
-            code(
-                'axes = draw(table)', outputs=shown('display_data', image_png='', text_plain='<F>')
-            ),
+            code('axes = draw(table)', outputs=figure(ALT)),
             code('checks.compare_prediction("How many?", my_guess, heard)'),
             *cells,
             *exercise(1),
@@ -204,6 +216,12 @@ BROKEN = [
     (rules.no_last_semicolon, lesson(code('%matplotlib inline\na.plot(x);'))),
     (rules.no_changed_outputs, lesson(code('clear_output(wait=True)'))),
     (rules.no_changed_outputs, lesson(code('bar = display(0, display_id=True)'))),
+    (rules.pictures_described, lesson(code('draw(b)', outputs=figure(ALT)))),
+    (rules.pictures_described, lesson(code('draw(b)', outputs=figure('A figure.')))),
+    (rules.pictures_described, lesson(code('draw(b)', outputs=shown(text_html='<img src="b">')))),
+    (rules.pictures_described, lesson(code('draw(b)', outputs=shown(image_png='iVBO')))),
+    (rules.pictures_described, lesson(new_markdown_cell('![](images/b.png)'))),
+    (rules.pictures_described, lesson(new_markdown_cell('<img src="images/b.png">'))),
     (rules.nothing_ignored, lesson(code('# NBVAL_IGNORE_OUTPUT\nrun()'))),
     (rules.nothing_ignored, lesson(code('# NBVAL_IGNORE_OUTPUT\n# Not compared:\nrun()'))),
     (rules.nothing_ignored, lesson(code('run()', 'nbval-ignore-output'))),
@@ -392,10 +410,11 @@ def test_nbval_agrees_with_what_the_tool_saves(tmp_path, monkeypatch):
         code('import sys\nfrom pathlib import Path\nPath.cwd().name, sys.executable'),
         code('import os\nprint("seen")\n_ = os.write(1, b"at C level")'),
         code('import ipywidgets\nout = ipywidgets.Output()\nwith out:\n    print("in")\nout'),
-        code('%matplotlib inline\nimport matplotlib.pyplot as plt\n_, axes = plt.subplots()'),
+        code(RANDOM_FIGURE),
         code('for i in range(3):\n    print(f"\\r{i} of 3", end="", flush=True)\nprint("\\rdone")'),
         code(RANDOM_LOG),
         code('print("first")'),
+        code(f'%matplotlib inline\n{RANDOM_FIGURE}\nplt.show()'),
     )
     ids = [cell.id for cell in nbformat.read(path, as_version=4).cells]
     spec = tmp_path / 'jupyter' / 'kernels' / 'python3' / 'kernel.json'
@@ -412,11 +431,17 @@ def test_nbval_agrees_with_what_the_tool_saves(tmp_path, monkeypatch):
     assert notebook.cells[0].outputs[0].data['text/plain'] == f'{(tmp_path.name, sys.executable)}'
     assert [output.text for output in notebook.cells[1].outputs] == ['seen\n']
     assert [output.text for output in notebook.cells[4].outputs] == ['done\n']
+    for figure in (notebook.cells[3], notebook.cells[7]):
+        [alt] = rules.alternative_texts(figure)
+        assert unescape(alt) == 'A line through <nine> "points".'
     notebook.cells[6].outputs[0].text = 'second\n'
+    data = notebook.cells[7].outputs[0].data
+    data['text/html'] = data['text/html'].replace('A line', 'A curve')
     nbformat.write(notebook, path)
     report = nbval(path)
-    assert '1 failed, 6 passed' in report
+    assert '2 failed, 6 passed' in report
     assert 'Cell 6 - ' in report
+    assert 'Cell 7 - ' in report
 
 
 def nbval(path):
@@ -426,12 +451,20 @@ def nbval(path):
     return subprocess.run(command, cwd=path.parent, capture_output=True, text=True).stdout
 
 
-def test_the_sanitize_file_replaces_only_what_the_slow_subscriber_heard():
-    [(regex, replacement)] = get_sanitize_patterns(SANITIZE.read_text(encoding='utf-8'))
+def sanitized(text):
+    for regex, replacement in get_sanitize_patterns(SANITIZE.read_text(encoding='utf-8')):
+        text = re.sub(regex, replacement, text)
+    return text
 
-    def sanitized(log):
-        return re.sub(regex, replacement, log)
 
+def test_the_sanitize_file_replaces_of_a_figure_only_the_pixels():
+    html = '<img alt="One dot." src="data:image/png;base64,{}"> <a href="x">y</a>'
+    assert sanitized(html.format('iVBO+/8=')) == sanitized(html.format('iVBOAAAA'))
+    assert sanitized(html) != sanitized(html.replace('One', 'No'))
+    assert sanitized(html).endswith('> <a href="x">y</a>')
+
+
+def test_the_sanitize_file_replaces_of_the_logs_only_what_the_slow_subscriber_heard():
     line = '[INFO] [slow_subscriber]: I heard: "Hello World: {}"\n'
     log = ''.join(line.format(count) for count in range(5))
     assert sanitized(f'before\n{log}after\n') == 'before\n<what slow_subscriber heard>\nafter\n'

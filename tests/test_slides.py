@@ -36,7 +36,8 @@ def printed(lines):
 
 def picture(width, tall):
     header = b'\x89PNG\r\n\x1a\n\0\0\0\rIHDR' + width.to_bytes(4, 'big') + tall.to_bytes(4, 'big')
-    data = {'image/png': b64encode(header).decode(), 'text/plain': '<Figure>'}
+    html = f'<img alt="A plot." src="data:image/png;base64,{b64encode(header).decode()}">'
+    data = {'text/html': html, 'text/plain': 'A plot.'}
     return [new_output('display_data', data=data)]
 
 

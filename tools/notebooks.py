@@ -19,7 +19,6 @@ import re
 import subprocess
 import sys
 import time
-from base64 import b64decode
 from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
@@ -33,7 +32,7 @@ from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernel
 from nbformat import NotebookNode
 from traitlets import default
 
-from tools.slides import slide_types
+from tools.slides import png_of, slide_types
 
 FOLDER = Path(__file__).resolve().parent.parent / 'notebooks'
 CELL_TIMEOUT_S = 100
@@ -167,11 +166,11 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
 def pictures(notebook: NotebookNode) -> dict[str, bytes]:
     """Return the PNG files of `PICTURES` that come from this notebook, by their name."""
     return {
-        PICTURES[cell.id]: b64decode(output.data['image/png'])
+        PICTURES[cell.id]: png
         for cell in notebook.cells
         if cell.get('id') in PICTURES
         for output in cell.outputs
-        if 'image/png' in output.get('data', {})
+        if (png := png_of(output))
     }
 
 

@@ -35,6 +35,7 @@ TABLE_ROW = 4.6
 # Lines of code at most: the size of a letter, the height of a figure.
 CODE = {8: (2.4, 62.0), 18: (2.4, 40.0), 26: (2.15, 28.0), 999: (1.85, 28.0)}
 CODE_LINE, CODE_CHARACTER = 1.3, 0.61  # times the size of a letter
+PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 
 
 def slide_types(notebook: NotebookNode) -> list[str]:
@@ -105,11 +106,16 @@ def _height_of_prose(block: str) -> float:
     return PROSE_GAP + PROSE_LINE * sum(ceil(len(line) / PROSE_CHARACTERS) for line in lines)
 
 
+def png_of(output: NotebookNode) -> bytes | None:
+    """Return the PNG file of an output that is a figure, as `helpers.alt_text` shows one."""
+    found = PICTURE.search(output.get('data', {}).get('text/html', ''))
+    return b64decode(found[1]) if found else None
+
+
 def _height_of_output(output: NotebookNode, letter: float, figure: float) -> float:
     data = output.get('data', {})
-    if 'image/png' in data:
-        header = b64decode(data['image/png'][:64])
-        width, tall = (int.from_bytes(header[i : i + 4], 'big') for i in (16, 20))
+    if png := png_of(output):
+        width, tall = (int.from_bytes(png[i : i + 4], 'big') for i in (16, 20))
         return min(figure, WIDTH * tall / max(width, 1)) + BORDER
     if 'text/html' in data:
         return data['text/html'].count('<tr') * TABLE_ROW

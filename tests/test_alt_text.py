@@ -1,0 +1,155 @@
+"""What is said about a figure. test_notebook_rules.py shows figures in a real kernel."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import pytest
+
+from helpers import plots
+from helpers.alt_text import alt_text, describe
+
+
+@pytest.fixture(autouse=True)
+def close_figures():
+    plt.switch_backend('agg')
+    yield
+    plt.close('all')
+
+
+def run(lost=(), delay_s=0.01, overlap=False):
+    """Return the table of a run of 12 messages, one each 0.1 s; a callback takes 0.05 s or 0.15."""
+    table = pd.DataFrame({'seq': range(12), 'published_s': 0.1 * np.arange(12)})
+    started = table.published_s + delay_s
+    return table.assign(
+        started_s=started.mask(table.seq.isin(lost)),
+        finished_s=(started + (0.15 if overlap else 0.05)).mask(table.seq.isin(lost)),
+        thread=[None if n in lost else f'worker {n % 2 + 1}' for n in range(12)],
+    )
+
+
+DRAW = {
+    'sequence_gaps': plots.sequence_gaps,
+    'before_and_after': lambda table: plots.before_and_after(table, table),
+    'timeline': plots.timeline,
+    'queue_length': lambda table: plots.queue_length(table, 3),
+    'latency': lambda table: plots.latency(table, 0.1),
+}
+each_plot = pytest.mark.parametrize('draw', DRAW.values(), ids=DRAW)
+
+
+def said(draw, *arguments):
+    drawn = draw(*arguments)
+    text = alt_text(getattr(drawn, 'figure', drawn))
+    plt.close('all')
+    return text
+
+
+def test_title_description_and_axes_of_a_figure():
+    figure, ax = plt.subplots()
+    ax.set(title='A drive', xlabel='x (m)', ylabel='y (m)')
+    assert alt_text(figure) == 'A drive. Horizontal axis: x (m). Vertical axis: y (m).'
+    describe(ax, 'A circle, twice.')
+    assert alt_text(figure).startswith('A drive. A circle, twice. Horizontal')
+    describe(ax, 'One circle.', title='Moves')
+    assert alt_text(figure).startswith('Moves. One circle. Horizontal')
+
+
+def test_each_of_several_axes_has_its_turn():
+    figure, (left, right) = plt.subplots(1, 2)
+    figure.suptitle('Two\nruns')
+    right.set_title('Which one?', loc='left')
+    describe(left, 'A line.')
+    assert alt_text(figure) == 'Two runs. Picture 1 of 2. A line. Picture 2 of 2. Which one?'
+
+
+def test_an_empty_description_is_refused():
+    with pytest.raises(ValueError, match='^The description of a figure needs'):
+        describe(plt.figure().add_subplot(), ' ')
+
+
+def test_an_axes_that_is_gone_leaves_nothing_behind():
+    figure, ax = plt.subplots()
+    describe(ax, 'A line.')
+    plt.close(figure)
+    assert alt_text(plt.figure()) == ''
+
+
+@each_plot
+def test_what_moves_from_run_to_run_is_not_said(draw):
+    assert said(draw, run(lost=[4, 5, 6])) == said(draw, run(lost=[5, 6, 7, 9], delay_s=0.02))
+
+
+@each_plot
+def test_the_result_of_a_run_is_said(draw):
+    good, bad = run(), run(lost=[4, 5, 6], overlap=True)
+    assert said(draw, good) != said(draw, bad)
+
+
+def test_losses_and_overlaps_in_words():
+    assert 'None was lost.' in said(plots.sequence_gaps, run())
+    assert 'Some were lost: crosses.' in said(plots.sequence_gaps, run(lost=[3]))
+    assert 'All were lost: crosses.' in said(plots.sequence_gaps, run(lost=range(12)))
+    assert 'No two callbacks overlap.' in said(plots.timeline, run())
+    assert 'Some callbacks overlap.' in said(plots.timeline, run(overlap=True))
+    assert 'No two callbacks overlap.' in said(plots.timeline, run(lost=range(12)))
+    groups = {'fast': run(), 'slow': run(overlap=True)}
+    assert 'The groups are: fast, slow. Some' in said(plots.timeline, groups)
+    assert 'None is pushed out.' in said(plots.queue_length, run(), 3)
+
+
+@pytest.mark.parametrize(
+    ('thread_free', 'group_free', 'words'),
+    [
+        (True, True, "a thread, which is free and the client's group, which is free. no circle."),
+        (
+            False,
+            True,
+            "a thread, which tick holds and the client's group, which is free. one circle.",
+        ),
+        (
+            False,
+            False,
+            "a thread, which tick holds and the client's group, which tick holds. two circles.",
+        ),
+    ],
+)
+def test_who_waits_in_words(thread_free, group_free, words):
+    text = said(plots.who_waits, 'tick', 'the answer', thread_free, group_free)
+    assert 'tick waits for the answer. The answer needs a thread, which' in text
+    assert text.endswith(words.replace('. ', '. The arrows close '))
+
+
+def test_graphs_are_told_arrow_by_arrow():
+    columns = ['node', 'role', 'topic', 'type', 'qos']
+    ends = [
+        ('talker', 'publisher', '/topic', 'std_msgs/msg/String', 'RELIABLE, depth 10'),
+        ('listener', 'subscription', '/topic', 'std_msgs/msg/String', 'BEST_EFFORT, depth 1'),
+    ]
+    text = said(plots.topic_graph, pd.DataFrame(ends, columns=columns))
+    assert 'talker publishes on /topic (std_msgs/msg/String), RELIABLE, depth 10.' in text
+    assert 'listener subscribes to /topic' in text
+    edges = pd.DataFrame([('map', 'odom', 'ekf')], columns=['parent', 'child', 'publisher'])
+    assert 'map to odom by ekf.' in said(plots.frame_tree, edges)
+
+
+def test_what_was_compared_is_named():
+    t = np.arange(3.0)
+    truth = pd.DataFrame({'t': t, 'x': t, 'y': t, 'var_x': 1.0, 'cov_x_y': 0.0, 'var_y': 1.0})
+    fixes = pd.DataFrame({'gps_x': t, 'gps_y': t})
+    text = said(plots.path, truth, {'wheels': truth, 'all': truth}, fixes, 5)
+    assert 'a line for each of: wheels, all. Plus signs' in text
+    assert '3 sigma every 5 seconds.' in text
+    errors = {'wheels': pd.DataFrame({'t': t, 'distance': t + 1})}
+    text = said(plots.error, errors, {'no GPS': (1, 2.5)}, 'distance (m)', True)
+    assert 'One line for each of: wheels. The vertical axis is logarithmic.' in text
+    assert 'Shaded: no GPS, 1 to 2.5 s.' in text
+    results = pd.DataFrame({'lost (%)': [50, 0]}, index=pd.Index([1, 4], name='threads'))
+    text = said(plots.sweep, results, 4, 'enough', 'Forty a second')
+    assert text == (
+        'Forty a second. lost (%). One dot for each of 1, 4, joined by a line. '
+        'A dashed line marks 4: enough. Horizontal axis: threads.'
+    )
+    assert 'for each of: a, b.' in said(plots.bars, pd.Series({'a': 1, 'b': 2}), 'count')
+    kept = pd.DataFrame({'t': t, 'innovation': t, 'sigma': 1.0, 'accepted': [True, True, False]})
+    assert 'Crosses were kept out.' in said(plots.innovation, kept)
+    assert 'None was kept out.' in said(plots.innovation, kept[:2])
