@@ -16,7 +16,8 @@ def assert_all_ran(lab):
     for index, cell in enumerate(cells):
         images = lab.show(index).query_selector_all('img')
         assert all(image.evaluate('img => img.naturalWidth > 0') for image in images)
-        saved = [o for o in cell.get('outputs', []) if 'image/png' in o.get('data', {})]
+        assert all(image.get_attribute('alt') for image in images)
+        saved = [o for o in cell.get('outputs', []) if '<img ' in str(o.get('data', {}))]
         assert len(images) >= len(saved)
 
 
@@ -45,14 +46,14 @@ def test_move_a_slider_and_see_the_figure_change(lab):
     used = next(i for i, source in enumerate(sources) if 'interactive_output' in source)
     lab.run_all()
     cell = lab.show(used)
-    picture = cell.query_selector('.jp-RenderedImage img')
+    picture = cell.query_selector('.jp-RenderedHTML img')
     before = picture.get_attribute('src')
     lab.screenshot('slider_before')
     cell.query_selector('.noUi-handle').focus()
     lab.page.keyboard.press('ArrowRight')
     lab.page.wait_for_function(
         """([cell, before]) => {
-            const image = cell.querySelector('.jp-RenderedImage img');
+            const image = cell.querySelector('.jp-RenderedHTML img');
             return image && image.complete && image.src !== before;
         }""",
         arg=[cell, before],
