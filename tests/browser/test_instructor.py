@@ -22,6 +22,8 @@ CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
             found.push(`cell ${{index}}: ${{part.tagName}}.${{part.className}} is cut off`);
         if (part.tagName === 'IMG' && !part.naturalWidth)
             found.push(`cell ${{index}}: a picture is missing`);
+        if (part.tagName === 'IMG' && !part.alt)
+            found.push(`cell ${{index}}: a picture has no alternative text`);
     }}
     return found;
 }})"""
