@@ -41,13 +41,14 @@ def alt_text(figure: Figure) -> str:
         if len(panels) > 1:
             parts.append(f'Picture {number} of {len(panels)}')
         parts += _of_axes(ax)
-    return ' '.join(_sentence(part) for part in parts if part.strip())
+    text = ' '.join(_sentence(part) for part in parts if part.strip())
+    return text or 'A figure without a title.'
 
 
 def show(figure: Figure) -> None:
     """Display a figure in the notebook, with its alternative text."""
     text = alt_text(figure)
-    data = {'text/plain': text or str(figure)}
+    data = {'text/plain': text}
     if png := print_figure(figure, base64=True):  # None where nothing is drawn
         data['text/html'] = f'<img alt="{escape(text)}" src="data:image/png;base64,{png}">'
     display(data, raw=True)
