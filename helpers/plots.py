@@ -426,7 +426,7 @@ def who_waits(
     circles = ('no circle', 'one circle', 'two circles')[(not thread_free) + (not group_free)]
     describe(
         ax,
-        f'Boxes joined by arrows. {callback} waits for {answer}. {answer.capitalize()} needs '
+        f'Boxes joined by arrows. {callback} waits for {answer}. Needed are '
         f'{", and ".join(needs)}. The arrows close {circles}.',
     )
     return ax
@@ -656,7 +656,7 @@ def frame_tree(transforms: pd.DataFrame, title: str | None = None) -> Axes:
     _dress(ax, title or 'The tree of frames', '', '', handles)
     ax.set_axis_off()
     edges = (f'{row.parent} to {row.child} by {row.publisher}' for row in transforms.itertuples())
-    describe(ax, f'One arrow for each transform, and who publishes it: {"; ".join(edges)}.')
+    describe(ax, f'One arrow for each transform, and who publishes it: {_list(edges)}.')
     return ax
 
 
