@@ -81,7 +81,7 @@ def sequence_gaps(table: pd.DataFrame, title: str | None = None, ax: Axes | None
     ax = _axes(ax)
     handles = _draw_gaps(ax, table)
     _dress(ax, title or f'Messages: {_loss(table)}', TIME_LABEL, 'sequence number', handles)
-    describe(ax, _gaps_in_words(table), title or 'Messages')
+    describe(ax, _gaps_in_words(table), title or '')
     _label_gaps(ax, table)
     return ax
 
@@ -160,7 +160,7 @@ def timeline(
     default = 'One bar for each callback, with its sequence number'
     legend = handles if isinstance(table, Mapping) else None
     _dress(ax, title or default, time_label, 'thread', legend, grid='x')
-    named = f' The groups are: {", ".join(groups)}.' if legend else ''
+    named = f' The groups are: {_list(groups)}.' if legend else ''
     describe(
         ax,
         'One lane for each thread that ran a callback, one bar for each callback, with its '
@@ -312,8 +312,10 @@ def sweep(
     return figure
 
 
-def bars(values: pd.Series, xlabel: str, title: str | None = None) -> Axes:
+def bars(values: pd.Series, xlabel: str, title: str | None = None, exact: bool = False) -> Axes:
     """Draw one horizontal bar a row of `values`, from the top, each with its value.
+
+    `exact` values do not move from run to run: the description in words tells them, too.
 
     Raises ValueError where there is nothing to draw.
     """
@@ -323,13 +325,16 @@ def bars(values: pd.Series, xlabel: str, title: str | None = None) -> Axes:
         raise ValueError('There are no values to draw.')
     values = pd.Series(_numbers(values), values.index)
     ax = _axes(None, height=1.3 + 0.6 * len(values))
-    drawn = ax.barh(values.index.astype(str), values.to_numpy(), color=HEARD, height=0.6)
+    names = values.index.astype(str)
+    drawn = ax.barh(names, values.to_numpy(), color=HEARD, height=0.6)
     texts = [f'{value:.0f}' if value >= 10 else f'{value:.2g}' for value in values]
     ax.bar_label(drawn, texts, padding=5, fontsize=NORMAL)
     ax.invert_yaxis()
     ax.margins(x=0.12)
     _dress(ax, title or '', xlabel, '', None, grid='x')
-    describe(ax, f'One horizontal bar, with its value, for each of: {_list(values.index)}.')
+    if exact:
+        names = [f'{name}: {text}' for name, text in zip(names, texts, strict=True)]
+    describe(ax, f'One horizontal bar, with its value, for each of: {_list(names)}.')
     return ax
 
 
@@ -440,8 +445,8 @@ def who_waits(
     circles = ('no circle', 'one circle', 'two circles')[(not thread_free) + (not group_free)]
     describe(
         ax,
-        f'Boxes joined by arrows. {callback} waits for {answer}. {answer.capitalize()} needs '
-        f'{" and ".join(needs)}. The arrows close {circles}.',
+        f'Boxes joined by arrows. {callback} waits for {answer}. Needed are '
+        f'{", and ".join(needs)}. The arrows close {circles}.',
     )
     return ax
 
@@ -676,7 +681,7 @@ def frame_tree(transforms: pd.DataFrame, title: str | None = None) -> Axes:
     _dress(ax, title or 'The tree of frames', '', '', handles)
     ax.set_axis_off()
     edges = (f'{row.parent} to {row.child} by {row.publisher}' for row in transforms.itertuples())
-    describe(ax, f'One arrow for each transform, and who publishes it: {"; ".join(edges)}.')
+    describe(ax, f'One arrow for each transform, and who publishes it: {_list(edges)}.')
     return ax
 
 
@@ -784,7 +789,7 @@ def _loss(table: pd.DataFrame) -> str:
 
 
 def _list(names: Iterable) -> str:
-    return ', '.join(map(str, names))
+    return '; '.join(map(str, names))
 
 
 # What a picture shows, in words: nbval compares them, so no number that moves may be in them.

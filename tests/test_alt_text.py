@@ -93,29 +93,29 @@ def test_losses_and_overlaps_in_words():
     assert 'Some callbacks overlap.' in said(plots.timeline, run(overlap=True))
     assert 'No two callbacks overlap.' in said(plots.timeline, run(lost=range(12)))
     groups = {'fast': run(), 'slow': run(overlap=True)}
-    assert 'The groups are: fast, slow. Some' in said(plots.timeline, groups)
+    assert 'The groups are: fast; slow. Some' in said(plots.timeline, groups)
     assert 'None is pushed out.' in said(plots.queue_length, run(), 3)
 
 
 @pytest.mark.parametrize(
     ('thread_free', 'group_free', 'words'),
     [
-        (True, True, "a thread, which is free and the client's group, which is free. no circle."),
+        (True, True, "a thread, which is free, and the client's group, which is free. no circle."),
         (
             False,
             True,
-            "a thread, which tick holds and the client's group, which is free. one circle.",
+            "a thread, which tick holds, and the client's group, which is free. one circle.",
         ),
         (
             False,
             False,
-            "a thread, which tick holds and the client's group, which tick holds. two circles.",
+            "a thread, which tick holds, and the client's group, which tick holds. two circles.",
         ),
     ],
 )
 def test_who_waits_in_words(thread_free, group_free, words):
     text = said(plots.who_waits, 'tick', 'the answer', thread_free, group_free)
-    assert 'tick waits for the answer. The answer needs a thread, which' in text
+    assert 'tick waits for the answer. Needed are a thread, which' in text
     assert text.endswith(words.replace('. ', '. The arrows close '))
 
 
@@ -137,7 +137,7 @@ def test_what_was_compared_is_named():
     truth = pd.DataFrame({'t': t, 'x': t, 'y': t, 'var_x': 1.0, 'cov_x_y': 0.0, 'var_y': 1.0})
     fixes = pd.DataFrame({'gps_x': t, 'gps_y': t})
     text = said(plots.path, truth, {'wheels': truth, 'all': truth}, fixes, 5)
-    assert 'a line for each of: wheels, all. Plus signs' in text
+    assert 'a line for each of: wheels; all. Plus signs' in text
     assert '3 sigma every 5 seconds.' in text
     errors = {'wheels': pd.DataFrame({'t': t, 'distance': t + 1})}
     text = said(plots.error, errors, {'no GPS': (1, 2.5)}, 'distance (m)', True)
@@ -146,10 +146,11 @@ def test_what_was_compared_is_named():
     results = pd.DataFrame({'lost (%)': [50, 0]}, index=pd.Index([1, 4], name='threads'))
     text = said(plots.sweep, results, 4, 'enough', 'Forty a second')
     assert text == (
-        'Forty a second. lost (%). One dot for each of 1, 4, joined by a line. '
+        'Forty a second. lost (%). One dot for each of 1; 4, joined by a line. '
         'A dashed line marks 4: enough. Horizontal axis: threads.'
     )
-    assert 'for each of: a, b.' in said(plots.bars, pd.Series({'a': 1, 'b': 2}), 'count')
+    assert 'for each of: a; b.' in said(plots.bars, pd.Series({'a': 1, 'b': 2}), 'count')
+    assert 'a: 1; b: 0.25.' in said(plots.bars, pd.Series({'a': 1, 'b': 0.25}), 'm', '', True)
     kept = pd.DataFrame({'t': t, 'innovation': t, 'sigma': 1.0, 'accepted': [True, True, False]})
     assert 'Crosses were kept out.' in said(plots.innovation, kept)
     assert 'None was kept out.' in said(plots.innovation, kept[:2])
