@@ -274,7 +274,8 @@ def _pauses(heard: pd.DataFrame, threads: int, until: float) -> tuple[np.ndarray
 
 def _regular(durations: pd.Series) -> bool:
     """Whether all durations are alike. If not, a late worker proves nothing."""
-    return len(durations) > 0 and durations.max() <= 2 * durations.median()
+    longest = durations.max()  # NaN of none, infinite while a callback is running
+    return longest < math.inf and longest <= 2 * durations.median()
 
 
 def _count(name: str, value: int) -> int:
