@@ -216,10 +216,10 @@ def test_explain_finds_what_cannot_have_happened(happening, changes, data):
 
 @st.composite
 def regular_runs(draw, most_late):
-    """A run of a timer, whose callbacks need 20 s each and begin late. Return it as above."""
+    """A run of a timer, whose callbacks need about 20 s and begin late. Return it as above."""
     depth, threads = draw(st.integers(1, 10)), draw(st.integers(1, 4))
     period, messages = draw(st.integers(1, 20)), draw(st.integers(2, 40))
-    late = st.integers(0, most_late) if most_late else st.just(0)
+    late, more = st.integers(0, most_late), st.integers(0, draw(st.sampled_from([0, 0, 3])))
     queue, rows, awake_at = [], {}, [0, *(draw(late) for _ in range(threads - 1))]
     now = arrived = 0
     while arrived < messages or queue:
@@ -230,8 +230,9 @@ def regular_runs(draw, most_late):
             arrived += 1
         else:
             now, worker = take_at, awake_at.index(min(awake_at))
-            rows[queue.pop(0)] = now, now + 20, f'worker {worker + 1}'
-            awake_at[worker] = now + 20 + draw(late)
+            finish = now + 20 + draw(more)
+            rows[queue.pop(0)] = now, finish, f'worker {worker + 1}'
+            awake_at[worker] = finish + draw(late)
     return made_table(np.arange(messages) * period, rows), depth, threads
 
 
@@ -268,17 +269,20 @@ def test_a_worker_may_be_a_little_late(run):
 
 
 @tries(150)
-@given(regular_runs(most_late=20), st.integers(0, 2), st.data())
-def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, data):
+@given(regular_runs(most_late=20), st.integers(0, 2), st.sampled_from([0, 0, 4]), st.data())
+def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, delay, data):
     table, depth, threads = run
     table = table.copy()
     for _ in range(fewer):
         lose(data.draw, table)
         assume(heard(table))
-    table.loc[table['started_s'].isna(), 'thread'] = None
-    rests = [s for s in explain(table, depth, threads).contradictions if 'a worker was free' in s]
+    found = explain(table, depth, threads, delay).contradictions
+    rests = [sentence for sentence in found if 'a worker was free' in sentence]
     event(f'rests: {bool(rests)}')
-    assert bool(rests) is (longest_rest(table, depth, threads) > REST * 20)
+    # Nothing but the callbacks was late: on a precise record this is 8 s.
+    callbacks = (table['finished_s'] - table['started_s']).dropna()
+    allowed = REST * callbacks.median() + callbacks.max() - callbacks.min() + delay
+    assert bool(rests) == (longest_rest(table, depth, threads) > allowed)
 
 
 # Real runs: rclpy and Fast DDS, one step after the other
