@@ -91,10 +91,12 @@ def test_predict_is_what_a_queue_does(run):
 
 
 @st.composite
-def happenings(draw, most_messages=9, regular=False):
+def happenings(draw):
     """A run in which all is late by chance. Return its table, its depth and its workers."""
     depth, threads = draw(st.integers(1, 4)), draw(st.integers(1, 3))
-    gaps = draw(st.lists(st.integers(0, 6), min_size=1, max_size=most_messages))
+    # An exclusive group has one worker, who may have another thread each time.
+    names = st.integers(1, draw(st.sampled_from([1, 3]))) if threads == 1 else None
+    gaps = draw(st.lists(st.integers(0, 6), min_size=1, max_size=9))
     published = np.cumsum(gaps)
     few = st.integers(0, 4)
     queue, free_at, rows = [], [0] * threads, {}
@@ -112,7 +114,8 @@ def happenings(draw, most_messages=9, regular=False):
             worker = draw(st.sampled_from([w for w in range(threads) if free_at[w] <= now]))
             start = now + draw(few)
             free_at[worker] = start + draw(st.integers(0, 12))
-            rows[queue.pop(0)] = start, free_at[worker], f'worker {worker + 1}'
+            name = draw(names) if names is not None else worker + 1
+            rows[queue.pop(0)] = start, free_at[worker], f'worker {name}'
     return made_table(published, rows), depth, threads
 
 
@@ -209,6 +212,20 @@ def test_explain_finds_what_cannot_have_happened(happening, changes, data):
     possible = can_have_happened(table, depth, threads, delay)
     event(f'possible: {possible}')
     assert (contradictions(table, depth, threads, delay) == []) is possible
+
+
+def test_a_worker_that_is_busy_takes_nothing():
+    heard_late = {0: (0, 10, 'worker 1'), 1: (10, 12, 'worker 2'), 3: (12, 14, 'worker 1')}
+    table = made_table([0, 1, 2, 3], heard_late)
+    assert not can_have_happened(table, 1, 1)
+    assert contradictions(table, 1, 1) != []
+    # With two workers, message 1 was taken at once, and its callback came late.
+    assert can_have_happened(table, 1, 2)
+    assert contradictions(table, 1, 2) == []
+    # Not by the thread that had another callback then.
+    table = made_table([0, 1, 2, 3], heard_late | {1: (10, 12, 'worker 1')})
+    assert not can_have_happened(table, 1, 2)
+    assert contradictions(table, 1, 2) != []
 
 
 # explain: how long a worker may rest
