@@ -144,7 +144,7 @@ counts = mostly(st.sampled_from([1, 2, 10, 10**18, 10**30]))
 seconds = mostly(st.sampled_from([0, 0.05, 1, 1e9, np.float32(0.1), Fraction(1, 3)]))
 
 
-@tries(150)
+@tries(100)
 @given(messages)
 def test_check_table(table):
     checked = answer(check_table, table)
@@ -212,7 +212,7 @@ PICTURES = {
 def test_pictures(draw):
     plt.switch_backend('agg')
 
-    @tries(20)
+    @tries(12)
     @given(PICTURES[draw])
     def no_picture_fails(arguments):
         try:
@@ -445,7 +445,7 @@ def write(root, files):
             path.write_bytes(FILES[name] if content in NAMES else content)
 
 
-@tries(150)
+@tries(80)
 @given(packages())
 def test_packages(files):
     with tempfile.TemporaryDirectory() as folder:
@@ -477,7 +477,7 @@ words = st.sampled_from(PIECES).map(lambda piece: piece.decode('latin-1')) | st.
 )  # fmt: skip
 
 
-@tries(300)
+@tries(200)
 @given(
     st.lists(words | st.text(max_size=5), max_size=20).map(''.join)
     | damaged_text(FILES['CMakeLists.txt']).map(lambda text: text.decode('utf-8', 'replace'))
