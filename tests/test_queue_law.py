@@ -294,6 +294,12 @@ def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, delay, data):
     for _ in range(fewer):
         lose(data.draw, table)
         assume(heard(table))
+    # A worker may never work, or stop for good.
+    threads += data.draw(st.sampled_from([0, 0, 1]))
+    end = data.draw(st.sampled_from([math.inf, 20, 60]))
+    gone = (table['thread'] == 'worker 1') & (table['started_s'] > end)
+    table.loc[gone, ['started_s', 'finished_s', 'thread']] = math.nan, math.nan, None
+    assume(heard(table))
     found = explain(table, depth, threads, delay).contradictions
     rests = [sentence for sentence in found if 'a worker was free' in sentence]
     event(f'rests: {bool(rests)}')
