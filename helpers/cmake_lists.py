@@ -149,14 +149,14 @@ def _nesting(missing: str) -> None:
 
 
 def _tokens(text: str) -> Iterator[tuple[int, str, str]]:
-    position = 0
+    position, line = 0, 1
     while position < len(text):
         match = TOKEN.match(text, position)
-        line = text.count('\n', 0, position) + 1
         if not match:
             error = f'{PARSE_ERROR} Function missing ending ")". End of file reached"'
             raise CMakeListsError(f'what closes {text[position]} of line {line}', error)
         if match.lastgroup != 'space' and not match['space']:
             kind = next(k for k in ('bracket', 'quoted', 'paren', 'word') if match[k] is not None)
             yield line, kind, match[0]
+        line += text.count('\n', position, match.end())
         position = match.end()

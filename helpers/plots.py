@@ -282,14 +282,14 @@ def sweep(
     Names are the axis labels: that of the index below, those of the columns (with their unit) above
     each panel. `limit` marks a value of the index with a line, `limit_label` says what it is.
 
-    Raises ValueError where `results` has no row or no column.
+    Raises TypeError or ValueError for bad results: no row, no column, or something but numbers.
     """
     check_columns(results, [], 'The results of a sweep')
     if results.empty:
         raise ValueError('The results of a sweep need at least one row and one column.')
     check_columns(results, results.columns, 'The results of a sweep')
     results = results.assign(**{name: column_of_numbers(results, name) for name in results})
-    results.index = pd.Index(_numbers(results.index.to_series()), name=results.index.name)
+    results.index = pd.Index(_numbers('index', results.index.to_series()), name=results.index.name)
     if limit is not None and not is_number(limit):
         raise TypeError(f'limit must be a number, not {shown(limit)}.')
     figure = plt.figure(figsize=WIDE, dpi=DPI, layout='constrained')
@@ -317,13 +317,13 @@ def bars(values: pd.Series, xlabel: str, title: str | None = None, exact: bool =
 
     `exact` values do not move from run to run: the description in words tells them, too.
 
-    Raises ValueError where there is nothing to draw.
+    Raises TypeError or ValueError where there is nothing to draw, or something but numbers.
     """
     if not isinstance(values, pd.Series):
         raise TypeError(f'values must be a Series, not {type(values).__name__}.')
     if values.empty:
         raise ValueError('There are no values to draw.')
-    values = pd.Series(_numbers(values), values.index)
+    values = pd.Series(_numbers('values', values), values.index)
     ax = _axes(None, height=1.3 + 0.6 * len(values))
     names = values.index.astype(str)
     drawn = ax.barh(names, values.to_numpy(), color=HEARD, height=0.6)
@@ -345,7 +345,7 @@ def topic_graph(endpoints: pd.DataFrame, title: str | None = None) -> Axes:
     ('publisher' or 'subscription'), `topic`, `type` and `qos` (all text). An arrow is dashed where
     a topic lacks the other side.
 
-    Raises ValueError for a missing column, an empty table or an unknown role.
+    Raises TypeError or ValueError for a bad table or an unknown role.
     """
     endpoints = _checked('endpoints', endpoints, texts=('node', 'role', 'topic', 'type', 'qos'))
     if not endpoints['role'].isin(['publisher', 'subscription']).all():
@@ -535,10 +535,8 @@ def path(
     estimates = _checked_lines('estimate', estimates, 'x', 'y', *more)
     if fixes is not None:
         fixes = _checked('fixes', fixes, 'gps_x', 'gps_y')
-    if ellipses_s is not None and not (is_number(ellipses_s) and ellipses_s > 0):
-        raise ValueError(
-            f'ellipses_s must be a number of seconds above 0, not {shown(ellipses_s)}.'
-        )
+    if ellipses_s is not None:
+        _check_seconds('ellipses_s', ellipses_s)
 
     ax = _axes(ax, height=5.6)
     handles = ax.plot(truth.x, truth.y, color=TRUTH, lw=6, label='truth', solid_capstyle='round')
@@ -686,7 +684,7 @@ def frame_tree(transforms: pd.DataFrame, title: str | None = None) -> Axes:
 
 
 def _checked(what: str, table: pd.DataFrame, *numbers: str, texts: Iterable[str] = ()):
-    """Return the columns of a table that has rows, and numbers or text in them, or raise."""
+    """Return the columns of a table that has rows, with numbers or text in them, or raise."""
     check_columns(table, [*numbers, *texts], what)
     if table.empty:
         raise ValueError(f'{what} is empty: it needs at least one row.')
@@ -708,8 +706,8 @@ def _check_seconds(name: str, value: float) -> None:
         raise ValueError(f'{name} must be a number of seconds above 0, not {shown(value)}.')
 
 
-def _numbers(values: pd.Series) -> np.ndarray:
-    return column_of_numbers(pd.DataFrame({'value': values.to_numpy()}), 'value')
+def _numbers(name: str, values: pd.Series) -> np.ndarray:
+    return column_of_numbers(pd.DataFrame({name: values.to_numpy()}), name)
 
 
 def _check_number(what: str, items) -> None:

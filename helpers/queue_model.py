@@ -37,7 +37,7 @@ def predict(
     moment when a worker becomes free arrives first. Times are exact to the nanosecond.
 
     Raises ValueError or TypeError for a value that is no number, zero or negative (`callback_s`
-    may be zero).
+    may be zero), and for a run that is too long to compute.
     """
     period = _nanoseconds('period_s', period_s)
     callback = _nanoseconds('callback_s', callback_s, zero_allowed=True)
@@ -46,7 +46,9 @@ def predict(
         for name, value in (('depth', depth), ('threads', threads), ('messages', messages))
     )
     if messages * (period + callback) >= 2**63:
-        raise ValueError('This run would take longer than 292 years: choose less of something.')
+        raise ValueError(
+            'This run would take more than 292 years: give shorter times, or fewer messages.'
+        )
     if messages > MOST_MESSAGES:
         raise ValueError(f'messages must be at most {MOST_MESSAGES}, not {messages}.')
     taken, started = [], []
@@ -274,7 +276,8 @@ def _pauses(heard: pd.DataFrame, threads: int, until: float) -> tuple[np.ndarray
 
 def _regular(durations: pd.Series) -> bool:
     """Whether all durations are alike. If not, a late worker proves nothing."""
-    return len(durations) > 0 and durations.max() <= 2 * durations.median()
+    longest = durations.max()  # NaN of none, infinite while a callback is running
+    return longest < math.inf and longest <= 2 * durations.median()
 
 
 def _count(name: str, value: int) -> int:

@@ -237,6 +237,8 @@ def _surround(callback: Callable, start: Callable, finish: Callable) -> Callable
 def check_table(table: pd.DataFrame) -> pd.DataFrame:
     """Return the rows of a recording in the order of their sequence numbers.
 
+    `seq` is then int, the times are float, and `thread` is a str, or None.
+
     Raises TypeError or ValueError, with one clear sentence, where `table` is not a recording.
     """
     check_columns(table, COLUMNS)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pymap3d
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
@@ -288,7 +288,6 @@ steps = st.tuples(
 )
 
 
-@settings(deadline=None)
 @given(st.lists(steps, min_size=1, max_size=40))
 def test_the_covariance_stays_one_and_the_yaw_an_angle(messages):
     ekf = ExtendedKalmanFilter()

@@ -30,6 +30,7 @@ def answer(function, *arguments, **options):
     """Return what a function answers, or None where it refuses: in one sentence of ours."""
     with warnings.catch_warnings(action='error'):
         warnings.simplefilter('ignore', DeprecationWarning)  # between libraries
+        warnings.filterwarnings('ignore', 'Glyph')  # a letter that no font has
         try:
             result = function(*arguments, **options)
             event('answered')
@@ -137,12 +138,13 @@ def with_column(table, at, column):
 
 
 RUN = predict(0.05, 0.2, depth=3, threads=2, messages=12)
-messages = mostly(damaged(RUN))
+# Some look at a run before its callbacks have ended.
+messages = mostly(damaged(RUN) | damaged(RUN.assign(finished_s=math.nan)))
 counts = mostly(st.sampled_from([1, 2, 10, 10**18, 10**30]))
 seconds = mostly(st.sampled_from([0, 0.05, 1, 1e9, np.float32(0.1), Fraction(1, 3)]))
 
 
-@tries(150)
+@tries(100)
 @given(messages)
 def test_check_table(table):
     checked = answer(check_table, table)
@@ -210,16 +212,14 @@ PICTURES = {
 def test_pictures(draw):
     plt.switch_backend('agg')
 
-    @tries(20)
+    @tries(12)
     @given(PICTURES[draw])
     def no_picture_fails(arguments):
         try:
             picture = answer(draw, *arguments)
             assert picture is not None or not plt.get_fignums(), 'bad input raises before drawing'
             if picture is not None:
-                with warnings.catch_warnings(action='error'):
-                    warnings.filterwarnings('ignore', 'Glyph')  # a letter that no font has
-                    getattr(picture, 'figure', picture).draw_without_rendering()
+                answer(getattr(picture, 'figure', picture).draw_without_rendering)
         finally:
             plt.close('all')
 
@@ -445,7 +445,7 @@ def write(root, files):
             path.write_bytes(FILES[name] if content in NAMES else content)
 
 
-@tries(150)
+@tries(80)
 @given(packages())
 def test_packages(files):
     with tempfile.TemporaryDirectory() as folder:
@@ -477,7 +477,7 @@ words = st.sampled_from(PIECES).map(lambda piece: piece.decode('latin-1')) | st.
 )  # fmt: skip
 
 
-@tries(300)
+@tries(200)
 @given(
     st.lists(words | st.text(max_size=5), max_size=20).map(''.join)
     | damaged_text(FILES['CMakeLists.txt']).map(lambda text: text.decode('utf-8', 'replace'))

@@ -261,6 +261,24 @@ def test_messages_that_need_time_to_the_queue():
         explain(table, 10, 1, delay_s=-1)
 
 
+@pytest.mark.filterwarnings('error')
+def test_callbacks_that_are_still_running():
+    table = predict(0.05, 0.2, 10, 1, 41).assign(finished_s=np.nan)[:15]
+    for seq in heard(table)[1:]:
+        table = without(table, seq)
+    explanation = explain(table, 10, 1)
+    assert (explanation.lost, explanation.explained) == (14, 4)
+
+
+def test_two_workers_that_are_both_a_little_late():
+    # Seconds in which one of them is free follow on each other: neither is free for 12 s.
+    table = predict(4, 20, 1, 2, 10)
+    table[['started_s', 'finished_s', 'thread']] = np.nan, np.nan, None
+    for seq, start, worker in ((0, 0, 1), (1, 4, 2), (6, 24, 1), (9, 36, 2)):
+        table.loc[seq, CALLBACK] = start, start + 20, f'worker {worker}'
+    assert explain(table, 1, 2).complete
+
+
 @pytest.mark.parametrize(('depth', 'threads'), [(11, 1), (10, 2), (10, 4)])
 def test_another_queue_or_executor_contradicts(depth, threads):
     assert reported(predict(0.05, 0.2, 10, 1, 41), depth, threads)
