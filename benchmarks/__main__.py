@@ -1,7 +1,9 @@
-"""Run the benchmarks and print one table. Nothing here fails: a reader judges the ratios.
+"""Run the benchmarks and print one table.
 
-python -m benchmarks                    all of them
-python -m benchmarks latency model      some of them
+    python -m benchmarks                    all of them
+    python -m benchmarks latency model      some of them
+
+No number fails: a reader judges the ratios.
 """
 
 import argparse
@@ -33,9 +35,12 @@ def busy_cores(pause_s: float = 2.0) -> float:
 def main() -> None:
     """Run what the command line names."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('names', nargs='*', choices=[[], *NAMES], metavar='NAME', default=NAMES)
+    parser.add_argument('names', nargs='*', metavar='NAME', help=', '.join(NAMES))
+    names = parser.parse_args().names or NAMES
+    if unknown := set(names) - set(NAMES):
+        parser.error(f'{unknown.pop()} is none of {", ".join(NAMES)}')
     rows, remarks = [], []
-    for name in parser.parse_args().names:
+    for name in names:
         print(f'measuring: {name}', flush=True)
         busy = busy_cores()
         try:
