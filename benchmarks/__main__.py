@@ -1,7 +1,9 @@
-"""Run the benchmarks and print one table. Nothing here fails: a reader judges the ratios.
+"""Run the benchmarks and print one table.
 
-python -m benchmarks                    all of them
-python -m benchmarks latency model      some of them
+    python -m benchmarks                    all of them
+    python -m benchmarks latency model      some of them
+
+No number fails: a reader judges the ratios.
 """
 
 import argparse
@@ -11,7 +13,7 @@ import time
 
 from benchmarks.table import print_table
 
-# In this order: the short ones first. Each has a function `measure` that returns rows.
+# The last two take minutes. Each has a function `measure` that returns rows.
 NAMES = ('latency', 'recorder', 'model', 'fusion', 'two_threads', 'interface', 'set_up', 'checks')
 IDLE_CORES = 0.1
 
@@ -33,19 +35,24 @@ def busy_cores(pause_s: float = 2.0) -> float:
 def main() -> None:
     """Run what the command line names."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument('names', nargs='*', choices=[[], *NAMES], metavar='NAME', default=NAMES)
-    rows, disturbed = [], []
-    for name in parser.parse_args().names:
+    parser.add_argument('names', nargs='*', metavar='NAME', help=', '.join(NAMES))
+    names = parser.parse_args().names or NAMES
+    if unknown := set(names) - set(NAMES):
+        parser.error(f'{unknown.pop()} is none of {", ".join(NAMES)}')
+    rows, remarks = [], []
+    for name in names:
         print(f'measuring: {name}', flush=True)
-        busy = [busy_cores()]
-        rows += importlib.import_module(f'benchmarks.{name}').measure()
-        busy.append(busy_cores())
-        if max(busy) > IDLE_CORES:
-            disturbed.append(f'{name} ({max(busy):.1f} cores)')
+        busy = busy_cores()
+        try:
+            rows += importlib.import_module(f'benchmarks.{name}').measure()
+        except Exception as error:  # the others are measured all the same
+            remarks.append(f'{name} failed: {error}')
+        busy = max(busy, busy_cores())
+        if busy > IDLE_CORES:
+            remarks.append(f'{name} is not valid: something else used {busy:.1f} cores.')
     print()
     print_table(rows)
-    if disturbed:
-        print(f'\nNot valid, because something else was running: {", ".join(disturbed)}.')
+    print(*remarks, sep='\n')
 
 
 if __name__ == '__main__':
