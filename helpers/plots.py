@@ -128,6 +128,11 @@ def timeline(
     groups = _checked_groups(table)
     span_s = None if span_s is None else _checked_span(span_s)
     bars = pd.concat([t[t.started_s.notna()].assign(group=name) for name, t in groups.items()])
+    unknown = bars.loc[bars.thread.isna(), 'seq']
+    if len(unknown):
+        raise ValueError(
+            f'It is not known which thread ran the callback of message {unknown.iloc[0]}.'
+        )
     # A callback that had not finished when the recording ended runs to the end of the picture.
     bars['finished_s'] = bars.finished_s.fillna(bars[['started_s', 'finished_s']].max().max())
     threads = sorted(bars.thread.astype(str).unique(), key=_natural)

@@ -240,7 +240,8 @@ def _rests(
     lost = np.flatnonzero(table['started_s'].isna())
     lost = lost[lost + depth < len(table)]
     callbacks, periods = heard['finished_s'] - heard['started_s'], pd.Series(np.diff(published))
-    if not (len(lost) and _regular(callbacks) and _regular(periods)):
+    workers_known = threads == 1 or heard['thread'].notna().all()
+    if not (len(lost) and workers_known and _regular(callbacks) and _regular(periods)):
         return []
     # For how long, up to a time, was a message waiting that would be lost?
     pushed_out = published[lost + depth]
@@ -263,7 +264,7 @@ def _pauses(heard: pd.DataFrame, threads: int, until: float) -> tuple[np.ndarray
     ordered = heard.sort_values(['started_s', 'seq'])
     # A worker is a thread; those of an exclusive group are more, and work one after the other.
     worker = ordered['thread'].to_numpy()
-    if ordered['thread'].nunique() > threads:
+    if threads == 1 or ordered['thread'].nunique() > threads:
         worker = np.arange(len(ordered)) % threads
     finished = ordered['finished_s'].groupby(worker)
     first = ordered['started_s'].iloc[0]

@@ -260,9 +260,4 @@ def check_table(table: pd.DataFrame) -> pd.DataFrame:
     if table['published_s'].isna().any():
         unknown = table.loc[table['published_s'].isna(), 'seq'].iloc[0]
         raise ValueError(f'It is not known when message {unknown} was published.')
-    unknown = table.loc[table['started_s'].notna() & table['thread'].isna(), 'seq']
-    if len(unknown):
-        raise ValueError(
-            f'It is not known which thread ran the callback of message {unknown.iloc[0]}.'
-        )
     return table.sort_values('seq', ignore_index=True)

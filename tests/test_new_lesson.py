@@ -3,8 +3,10 @@
 import nbformat
 import notebook_rules as rules
 import pytest
+from test_teaching import wrong_in_notes, wrong_in_summaries
 
 from tools.new_lesson import TEMPLATE, new_lesson
+from tools.notebooks import FOLDER
 
 
 def test_a_new_lesson_keeps_all_rules(tmp_path):
@@ -15,7 +17,8 @@ def test_a_new_lesson_keeps_all_rules(tmp_path):
     assert [sentence for group in rules.GROUPS for sentence in rules.problems(lesson, group)] == []
     assert rules.title_matches(path.name, lesson) == []
     assert rules.saved_as_jupyter_does(text, lesson) == []
-    assert rules.links_lead_somewhere(lesson, tmp_path) == []
+    assert rules.links_lead_somewhere(lesson, FOLDER) == []
+    assert wrong_in_summaries(lesson) == wrong_in_notes(lesson) == []
     assert '90' not in text
 
 

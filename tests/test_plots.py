@@ -340,6 +340,12 @@ class TestTimeline:
         (bars,) = bars_of(plots.timeline(table)).values()
         assert bars[0][:2] == pytest.approx((0.0, 0.5))
 
+    def test_a_callback_of_an_unknown_thread_has_no_lane(self, slow):
+        slow['thread'] = None  # as in a table made from the output of processes
+        plots.sequence_gaps(slow)
+        with pytest.raises(ValueError, match='^It is not known which thread .* message 0[.]$'):
+            plots.timeline(slow)
+
     def test_no_callback_is_said(self):
         assert words_of(plots.timeline(table_of([np.nan]))) == ['no callback was called']
 

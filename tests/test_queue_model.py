@@ -245,6 +245,10 @@ def test_a_worker_may_be_as_late_as_its_callbacks():
     for seq, start in {1: 0.444, 4: 0.65, 8: 0.86, 12: 1.07}.items():
         table.loc[seq, ['started_s', 'finished_s']] = start, start + 0.2
     assert rested in explain(table, 10, 1).contradictions
+    # One worker is one worker, also where nobody knows its thread. Of two, nothing is known.
+    table['thread'] = None
+    assert rested in explain(table, 10, 1).contradictions
+    assert rested not in explain(table, 10, 2).contradictions
 
 
 def test_messages_that_need_time_to_the_queue():
