@@ -34,6 +34,7 @@ def new_lesson(name: str, folder: Path = FOLDER) -> Path:
         (f'# {NUMBER} {TITLE}', f'# {number} {words.replace("_", " ").capitalize()}'),
         (f'of lesson {NUMBER}', f'of lesson {number}'),
         (f'"lesson-{NUMBER}-', f'"lesson-{number}-'),
+        (f'"note-{NUMBER}-', f'"note-{number}-'),
     ):
         text = text.replace(old, new)
     path = folder / f'{found[0]}.ipynb'
