@@ -50,7 +50,7 @@ def test_what_is_left_in_a_kernel_is_named():
     )
     nothing, left, child = json.loads(answer.stdout)
     assert nothing == []
-    assert 'The thread mine still runs.' in left
+    assert 'The thread mine (Thread) still runs.' in left
     assert 'The thread dds.ev.0 still runs.' in left
     assert f'The process {child} still runs: sleep 9.' in left
     assert 'The kernel holds 2 domain ids instead of one.' in left
@@ -177,7 +177,7 @@ def test_an_interrupted_cell_is_looked_at_and_run_again(tmp_path):
     interrupted, left = record['report'][1:3]
     assert interrupted['interrupted_after_s'] < 3
     assert interrupted['failed'] is None
-    assert 'The thread left still runs.' in left['failed']
+    assert 'The thread left (Thread) still runs.' in left['failed']
     assert record['failed'][0] == 'code cell 3'
 
 

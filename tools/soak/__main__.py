@@ -172,7 +172,7 @@ def soak(
     """Run and record every notebook `rounds` times in every condition; return the records."""
     this_commit, deadline = commit(), time.monotonic() + 60 * minutes
     counts = Counter((r['notebook'], r['condition']) for r in recorded(this_commit))
-    jobs: list[tuple[int, Condition, list[Path]]] = []
+    jobs: list[tuple[int, int, Condition, list[Path]]] = []
     for number in range(rounds):
         for condition in conditions:
             # As many at once as the condition asks for, also where fewer notebooks are wanted.
@@ -180,11 +180,11 @@ def soak(
             groups = [several] if condition.at_once > 1 else [[notebook] for notebook in several]
             for group in groups:
                 done = min(counts[notebook.stem, condition.name] for notebook in group)
-                jobs.append((done + number, condition, group))
+                jobs.append((done + number, number, condition, group))
     records, refused = [], {}
     RUNS.parent.mkdir(exist_ok=True)
     with RUNS.open('a', encoding='utf-8') as file:
-        for number, condition, group in sorted(jobs, key=lambda job: job[0]):
+        for _, number, condition, group in sorted(jobs, key=lambda job: job[0]):
             if time.monotonic() > deadline:
                 break
             if condition.name in refused:

@@ -23,6 +23,7 @@ SHARED_MEMORY = '/dev/shm/fastrtps_'
 LOCK_FILES = ('_el', '_sl')  # of a segment or a port, locked while a process uses it
 # Threads of Fast DDS that belong to no participant: they live until the process ends.
 OF_PROCESS = ('dds.shm.wdog', 'dds.log')
+OF_ZMQ = 'GarbageCollectorThread'  # frees what Jupyter has sent, from its first picture on
 LOOK_EVERY_S = 0.1
 END_TIMEOUT_S = 10.0
 
@@ -36,7 +37,11 @@ def state_of_process() -> dict:
     Of the threads that C++ started, those of Fast DDS's participants. `domain_ids` maps each
     reserved id to the inode of the socket that reserves it.
     """
-    threads = {str(thread.ident): thread.name for thread in threading.enumerate()}
+    threads = {
+        str(thread.ident): f'{thread.name} ({type(thread).__name__})'
+        for thread in threading.enumerate()
+        if type(thread).__name__ != OF_ZMQ
+    }
     for task in Path('/proc/self/task').iterdir():
         with suppress(OSError):  # it has ended
             name = (task / 'comm').read_text().strip()

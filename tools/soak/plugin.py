@@ -42,6 +42,8 @@ REPLY_TIMEOUT_S = 2.0  # it was sent before the kernel became idle
 # From the second try on, the check of an exercise also prints hints. A fresh run has none.
 HINTS = re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE)
 
+# In IPython's traceback: the top level of a module.
+IN_IMPORT = re.compile(r'^File <frozen importlib|^File \S+\.py:\d+$', re.MULTILINE)
 COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
 
 
@@ -213,8 +215,8 @@ class Interrupted(Again):
             return None
         if reply['status'] != 'error':
             return None
-        traceback = '\n'.join(reply['traceback'])
-        if '<frozen importlib' in traceback:
+        traceback = COLOURS.sub('', '\n'.join(reply['traceback']))
+        if IN_IMPORT.search(traceback):
             # Python cannot repeat a half-done import of NumPy: environment.md says to restart.
             self.user_properties.append(('import_interrupted', True))
             restart(self.parent)
