@@ -64,6 +64,8 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
             *('--rootdir', ROOT, '-p', 'no:cacheprovider', '--color=no', '-p', 'tools.soak.plugin'),
             *('--soak-mode', condition.mode, '--soak-seed', str(seed), '--soak-report', report),
         ]
+        if condition.sentence:  # the kernel may die, which nbval notices at its time-out only
+            command += ['--exitfirst', '--nbval-cell-timeout=20']
         environment = os.environ | _environment(folder) | {MARK: mark}
         environment |= condition.environment(random.Random(seed))
         started = time.monotonic()
