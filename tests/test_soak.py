@@ -17,7 +17,7 @@ from tools.soak import __main__ as soak
 from tools.soak import leftovers
 from tools.soak.conditions import CONDITIONS, CannotRunError, Condition, busy_loops, python_of
 from tools.soak.leftovers import MARK, Watch
-from tools.soak.plugin import HINTS
+from tools.soak.plugin import HINTS, IN_IMPORT
 
 CONDITION = {condition.name: condition for condition in CONDITIONS}
 
@@ -125,14 +125,15 @@ def test_what_a_killed_process_leaves_is_named(folders, monkeypatch):
 
 def test_shared_memory_of_a_killed_process_is_removed_and_not_counted(folders):
     mark = f'test-{os.getpid()}'
-    watch = Watch(mark, [folders / 'home'], [folders / 'checkout'])
-    segment = f'{SHARED_MEMORY}/fastrtps_of_{mark}'
-    for end in ('', '_el'):
-        Path(segment + end).touch()
-    with watch:
-        watch._held.add(segment)
+    segment, older = (f'{SHARED_MEMORY}/fastrtps_{name}_of_{mark}' for name in ('new', 'old'))
+    Path(older).touch()
+    with Watch(mark, [folders / 'home'], [folders / 'checkout']) as watch:
+        for end in ('', '_el'):
+            Path(segment + end).touch()
+        watch._held |= {segment, older}
     assert watch.left({}, killed={segment}) == []
     assert not Path(f'{segment}_el').exists()
+    Path(older).unlink()  # somebody else's: it was there before
 
 
 def test_other_processes_are_left_alone(folders):
@@ -194,6 +195,19 @@ def test_the_hints_of_a_second_try_are_not_compared():
     assert HINTS.sub('', f'{head}{hint}[ok]{rest}') == first
 
 
+@pytest.mark.parametrize(
+    ('frame', 'import_'),
+    [
+        ('File ~/my env/site-packages/numpy/_core/numeric.py:12\n     10 import x', True),
+        ('File <frozen importlib._bootstrap>:1176, in _find_and_load(name, import_)', True),
+        ('File ~/env/numpy/_core/numeric.py:580, in ones(shape)\n    579 result', False),
+        ('Cell In[1], line 1\n----> 1 import numpy', False),
+    ],
+)
+def test_an_interrupted_import_is_seen_in_the_traceback(frame, import_):
+    assert bool(IN_IMPORT.search(f'KeyboardInterrupt\n{frame}\n')) is import_
+
+
 # The tool
 
 
@@ -233,6 +247,7 @@ def record(notebook: str, condition: str, failed=None) -> dict:
         'seed': 7,
         'seconds': 3.0,
         'cells': cells,
+        'interrupts': {'interrupted': 2, 'in an import': 0, 'without a reply': 1},
         'failed': failed,
     }
 
@@ -247,6 +262,7 @@ def test_the_table():
     assert lines[1] == '01_a 2 1 2.0 s, code cell 2 busy, code cell 2'
     assert lines[2] == '02_b 1 0 2.0 s, code cell 2'
     assert 'Failures by condition: idle 0 of 2, busy 1 of 1.' in lines
+    assert 'Cells: 6 interrupted, 3 without a reply.' in lines
     assert lines[-2:] == ['It differs.', 'Here.']
 
 

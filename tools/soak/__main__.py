@@ -96,6 +96,11 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
             for row in rows
             if row['item'].startswith('code cell')
         },
+        'interrupts': {
+            'interrupted': sum('interrupted_after_s' in row for row in rows),
+            'in an import': sum('import_interrupted' in row for row in rows),
+            'without a reply': sum('no_reply' in row for row in rows),
+        },
         'failed': failures[0] if failures else None,
         'report': rows if failures else [],
     }
@@ -247,7 +252,12 @@ def table(records: list[dict]) -> str:
     runs = Counter(record['condition'] for record in records)
     failures = Counter(record['condition'] for record in records if record['failed'])
     conditions = [f'{name} {failures[name]} of {runs[name]}' for name in runs]
-    return '\n'.join([*lines, '', f'Failures by condition: {", ".join(conditions)}.', *texts])
+    lines += ['', f'Failures by condition: {", ".join(conditions)}.']
+    interrupts = sum((Counter(record['interrupts']) for record in records), Counter())
+    if interrupts:
+        counts = ', '.join(f'{count} {what}' for what, count in interrupts.items())
+        lines.append(f'Cells: {counts}.')
+    return '\n'.join(lines + texts)
 
 
 def _short(text: str) -> str:

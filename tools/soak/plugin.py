@@ -43,7 +43,7 @@ REPLY_TIMEOUT_S = 2.0  # it was sent before the kernel became idle
 HINTS = re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE)
 
 # In IPython's traceback: the top level of a module.
-IN_IMPORT = re.compile(r'^File <frozen importlib|^File \S+\.py:\d+$', re.MULTILINE)
+IN_IMPORT = re.compile(r'^File (<frozen importlib|.+\.py:\d+$)', re.MULTILINE)
 COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
 
 
