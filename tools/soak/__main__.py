@@ -66,7 +66,7 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
         ]
         if condition.sentence:  # the kernel may die, which nbval notices at its time-out only
             command += ['--exitfirst', '--nbval-cell-timeout=20']
-        environment = os.environ | _environment(folder) | {MARK: mark}
+        environment = _environment(folder) | {MARK: mark}
         environment |= condition.environment(random.Random(seed))
         started = time.monotonic()
         with Watch(mark, own, [ROOT]) as watch:
@@ -107,8 +107,15 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """Return what gives a run a home, a temporary folder and a Jupyter of its own."""
-    return {
+    """Return the variables of a run: a home, a temporary folder and a Jupyter of its own."""
+    inherited = dict(os.environ)
+    # The wheels set these when this Python started. Another Python must set its own.
+    inherited.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
+    libraries = inherited.pop('LD_LIBRARY_PATH', '').split(os.pathsep)
+    libraries = [path for path in libraries if path and not path.startswith(sys.prefix)]
+    if libraries:
+        inherited['LD_LIBRARY_PATH'] = os.pathsep.join(libraries)
+    return inherited | {
         'HOME': str(folder / 'home'),
         'TMPDIR': str(folder / 'tmp'),
         'JUPYTER_CONFIG_DIR': str(folder / 'jupyter'),
