@@ -27,14 +27,24 @@ CONDITION = {condition.name: condition for condition in CONDITIONS}
 
 def test_what_is_left_in_a_kernel_is_named():
     script = """
-        import json, subprocess, threading
+        import json, socket, subprocess, threading
         from domain_coordinator import domain_id
-        from helpers.session import ros_session
+        from domain_coordinator.impl import PORT_BASE
+        from helpers.session import reserve_domain_id, ros_session
         from tools.soak.leftovers import left_in_process, state_of_process
 
         before, gate = state_of_process(), threading.Event()
         with ros_session():
             pass
+        reserve_domain_id()
+        # A port of the coordinator's range that serves something else.
+        for port in range(PORT_BASE + 101, PORT_BASE, -1):
+            try:
+                server = socket.create_server(('127.0.0.1', port))
+                break
+            except OSError:
+                continue
+        client = socket.create_connection(server.getsockname())
         nothing = left_in_process(before, state_of_process())
         threading.Thread(target=gate.wait, name='mine').start()
         child = subprocess.Popen(['sleep', '9'])

@@ -80,9 +80,21 @@ def _reserved_ids() -> Iterator[tuple[int, int]]:
         if not target.startswith('socket:'):
             continue
         with suppress(OSError), socket.socket(fileno=os.dup(number)) as copy:
-            address = copy.getsockname()
-            if copy.family == socket.AF_INET and PORT_BASE <= address[1] <= PORT_BASE + 101:
-                yield address[1] - PORT_BASE, os.fstat(number).st_ino
+            if (copy.family, copy.type) != (socket.AF_INET, socket.SOCK_STREAM):
+                continue
+            port = copy.getsockname()[1]
+            # Others may have got a port of this range from the system; they use theirs.
+            used = copy.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN) or _connected(copy)
+            if PORT_BASE <= port <= PORT_BASE + 101 and not used:
+                yield port - PORT_BASE, os.fstat(number).st_ino
+
+
+def _connected(connection: socket.socket) -> bool:
+    try:
+        connection.getpeername()
+    except OSError:
+        return False
+    return True
 
 
 # --- From outside --------------------------------------------------------------------------------

@@ -147,6 +147,16 @@ def restart(file: IPyNbFile) -> None:
     look_at(file.kernel)
 
 
+def begin(kernel: RunningKernel, source: str) -> str:
+    """Let a kernel run a cell; return the id of the message once it has begun."""
+    message = kernel.execute_cell_input(source, allow_stdin=False)
+    while True:
+        answer = kernel.get_message('iopub', timeout=OUTPUT_TIMEOUT_S)
+        begun = answer['msg_type'] == 'execute_input'
+        if begun and answer['parent_header'].get('msg_id') == message:
+            return message
+
+
 def await_reply(kernel: RunningKernel, message: str, timeout_s: float) -> dict:
     """Wait for a kernel's reply to a message and return its content. Raises queue.Empty."""
     deadline = time.monotonic() + timeout_s
@@ -183,7 +193,7 @@ class Interrupted(Again):
     def runtest(self) -> None:
         """Run the cell, interrupt it, look what it left, then run it as nbval does."""
         kernel, after_s = self.parent.kernel, random_time_s(chance_of(self))
-        message = kernel.execute_cell_input(self.cell.source, allow_stdin=False)
+        message = begin(kernel, self.cell.source)
         traceback = None
         try:
             await_reply(kernel, message, after_s)
@@ -252,7 +262,7 @@ class Killed(_OfNotebook):
         chance, kernel = chance_of(self), self.parent.kernel
         last, after_s = chance.randrange(len(self.cells)), random_time_s(chance)
         run_to(self.parent, last)
-        message = kernel.execute_cell_input(self.cells[last].cell.source, allow_stdin=False)
+        message = begin(kernel, self.cells[last].cell.source)
         with suppress(Empty):  # it is in the middle
             await_reply(kernel, message, after_s)
         process = psutil.Process(kernel.km.provisioner.pid)
