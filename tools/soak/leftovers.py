@@ -164,12 +164,8 @@ class Watch:
         another process, as `fastdds shm clean` does, so it is removed here and not reported.
         """
         deadline = time.monotonic() + END_TIMEOUT_S
-        while (alive := processes_of(self.mark)) and time.monotonic() < deadline:
-            psutil.wait_procs(alive, timeout=LOOK_EVERY_S)
-        found = [f'The process {process.pid} still runs: {_name(process)}.' for process in alive]
-        for domain_id, inode in domain_ids.items():
-            holders = [pid for pid in psutil.pids() if _holds_socket(pid, inode)]
-            found += [f'The process {pid} still reserves domain id {domain_id}.' for pid in holders]
+        while (found := self._processes_left(domain_ids)) and time.monotonic() < deadline:
+            time.sleep(LOOK_EVERY_S)
         for segment in sorted(self._held - self._there):
             files = [Path(segment), *(Path(segment + end) for end in LOCK_FILES)]
             left = [file for file in files if file.exists()]
@@ -180,6 +176,16 @@ class Watch:
             for file in left:
                 file.unlink(missing_ok=True)
         return found + [f'The file {file} is new or has changed.' for file in self._files_left()]
+
+    def _processes_left(self, domain_ids: dict[str, int]) -> list[str]:
+        found = [
+            f'The process {process.pid} still runs: {_name(process)}.'
+            for process in processes_of(self.mark)
+        ]
+        for domain_id, inode in domain_ids.items():
+            holders = [pid for pid in psutil.pids() if _holds_socket(pid, inode)]
+            found += [f'The process {pid} still reserves domain id {domain_id}.' for pid in holders]
+        return found
 
     def _files_left(self) -> list[Path]:
         after = files_in(*self.shared)
