@@ -1,6 +1,7 @@
 """How nbval starts the kernels of the notebooks, and how hypothesis chooses its examples."""
 
 import os
+import signal
 import tempfile
 from functools import partial
 from itertools import count
@@ -15,6 +16,11 @@ from helpers.progress import FILE_VARIABLE
 
 # No test reads or changes what the user of this checkout has solved. Kernels inherit it.
 os.environ[FILE_VARIABLE] = ''
+
+# What a shell starts in the background ignores Ctrl+C, and so would all processes that the tests
+# start.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # `make test` tries the same examples every time: what passed yesterday passes in class. New ones:
 # `make test PYTEST_ARGS='--hypothesis-profile=explore tests/test_queue_law.py tests/test_fuzz.py'`,

@@ -356,11 +356,10 @@ class Session:
         return [record for record in self._log if node in (None, record.node)]
 
     def print_log(self, node: str | None = None) -> None:
-        """Print the records of `/rosout` that were not printed yet, of one node or of all."""
+        """Print the records of `/rosout` so far, oldest first, of one node or of all."""
         for record in self.log(node):
-            if not record.printed:
-                record.printed = True
-                print(record)
+            record.printed = True
+            print(record)
 
     def close(self) -> None:
         """Stop and destroy everything that this session opened.

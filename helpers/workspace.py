@@ -25,7 +25,7 @@ import tempfile
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -332,6 +332,22 @@ if os.getppid() == parent:
 """
 
 
+@contextlib.contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Let an Interrupt wait for the end of the block: a process that starts needs its owner."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread is interrupted
+        return
+    interrupts = []
+    handler = signal.signal(signal.SIGINT, lambda *_: interrupts.append(True))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if interrupts:
+            signal.raise_signal(signal.SIGINT)
+
+
 def _start(
     name: str, command: list[str], environment: dict[str, str], folder: Path, lines: list[str]
 ) -> tuple[subprocess.Popen, threading.Thread]:
@@ -587,7 +603,6 @@ class Workspace:
         # The entry point, because the script `colcon` may be of another environment.
         main = 'import sys; from colcon_core.command import main; sys.exit(main())'
         command = [sys.executable, '-c', main, '--log-base', 'log', *arguments]
-        process, reader = _start('colcon', command, environment, self.path, lines)
         total = max(1, len(packages) or len(list(self.path.glob('src/**/package.xml'))))
 
         def progress() -> float:
@@ -603,7 +618,10 @@ class Workspace:
             return (done + part) / total
 
         started = time.monotonic()
+        process = None
         try:
+            with _uninterrupted():
+                process, reader = _start('colcon', command, environment, self.path, lines)
             with ProgressBar(progress) as bar:
                 while reader.is_alive() or process.poll() is None:
                     reader.join(POLL_S)
@@ -615,7 +633,7 @@ class Workspace:
                             f'{self.path / "log/latest_build/logger_all.log"}.'
                         )
         finally:
-            if process.poll() is None:  # interrupted, or too slow
+            if process is not None and process.poll() is None:  # interrupted, or too slow
                 os.killpg(process.pid, signal.SIGINT)
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     process.wait(STOP_TIMEOUT_S)
@@ -772,11 +790,11 @@ class Workspace:
         if key in self._processes:
             self._processes.pop(key).stop()
         command, told = _find_executable(package, executable, environment)
-        process = Process(
-            executable, [*command, *arguments] if command else [], environment, self.path
-        )
+        command = [*command, *arguments] if command else []
+        with _uninterrupted():
+            process = Process(executable, command, environment, self.path)
+            self._processes[key] = process
         process._lines += told
-        self._processes[key] = process
         return process
 
     def close(self) -> None:

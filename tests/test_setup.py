@@ -385,6 +385,17 @@ def test_what_a_group_needs_is_kept_once_it_was_asked_for(checkout):
     assert answer.stderr == ''
 
 
+def test_an_environment_in_another_folder(checkout):
+    before = checkout.stamp()
+    answer = checkout.set_up('--in', '.soak/other', HERE)
+    assert answer.returncode == 0, answer.stderr
+    assert (checkout.root / '.soak/other/bin/python').exists()
+    assert checkout.stamp() == before, 'it touched .venv'
+    assert checkout.set_up('--in', '.soak/other', HERE).stderr == ''
+    answer = checkout.set_up('--in', '.soak/older', '3.9')
+    assert last_line(answer.stderr) == 'Not every pinned package has a wheel for Python 3.9.'
+
+
 def test_a_moved_checkout_is_noticed(checkout, path):
     checkout.lock(checkout.pins.values())
     assert checkout.set_up().returncode == 0
@@ -428,7 +439,7 @@ def test_another_ros_and_other_settings_stay_out(tmp_path):
     seen = dict(line.split('=', 1) for line in answer.stdout.splitlines())
     assert not foreign.keys() & seen.keys()
     assert mine.items() <= seen.items()
-    for name in ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR', 'IPYTHONDIR'):
+    for name in ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'IPYTHONDIR', 'MPLCONFIGDIR'):
         assert seen[name].startswith(f'{tmp_path}/.jupyter')
 
 

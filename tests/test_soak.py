@@ -17,7 +17,7 @@ from tools.soak import __main__ as soak
 from tools.soak import leftovers
 from tools.soak.conditions import CONDITIONS, CannotRunError, Condition, busy_loops, python_of
 from tools.soak.leftovers import MARK, Watch
-from tools.soak.plugin import HINTS
+from tools.soak.plugin import HINTS, IN_IMPORT
 
 CONDITION = {condition.name: condition for condition in CONDITIONS}
 
@@ -27,14 +27,24 @@ CONDITION = {condition.name: condition for condition in CONDITIONS}
 
 def test_what_is_left_in_a_kernel_is_named():
     script = """
-        import json, subprocess, threading
+        import json, socket, subprocess, threading
         from domain_coordinator import domain_id
-        from helpers.session import ros_session
+        from domain_coordinator.impl import PORT_BASE
+        from helpers.session import reserve_domain_id, ros_session
         from tools.soak.leftovers import left_in_process, state_of_process
 
         before, gate = state_of_process(), threading.Event()
         with ros_session():
             pass
+        reserve_domain_id()
+        # A port of the coordinator's range that serves something else.
+        for port in range(PORT_BASE + 101, PORT_BASE, -1):
+            try:
+                server = socket.create_server(('127.0.0.1', port))
+                break
+            except OSError:
+                continue
+        client = socket.create_connection(server.getsockname())
         nothing = left_in_process(before, state_of_process())
         threading.Thread(target=gate.wait, name='mine').start()
         child = subprocess.Popen(['sleep', '9'])
@@ -50,7 +60,7 @@ def test_what_is_left_in_a_kernel_is_named():
     )
     nothing, left, child = json.loads(answer.stdout)
     assert nothing == []
-    assert 'The thread mine still runs.' in left
+    assert 'The thread mine (Thread) still runs.' in left
     assert 'The thread dds.ev.0 still runs.' in left
     assert f'The process {child} still runs: sleep 9.' in left
     assert 'The kernel holds 2 domain ids instead of one.' in left
@@ -108,6 +118,7 @@ def test_what_a_killed_process_leaves_is_named(folders, monkeypatch):
     (domain_id,) = state['domain_ids']
     with_child = watch.left(state['domain_ids'], killed=set())
     os.kill(child, signal.SIGKILL)
+    monkeypatch.undo()  # it may take a moment
     assert sum(f'The process {child} still runs: ' in sentence for sentence in with_child) == 1
     assert f'The process {child} still reserves domain id {domain_id}.' in with_child
     files = [sentence for sentence in with_child if sentence.startswith('The file')]
@@ -125,14 +136,15 @@ def test_what_a_killed_process_leaves_is_named(folders, monkeypatch):
 
 def test_shared_memory_of_a_killed_process_is_removed_and_not_counted(folders):
     mark = f'test-{os.getpid()}'
-    watch = Watch(mark, [folders / 'home'], [folders / 'checkout'])
-    segment = f'{SHARED_MEMORY}/fastrtps_of_{mark}'
-    for end in ('', '_el'):
-        Path(segment + end).touch()
-    with watch:
-        watch._held.add(segment)
+    segment, older = (f'{SHARED_MEMORY}/fastrtps_{name}_of_{mark}' for name in ('new', 'old'))
+    Path(older).touch()
+    with Watch(mark, [folders / 'home'], [folders / 'checkout']) as watch:
+        for end in ('', '_el'):
+            Path(segment + end).touch()
+        watch._held |= {segment, older}
     assert watch.left({}, killed={segment}) == []
     assert not Path(f'{segment}_el').exists()
+    Path(older).unlink()  # somebody else's: it was there before
 
 
 def test_other_processes_are_left_alone(folders):
@@ -177,7 +189,7 @@ def test_an_interrupted_cell_is_looked_at_and_run_again(tmp_path):
     interrupted, left = record['report'][1:3]
     assert interrupted['interrupted_after_s'] < 3
     assert interrupted['failed'] is None
-    assert 'The thread left still runs.' in left['failed']
+    assert 'The thread left (Thread) still runs.' in left['failed']
     assert record['failed'][0] == 'code cell 3'
 
 
@@ -192,6 +204,19 @@ def test_the_hints_of_a_second_try_are_not_compared():
     hint = '    Hint: count the messages\n          that wait.\n'
     head, rest = first.split('[ok]')
     assert HINTS.sub('', f'{head}{hint}[ok]{rest}') == first
+
+
+@pytest.mark.parametrize(
+    ('frame', 'import_'),
+    [
+        ('File ~/my env/site-packages/numpy/_core/numeric.py:12\n     10 import x', True),
+        ('File <frozen importlib._bootstrap>:1176, in _find_and_load(name, import_)', True),
+        ('File ~/env/numpy/_core/numeric.py:580, in ones(shape)\n    579 result', False),
+        ('Cell In[1], line 1\n----> 1 import numpy', False),
+    ],
+)
+def test_an_interrupted_import_is_seen_in_the_traceback(frame, import_):
+    assert bool(IN_IMPORT.search(f'KeyboardInterrupt\n{frame}\n')) is import_
 
 
 # The tool
@@ -233,6 +258,7 @@ def record(notebook: str, condition: str, failed=None) -> dict:
         'seed': 7,
         'seconds': 3.0,
         'cells': cells,
+        'interrupts': {'interrupted': 2, 'in an import': 0, 'without a reply': 1},
         'failed': failed,
     }
 
@@ -247,6 +273,7 @@ def test_the_table():
     assert lines[1] == '01_a 2 1 2.0 s, code cell 2 busy, code cell 2'
     assert lines[2] == '02_b 1 0 2.0 s, code cell 2'
     assert 'Failures by condition: idle 0 of 2, busy 1 of 1.' in lines
+    assert 'Cells: 6 interrupted, 3 without a reply.' in lines
     assert lines[-2:] == ['It differs.', 'Here.']
 
 

@@ -279,7 +279,7 @@ def test_an_interrupted_build_leaves_no_process(other):
     generated = other.path / 'build/custom_interfaces/rosidl_generator_c'
 
     def interrupt() -> None:
-        wait_until(generated.exists)
+        wait_until(generated.exists, timeout_s=60)
         signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
 
     thread = threading.Thread(target=interrupt)
@@ -590,6 +590,26 @@ def test_two_kernels_do_not_share_a_folder(built):
     assert other.startswith('test_workspace')
     assert other != built.path.name
     assert built.result.log.is_file()
+
+
+@pytest.mark.parametrize('start', ['run', 'build'])
+def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch, start):
+    built.environment()  # it starts a shell the first time
+    started = []
+
+    class Interrupted(subprocess.Popen):
+        def __init__(self, *arguments, **options):
+            super().__init__(*arguments, **options)
+            started.append(self)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, 'Popen', Interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        built.run('talker_pkg', 'talker') if start == 'run' else built.build('talker_pkg')
+    monkeypatch.undo()
+    built.close()  # as after each cell that was interrupted
+    (process,) = started
+    assert process.poll() is not None
 
 
 def test_a_build_that_outlives_its_kernel_keeps_its_folder(other):

@@ -64,7 +64,9 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
             *('--rootdir', ROOT, '-p', 'no:cacheprovider', '--color=no', '-p', 'tools.soak.plugin'),
             *('--soak-mode', condition.mode, '--soak-seed', str(seed), '--soak-report', report),
         ]
-        environment = os.environ | _environment(folder) | {MARK: mark}
+        if condition.sentence:  # the kernel may die, which nbval notices at its time-out only
+            command += ['--exitfirst', '--nbval-cell-timeout=20']
+        environment = _environment(folder) | {MARK: mark}
         environment |= condition.environment(random.Random(seed))
         started = time.monotonic()
         with Watch(mark, own, [ROOT]) as watch:
@@ -94,14 +96,26 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
             for row in rows
             if row['item'].startswith('code cell')
         },
+        'interrupts': {
+            'interrupted': sum('interrupted_after_s' in row for row in rows),
+            'in an import': sum('import_interrupted' in row for row in rows),
+            'without a reply': sum('no_reply' in row for row in rows),
+        },
         'failed': failures[0] if failures else None,
         'report': rows if failures else [],
     }
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """Return what gives a run a home, a temporary folder and a Jupyter of its own."""
-    return {
+    """Return the variables of a run: a home, a temporary folder and a Jupyter of its own."""
+    inherited = dict(os.environ)
+    # The wheels set these when this Python started. Another Python must set its own.
+    inherited.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
+    libraries = inherited.pop('LD_LIBRARY_PATH', '').split(os.pathsep)
+    libraries = [path for path in libraries if path and not path.startswith(sys.prefix)]
+    if libraries:
+        inherited['LD_LIBRARY_PATH'] = os.pathsep.join(libraries)
+    return inherited | {
         'HOME': str(folder / 'home'),
         'TMPDIR': str(folder / 'tmp'),
         'JUPYTER_CONFIG_DIR': str(folder / 'jupyter'),
@@ -172,7 +186,7 @@ def soak(
     """Run and record every notebook `rounds` times in every condition; return the records."""
     this_commit, deadline = commit(), time.monotonic() + 60 * minutes
     counts = Counter((r['notebook'], r['condition']) for r in recorded(this_commit))
-    jobs: list[tuple[int, Condition, list[Path]]] = []
+    jobs: list[tuple[int, int, Condition, list[Path]]] = []
     for number in range(rounds):
         for condition in conditions:
             # As many at once as the condition asks for, also where fewer notebooks are wanted.
@@ -180,11 +194,11 @@ def soak(
             groups = [several] if condition.at_once > 1 else [[notebook] for notebook in several]
             for group in groups:
                 done = min(counts[notebook.stem, condition.name] for notebook in group)
-                jobs.append((done + number, condition, group))
+                jobs.append((done + number, number, condition, group))
     records, refused = [], {}
     RUNS.parent.mkdir(exist_ok=True)
     with RUNS.open('a', encoding='utf-8') as file:
-        for number, condition, group in sorted(jobs, key=lambda job: job[0]):
+        for _, number, condition, group in sorted(jobs, key=lambda job: job[0]):
             if time.monotonic() > deadline:
                 break
             if condition.name in refused:
@@ -245,7 +259,12 @@ def table(records: list[dict]) -> str:
     runs = Counter(record['condition'] for record in records)
     failures = Counter(record['condition'] for record in records if record['failed'])
     conditions = [f'{name} {failures[name]} of {runs[name]}' for name in runs]
-    return '\n'.join([*lines, '', f'Failures by condition: {", ".join(conditions)}.', *texts])
+    lines += ['', f'Failures by condition: {", ".join(conditions)}.']
+    interrupts = sum((Counter(record['interrupts']) for record in records), Counter())
+    if interrupts:
+        counts = ', '.join(f'{count} {what}' for what, count in interrupts.items())
+        lines.append(f'Cells: {counts}.')
+    return '\n'.join(lines + texts)
 
 
 def _short(text: str) -> str:

@@ -48,7 +48,7 @@ class Condition:
 def python_of(version: str) -> str:
     """Return the interpreter of an environment with this Python, made where there is none yet."""
     if version == f'{sys.version_info.major}.{sys.version_info.minor}':
-        return sys.executable
+        raise CannotRunError('All other conditions use this Python.')
     environment = CACHE / f'python{version}'
     # What pyenv has installed is not on the PATH as long as nobody chooses it.
     pyenv = Path(os.environ.get('PYENV_ROOT', Path.home() / '.pyenv'), 'versions')

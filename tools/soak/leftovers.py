@@ -23,6 +23,7 @@ SHARED_MEMORY = '/dev/shm/fastrtps_'
 LOCK_FILES = ('_el', '_sl')  # of a segment or a port, locked while a process uses it
 # Threads of Fast DDS that belong to no participant: they live until the process ends.
 OF_PROCESS = ('dds.shm.wdog', 'dds.log')
+OF_ZMQ = 'GarbageCollectorThread'  # frees what Jupyter has sent, from its first picture on
 LOOK_EVERY_S = 0.1
 END_TIMEOUT_S = 10.0
 
@@ -36,7 +37,11 @@ def state_of_process() -> dict:
     Of the threads that C++ started, those of Fast DDS's participants. `domain_ids` maps each
     reserved id to the inode of the socket that reserves it.
     """
-    threads = {str(thread.ident): thread.name for thread in threading.enumerate()}
+    threads = {
+        str(thread.ident): f'{thread.name} ({type(thread).__name__})'
+        for thread in threading.enumerate()
+        if type(thread).__name__ != OF_ZMQ
+    }
     for task in Path('/proc/self/task').iterdir():
         with suppress(OSError):  # it has ended
             name = (task / 'comm').read_text().strip()
@@ -75,9 +80,21 @@ def _reserved_ids() -> Iterator[tuple[int, int]]:
         if not target.startswith('socket:'):
             continue
         with suppress(OSError), socket.socket(fileno=os.dup(number)) as copy:
-            address = copy.getsockname()
-            if copy.family == socket.AF_INET and PORT_BASE <= address[1] <= PORT_BASE + 101:
-                yield address[1] - PORT_BASE, os.fstat(number).st_ino
+            if (copy.family, copy.type) != (socket.AF_INET, socket.SOCK_STREAM):
+                continue
+            port = copy.getsockname()[1]
+            # Others may have got a port of this range from the system; they use theirs.
+            used = copy.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN) or _connected(copy)
+            if PORT_BASE <= port <= PORT_BASE + 101 and not used:
+                yield port - PORT_BASE, os.fstat(number).st_ino
+
+
+def _connected(connection: socket.socket) -> bool:
+    try:
+        connection.getpeername()
+    except OSError:
+        return False
+    return True
 
 
 # --- From outside --------------------------------------------------------------------------------
@@ -125,6 +142,8 @@ class Watch:
 
     def __enter__(self) -> Watch:
         self._before = files_in(*self.shared)
+        # A participant also opens the ports of dead processes, to see whether it can have them.
+        self._there = {str(file) for file in Path(SHARED_MEMORY).parent.glob('fastrtps_*')}
         self._thread.start()
         return self
 
@@ -145,13 +164,9 @@ class Watch:
         another process, as `fastdds shm clean` does, so it is removed here and not reported.
         """
         deadline = time.monotonic() + END_TIMEOUT_S
-        while (alive := processes_of(self.mark)) and time.monotonic() < deadline:
-            psutil.wait_procs(alive, timeout=LOOK_EVERY_S)
-        found = [f'The process {process.pid} still runs: {_name(process)}.' for process in alive]
-        for domain_id, inode in domain_ids.items():
-            holders = [pid for pid in psutil.pids() if _holds_socket(pid, inode)]
-            found += [f'The process {pid} still reserves domain id {domain_id}.' for pid in holders]
-        for segment in sorted(self._held):
+        while (found := self._processes_left(domain_ids)) and time.monotonic() < deadline:
+            time.sleep(LOOK_EVERY_S)
+        for segment in sorted(self._held - self._there):
             files = [Path(segment), *(Path(segment + end) for end in LOCK_FILES)]
             left = [file for file in files if file.exists()]
             if not left or any(segment in _segments(pid) for pid in psutil.pids()):
@@ -161,6 +176,16 @@ class Watch:
             for file in left:
                 file.unlink(missing_ok=True)
         return found + [f'The file {file} is new or has changed.' for file in self._files_left()]
+
+    def _processes_left(self, domain_ids: dict[str, int]) -> list[str]:
+        found = [
+            f'The process {process.pid} still runs: {_name(process)}.'
+            for process in processes_of(self.mark)
+        ]
+        for domain_id, inode in domain_ids.items():
+            holders = [pid for pid in psutil.pids() if _holds_socket(pid, inode)]
+            found += [f'The process {pid} still reserves domain id {domain_id}.' for pid in holders]
+        return found
 
     def _files_left(self) -> list[Path]:
         after = files_in(*self.shared)

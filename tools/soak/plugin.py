@@ -37,11 +37,13 @@ print(json.dumps(leftovers.state_of_process()))
 """
 SHORTEST_S, LONGEST_S = 0.001, 10.0
 INTERRUPTED_TIMEOUT_S = 60.0
-OUTPUT_TIMEOUT_S = 10.0
+OUTPUT_TIMEOUT_S = 60.0  # of a kernel that is alive, on a busy machine
 REPLY_TIMEOUT_S = 2.0  # it was sent before the kernel became idle
 # From the second try on, the check of an exercise also prints hints. A fresh run has none.
 HINTS = re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE)
 
+# In IPython's traceback: the top level of a module.
+IN_IMPORT = re.compile(r'^File (<frozen importlib|.+\.py:\d+$)', re.MULTILINE)
 COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
 
 
@@ -145,6 +147,16 @@ def restart(file: IPyNbFile) -> None:
     look_at(file.kernel)
 
 
+def begin(kernel: RunningKernel, source: str) -> str:
+    """Let a kernel run a cell; return the id of the message once it has begun."""
+    message = kernel.execute_cell_input(source, allow_stdin=False)
+    while True:
+        answer = kernel.get_message('iopub', timeout=OUTPUT_TIMEOUT_S)
+        begun = answer['msg_type'] == 'execute_input'
+        if begun and answer['parent_header'].get('msg_id') == message:
+            return message
+
+
 def await_reply(kernel: RunningKernel, message: str, timeout_s: float) -> dict:
     """Wait for a kernel's reply to a message and return its content. Raises queue.Empty."""
     deadline = time.monotonic() + timeout_s
@@ -181,7 +193,7 @@ class Interrupted(Again):
     def runtest(self) -> None:
         """Run the cell, interrupt it, look what it left, then run it as nbval does."""
         kernel, after_s = self.parent.kernel, random_time_s(chance_of(self))
-        message = kernel.execute_cell_input(self.cell.source, allow_stdin=False)
+        message = begin(kernel, self.cell.source)
         traceback = None
         try:
             await_reply(kernel, message, after_s)
@@ -213,8 +225,8 @@ class Interrupted(Again):
             return None
         if reply['status'] != 'error':
             return None
-        traceback = '\n'.join(reply['traceback'])
-        if '<frozen importlib' in traceback:
+        traceback = COLOURS.sub('', '\n'.join(reply['traceback']))
+        if IN_IMPORT.search(traceback):
             # Python cannot repeat a half-done import of NumPy: environment.md says to restart.
             self.user_properties.append(('import_interrupted', True))
             restart(self.parent)
@@ -250,7 +262,7 @@ class Killed(_OfNotebook):
         chance, kernel = chance_of(self), self.parent.kernel
         last, after_s = chance.randrange(len(self.cells)), random_time_s(chance)
         run_to(self.parent, last)
-        message = kernel.execute_cell_input(self.cells[last].cell.source, allow_stdin=False)
+        message = begin(kernel, self.cells[last].cell.source)
         with suppress(Empty):  # it is in the middle
             await_reply(kernel, message, after_s)
         process = psutil.Process(kernel.km.provisioner.pid)
