@@ -26,8 +26,8 @@ def tab_to(lab: LabPage, text: str) -> None:
 
 def quiz(lab: LabPage) -> int:
     """Return the index of the first question whose answers open."""
-    sources = [''.join(cell['source']) for cell in lab.cells()]
-    found = next((i for i, source in enumerate(sources) if '### Question 1' in source), None)
+    cells = enumerate(lab.cells())
+    found = next((i for i, cell in cells if '### Question 1' in cell['source']), None)
     if found is None:
         pytest.skip('This lesson has no quiz.')
     return found
