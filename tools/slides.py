@@ -98,6 +98,9 @@ def height(cell: NotebookNode) -> float:
 def _height_of_prose(block: str) -> float:
     if block.startswith('#'):
         return HEADINGS.get(block.partition(' ')[0], PROSE_LINE + PROSE_GAP)
+    if block.startswith('```'):
+        lines = block.splitlines()[1:-1]
+        return PROSE_GAP + PROSE_LINE * sum(ceil(len(line) / PROSE_CHARACTERS) for line in lines)
     if block.startswith('!['):
         return PROSE_PICTURE + PROSE_GAP
     text = MARKUP.sub('', block)

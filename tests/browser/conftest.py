@@ -17,9 +17,11 @@ from playwright.sync_api import Browser, sync_playwright
 ARTEFACTS = Path(
     os.environ.get('BROWSER_ARTEFACTS') or Path(tempfile.gettempdir(), 'ros2_notebooks_browser')
 )
-# No sandbox, because root may run this; and nothing that asks the network.
+# No sandbox, because root may run this; no shared memory, of which containers have little and nodes
+# need some; and nothing that asks the network.
 CHROMIUM_OPTIONS = [
     '--no-sandbox',
+    '--disable-dev-shm-usage',
     '--disable-gpu',
     '--disable-quic',
     '--no-first-run',

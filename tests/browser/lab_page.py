@@ -30,6 +30,7 @@ CELL_RAN = f"""index => {{
     const cell = {PANEL}.content.model.cells.get(index);
     return {IDLE} && cell.executionState === 'idle' && cell.executionCount !== null;
 }}"""
+HAS_FOCUS = f'() => {PANEL}.content.activeCell.node.contains(document.activeElement)'
 SLIDE_DRAWN = f"""index => {{
     const widgets = {PANEL}.content.widgets;
     const slide = widgets.filter(cell => cell.node.classList.contains('jp-deck-mod-onscreen'));
@@ -159,6 +160,7 @@ class LabPage:
 
     def leave_with(self, key: str) -> int:
         """Press a key that leads to another cell, and return its index."""
+        self.page.wait_for_function(HAS_FOCUS)
         before = self.active()
         self.page.keyboard.press(key)
         self.page.wait_for_function(

@@ -36,7 +36,8 @@ def server(folder: Path, *make: str) -> Iterator[Server]:
     # Two workers start servers at the same moment, and would both find the first free port. The
     # system gives each a port of its own.
     command = ['make', *make, 'PORT=0', 'BROWSER=no', f'ROOT={folder}']
-    command += [f'{name}={folder / name}' for name in ('JUPYTER_CONFIG_DIR', 'JUPYTER_RUNTIME_DIR')]
+    state = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR')
+    command += [f'{name}={folder / name}' for name in state]
     command += ['LAB_ARGS=--LabApp.expose_app_in_browser=True']
     with Path(folder, 'log').open('w') as log:
         process = subprocess.Popen(

@@ -1,10 +1,9 @@
 """The first hour without a mouse: every step is a key that a person presses."""
 
 import pytest
-from lab_page import PANEL, LabPage, printed
+from lab_page import HAS_FOCUS, PANEL, LabPage, printed
 
 FOCUSED = '() => document.activeElement.innerText'
-IN_CELL = f'() => {PANEL}.content.activeCell.node.contains(document.activeElement)'
 FOLDED = f'() => {PANEL}.content.activeCell.inputHidden'
 OPEN = '() => document.activeElement.parentElement.open'
 
@@ -22,13 +21,13 @@ def tab_to(lab: LabPage, text: str) -> None:
     """Press Tab until what has this text is chosen, without leaving the active cell."""
     while lab.page.evaluate(FOCUSED) != text:
         lab.page.keyboard.press('Tab')
-        assert lab.page.evaluate(IN_CELL), f'Tab does not lead to {text!r}'
+        assert lab.page.evaluate(HAS_FOCUS), f'Tab does not lead to {text!r}'
 
 
 def quiz(lab: LabPage) -> int:
     """Return the index of the first question whose answers open."""
-    sources = [''.join(cell['source']) for cell in lab.cells()]
-    found = next((i for i, source in enumerate(sources) if '### Question 1' in source), None)
+    cells = enumerate(lab.cells())
+    found = next((i for i, cell in cells if '### Question 1' in cell['source']), None)
     if found is None:
         pytest.skip('This lesson has no quiz.')
     return found
