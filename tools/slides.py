@@ -108,7 +108,7 @@ def _height_of_prose(block: str) -> float:
     if text.startswith('|'):
         rows = [TABLE_ROW * ceil(len(line) / TABLE_CHARACTERS) for line in lines]
         return sum(rows) - TABLE_ROW + PROSE_GAP
-    if not re.search(r'^(```|- |\d\. |> )', text, re.MULTILINE):
+    if not re.search(r'^(- |\d\. |> )', text, re.MULTILINE):
         lines = [' '.join(lines)]
     return PROSE_GAP + PROSE_LINE * sum(ceil(len(line) / PROSE_CHARACTERS) for line in lines)
 

@@ -87,7 +87,7 @@ def test_every_slide_is_reached_and_nothing_is_cut_off(open_deck, artefacts, pat
     assert slides == types.count('slide') + types.count('subslide')
     assert slides == page.evaluate('() => Reveal.getTotalSlides()')
     assert cut_off == []
-    assert page.locator('img:not([alt])').count() == 0
+    assert page.locator('img:not([alt]), img[alt=""]').count() == 0
 
 
 def test_formulas_are_drawn_and_notes_and_solutions_are_not_shown(open_deck, artefacts):
