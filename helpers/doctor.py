@@ -58,7 +58,7 @@ class Check:
         """Return 'ok', or what to do."""
         if not self.to_do:
             return 'ok'
-        return self.to_do if self.required else f'not required: {self.to_do}'
+        return self.to_do if self.required else f'optional: {self.to_do}'
 
 
 def check_python() -> Check:
