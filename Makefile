@@ -77,11 +77,13 @@ deck = $(if $(LESSON),$(wildcard notebooks/$(LESSON)_*.ipynb))
 
 # The first argument says whether JupyterLab shows the notebook as slides, the second is its address.
 # A port that you name is the one you get, or an error. Without a name, the first free one from 8888.
-open_lab = slides="$(JUPYTER_CONFIG_DIR)/lab/user-settings/jupyterlab-slideshow" && \
+# A window of `make lab` and one of `make present` may be open side by side: each has its settings.
+open_lab = settings="$(JUPYTER_CONFIG_DIR)/lab/$(if $(filter true,$(1)),presenter,user)-settings" && \
+	slides="$$settings/jupyterlab-slideshow" && \
 	mkdir -p "$(JUPYTER_CONFIG_DIR)/custom" "$$slides" && \
 	cp tools/deck.css "$(JUPYTER_CONFIG_DIR)/custom/custom.css" && \
 	echo '{"active": $(1)}' > "$$slides/plugin.jupyterlab-settings" && \
-	exec $(PYTHON) -m jupyterlab --ServerApp.root_dir="$(ROOT)" --LabApp.custom_css=True \
+	JUPYTERLAB_SETTINGS_DIR="$$settings" exec $(PYTHON) -m jupyterlab --ServerApp.root_dir="$(ROOT)" --LabApp.custom_css=True \
 	--LabApp.default_url='$(2)' \
 	$(if $(PORT),--port="$(PORT)" --ServerApp.port_retries=0) \
 	$(if $(filter no,$(BROWSER)),--no-browser) \

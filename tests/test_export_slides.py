@@ -46,6 +46,22 @@ def test_notes_are_for_the_speaker_and_solutions_for_nobody(lesson):
     assert 'slideshow' not in lesson.cells[0].metadata  # the argument is left alone
 
 
+def test_a_note_stays_as_long_as_its_step():
+    code = '\n'.join(['run()'] * 20)
+    cells = [
+        new_markdown_cell('## 1. Run'),
+        new_raw_cell(NOTE, metadata={'tags': ['notes']}),
+        new_code_cell(code),
+        new_markdown_cell('Again.'),
+        new_code_cell(code),
+        new_markdown_cell('## 2. Look'),
+    ]
+    cells = export_slides.for_reveal(new_notebook(cells=cells)).cells
+    steps = [cell.source for cell in cells if cell.metadata.slideshow['slide_type'] != 'fragment']
+    assert steps == ['## 1. Run', NOTE, 'Again.', NOTE, '## 2. Look']
+    assert len({cell.id for cell in cells}) == len(cells)
+
+
 def test_the_reason_of_an_answer_is_folded_with_it(tmp_path):
     answer = '<details><summary>A. Yes.</summary>\n\nA reason.\n\n</details>'
     path = tmp_path / '02_lose_messages.ipynb'

@@ -38,7 +38,12 @@ def test_progress_knows_every_exercise():
         if exercises := rules.exercises(notebook):
             title = notebook.cells[0].source.splitlines()[0].removeprefix('# ')
             found[title[:2]] = title[3:], len(exercises)
-    assert found == progress.LESSONS
+    assert found == progress.LESSONS, f'LESSONS in helpers/progress.py should be {found}'
+
+
+def test_the_readme_leads_to_every_notebook():
+    readme = (FOLDER.parent / 'README.md').read_text(encoding='utf-8')
+    assert [name for name in NAMES if f'(notebooks/{name})' not in readme] == []
 
 
 def test_pictures_are_those_of_the_notebooks():

@@ -64,10 +64,11 @@ def fetch_packages(folder: Path = PACKAGES) -> Path:
 def for_reveal(notebook: NotebookNode) -> NotebookNode:
     """Return a copy of a notebook as nbconvert's slides want it."""
     notebook = deepcopy(notebook)
+    cells, note = [], None
     for cell, slide_type in zip(notebook.cells, slide_types(notebook), strict=True):
         tags = cell.metadata.setdefault('tags', [])
         if 'notes' in tags:
-            slide_type, cell.cell_type = 'notes', 'markdown'
+            slide_type, cell.cell_type, note = 'notes', 'markdown', cell
         elif 'solution' in tags:
             slide_type = 'skip'
         cell.metadata.slideshow = {'slide_type': slide_type}
@@ -77,6 +78,13 @@ def for_reveal(notebook: NotebookNode) -> NotebookNode:
             lines = len(cell.source.splitlines())
             tags += [f'more-than-{most}-lines' for most in CODE if lines > most]
             cell.outputs = [output for output in cell.outputs if not _is_widget(output)]
+        if re.match('##? ', cell.source):  # a step begins, and its note is behind the heading
+            note = None
+        cells.append(cell)
+        if note and slide_type in ('slide', 'subslide'):  # the step goes on: so does its note
+            cells.append(deepcopy(note))
+            cells[-1].id += f'-{len(cells)}'
+    notebook.cells = cells
     return notebook
 
 
@@ -107,7 +115,8 @@ def main(arguments: list[str] | None = None, folder: Path = FOLDER, output: Path
     parser.add_argument('--lesson', nargs='+', default=[], metavar='NN', help='for example 02')
     numbers = ' '.join(parser.parse_args(arguments).lesson).split()
     try:
-        paths = lessons(numbers, folder)
+        # Every deck has a link to the glossary.
+        paths = sorted({*lessons(numbers, folder), *folder.glob('99_*.ipynb')})
         packages = fetch_packages()
     except ValueError as error:
         print(error, file=sys.stderr)

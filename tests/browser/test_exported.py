@@ -15,6 +15,12 @@ AT_THE_END = '() => Reveal.isLastSlide() && !Reveal.availableFragments().next'
 SLIDE_COMPLETE = '() => !Reveal.availableFragments().next'
 FADED_IN = """() => !document.querySelector('.slides').getAnimations({ subtree: true }).length"""
 STATE = '() => JSON.stringify(Reveal.getState())'
+LANGUAGES = "() => Reveal.getCurrentSlide().querySelectorAll('details[lang]').length"
+# Two frames later the events of the first one have been handled.
+UNFOLD = """() => {
+    Reveal.getCurrentSlide().querySelectorAll('details').forEach(part => { part.open = true });
+    return new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)));
+}"""
 CUT_OFF = """() => [...Reveal.getCurrentSlide().querySelectorAll('.jp-Cell, .jp-Cell *')].filter(
     part => {
         const box = part.getBoundingClientRect();
@@ -88,6 +94,16 @@ def test_every_slide_is_reached_and_nothing_is_cut_off(open_deck, artefacts, pat
     assert slides == page.evaluate('() => Reveal.getTotalSlides()')
     assert cut_off == []
     assert page.locator('img:not([alt]), img[alt=""]').count() == 0
+
+
+@pytest.mark.parametrize('path', NOTEBOOKS, ids=[path.name for path in NOTEBOOKS])
+def test_a_summary_stays_on_its_slide_in_all_languages(open_deck, artefacts, path):
+    page = open_deck(path.with_suffix('.html').name)
+    while not page.evaluate(LANGUAGES):
+        page.keyboard.press('Space')
+    page.evaluate(UNFOLD)
+    page.screenshot(path=artefacts / f'{path.stem}_exported' / 'languages.png')
+    assert page.evaluate(CUT_OFF) == []
 
 
 def test_formulas_are_drawn_and_notes_and_solutions_are_not_shown(open_deck, artefacts):
