@@ -14,7 +14,8 @@ from nbformat.v4 import new_markdown_cell, new_notebook, new_raw_cell
 
 from tools.notebooks import FOLDER
 
-NOTEBOOKS = {path.name[:2]: nbformat.read(path, 4) for path in sorted(FOLDER.glob('*.ipynb'))}
+NAMES = {path.name[:2]: path.name for path in sorted(FOLDER.glob('*.ipynb'))}
+NOTEBOOKS = {number: nbformat.read(FOLDER / name, 4) for number, name in NAMES.items()}
 LESSONS = [number for number in NOTEBOOKS if number not in rules.NO_LESSON]
 GLOSSARY = NOTEBOOKS['99']
 TEACHING = Path(__file__).parents[1] / 'teaching.md'
@@ -146,7 +147,7 @@ def wrong_in_timetables(text: str, lessons: dict[str, NotebookNode] = NOTEBOOKS)
     return wrong
 
 
-@pytest.mark.parametrize('notebook', NOTEBOOKS.values(), ids=list(NOTEBOOKS))
+@pytest.mark.parametrize('notebook', NOTEBOOKS.values(), ids=NAMES.values())
 def test_summaries(notebook):
     assert wrong_in_summaries(notebook) == []
 
@@ -156,7 +157,7 @@ def test_glossary():
     assert wrong_in_glossary(GLOSSARY) == []
 
 
-@pytest.mark.parametrize('number', LESSONS)
+@pytest.mark.parametrize('number', LESSONS, ids=NAMES.get)
 def test_the_notes_fill_the_time_of_a_lesson(number):
     assert wrong_in_notes(NOTEBOOKS[number]) == []
 
