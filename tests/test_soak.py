@@ -263,6 +263,26 @@ def record(notebook: str, condition: str, failed=None) -> dict:
     }
 
 
+def test_a_run_counts_until_what_it_used_has_changed(tmp_path, monkeypatch):
+    monkeypatch.setattr(soak, 'ROOT', tmp_path)
+    monkeypatch.setattr(soak, 'RUNS', tmp_path / 'runs.jsonl')
+    monkeypatch.setattr(
+        soak, 'run', lambda path, condition, seed: record(path.stem, condition.name)
+    )
+    (tmp_path / 'helpers').mkdir()
+    one, other, helper = (tmp_path / name for name in ('1.ipynb', '2.ipynb', 'helpers/one.py'))
+    for path in (one, other, helper):
+        path.write_text('old')
+    assert soak.recorded([one]) == []
+    records = soak.soak([one, other], [CONDITION['idle']], rounds=2, minutes=1, seed=0)
+    assert len(records) == 4
+    assert soak.recorded([one, other]) == records
+    other.write_text('new')
+    assert {record['notebook'] for record in soak.recorded([one, other])} == {'1'}
+    helper.write_text('new')
+    assert soak.recorded([one, other]) == []
+
+
 def test_the_table():
     records = [
         record('01_a', 'idle'),

@@ -4,16 +4,18 @@
     python -m tools.soak --rounds 10 --conditions idle,busy --lesson 02
     python -m tools.soak --minutes 8                    begin no run after 8 minutes
     python -m tools.soak --seed 1234 ...                the random times of an earlier run
-    python -m tools.soak --report                       all runs of this commit so far
+    python -m tools.soak --report                       all runs so far
 
-What has run least often comes first, so that several sittings add up. Ctrl+C ends it with the table
-of what was done. Every run is a line of JSON in .soak/runs.jsonl.
+A run counts until its notebook, or what all notebooks use, has changed. What has run least often
+comes first, so that several sittings add up. Ctrl+C ends it with the table of what was done. Every
+run is a line of JSON in .soak/runs.jsonl.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import hashlib
 import json
 import math
 import os
@@ -37,6 +39,8 @@ from tools.soak.conditions import CACHE, CONDITIONS, ROOT, CannotRunError, Condi
 from tools.soak.leftovers import MARK, Watch, processes_of
 
 RUNS = CACHE / 'runs.jsonl'
+# What a notebook uses: with the notebook, all that can change how a run of it ends.
+USED = ('helpers', 'conftest.py', 'pyproject.toml', 'requirements.lock', 'tests/nbval_sanitize.cfg')
 RUN_TIMEOUT_S = 1800.0
 DOCTOR_TIMEOUT_S = 60.0
 LONGEST_TEXT = 1600
@@ -167,25 +171,28 @@ def _kill(mark: str) -> None:
 # --- Many runs -----------------------------------------------------------------------------------
 
 
-def commit() -> str:
-    """Return the commit of this checkout, with `+` where files have changed since."""
-    command = ['git', 'describe', '--always', '--dirty=+', '--exclude=*']
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True).stdout.strip()
+def version(notebook: Path) -> str:
+    """Return a hash of the notebook and of all that a notebook uses, as they are now."""
+    used = [path for part in USED for path in (ROOT / part, *(ROOT / part).rglob('*.py'))]
+    files = sorted(path for path in [notebook, *used] if path.is_file())
+    return hashlib.sha256(b'\0'.join(path.read_bytes() for path in files)).hexdigest()[:12]
 
 
-def recorded(of_commit: str) -> list[dict]:
-    """Return the records of all runs of a commit, oldest first."""
+def recorded(notebooks: list[Path]) -> list[dict]:
+    """Return the records of all runs of these notebooks that still count, oldest first."""
+    versions = {notebook.stem: version(notebook) for notebook in notebooks}
     lines = RUNS.read_text(encoding='utf-8').splitlines() if RUNS.exists() else []
     records = [json.loads(line) for line in lines]
-    return [record for record in records if record['commit'] == of_commit]
+    return [r for r in records if versions.get(r['notebook']) == r['version']]
 
 
 def soak(
     notebooks: list[Path], conditions: list[Condition], rounds: int, minutes: float, seed: int
 ) -> list[dict]:
     """Run and record every notebook `rounds` times in every condition; return the records."""
-    this_commit, deadline = commit(), time.monotonic() + 60 * minutes
-    counts = Counter((r['notebook'], r['condition']) for r in recorded(this_commit))
+    versions = {notebook.stem: version(notebook) for notebook in notebooks}
+    deadline = time.monotonic() + 60 * minutes
+    counts = Counter((r['notebook'], r['condition']) for r in recorded(notebooks))
     jobs: list[tuple[int, int, Condition, list[Path]]] = []
     for number in range(rounds):
         for condition in conditions:
@@ -205,7 +212,8 @@ def soak(
                 continue
             try:
                 for record in _together(group, condition, seed + 100 * number):
-                    records.append(record | {'commit': this_commit, 'time': time.time()})
+                    added = {'version': versions[record['notebook']], 'time': time.time()}
+                    records.append(record | added)
                     print(json.dumps(records[-1]), file=file, flush=True)
                     print(_line(record), flush=True)
             except CannotRunError as error:
@@ -295,7 +303,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--lesson', default='', metavar='NN', help='for example 02 or "02 03"')
     parser.add_argument('--minutes', type=float, default=math.inf, help='begin no run after these')
     parser.add_argument('--seed', type=int, help='of the random times; printed with each run')
-    parser.add_argument('--report', action='store_true', help='all runs of this commit so far')
+    parser.add_argument('--report', action='store_true', help='all runs so far')
     options = parser.parse_args(arguments)
     wanted = options.conditions.replace(',', ' ').split() or names
     if unknown := set(wanted) - set(names):
@@ -305,8 +313,7 @@ def main(arguments: list[str] | None = None) -> int:
     except ValueError as error:
         parser.error(str(error))
     if options.report:
-        records = [r for r in recorded(commit()) if r['condition'] in wanted]
-        records = [r for r in records if r['notebook'] in {path.stem for path in notebooks}]
+        records = [r for r in recorded(notebooks) if r['condition'] in wanted]
     else:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         seed = options.seed if options.seed is not None else random.randrange(10**6)
