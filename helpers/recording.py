@@ -62,8 +62,10 @@ class Recording:
 
         @functools.wraps(publish)
         def recorded_publish(msg):
-            append((sequence(msg), clock()))
+            published_s = clock()
             publish(msg)
+            # Not before, where it would delay the message.
+            append((sequence(msg), published_s))
 
         publisher.publish = recorded_publish
 

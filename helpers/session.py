@@ -31,7 +31,6 @@ try:
     from rclpy.node import Node
     from rclpy.qos import DurabilityPolicy, QoSProfile
     from rclpy.signals import SignalHandlerOptions
-    from rclpy.task import Future
 except ImportError as error:
     raise ImportError(
         f'rclpy cannot be imported in this Python ({error}): start JupyterLab with `make lab`, '
@@ -119,17 +118,6 @@ class SessionClosedError(Exception):
     """Raised in a callback that still waits for the answer of a service when its session closes."""
 
 
-class _Stop(Future):
-    """Ends the spinning of a session's executors, which the session wakes.
-
-    rclpy adds a callback to the future at each turn of a spin, 2000 a second in a busy one, and all
-    of them would be kept until the session closes.
-    """
-
-    def add_done_callback(self, callback: Callable) -> None:
-        """Keep nothing."""
-
-
 class Session:
     """An open ROS graph: the context, the threads that spin, and the log. See `ros_session`."""
 
@@ -141,7 +129,6 @@ class Session:
         self._executors: list[Executor] = []
         self._spin_threads: list[threading.Thread] = []
         self._failures: list[BaseException] = []
-        self._stop = _Stop()
         self._log: list[LogRecord] = []
         self._log_subscription = None
 
@@ -236,8 +223,7 @@ class Session:
 
     def _spin(self, executor: Executor) -> None:
         try:
-            # Ends when the session stops, without Executor.shutdown() under a running spin.
-            executor.spin_until_future_complete(self._stop)
+            executor.spin()
         except (ExternalShutdownException, SessionClosedError):
             pass  # the cell itself called rclpy.shutdown(), or left a callback that waits
         except BaseException as failure:
@@ -399,9 +385,10 @@ class Session:
         if self._closed:
             return
         deadline = deadline or time.monotonic() + CLOSE_TIMEOUT_S
-        if not self._stop.done():
-            self._stop.set_result(None)
         for executor in self._executors:
+            # Ends its spin. Executor.shutdown() does not wait for that end before it destroys what
+            # the spin uses.
+            executor._is_shutdown = True
             executor.wake()
         for thread in self._spin_threads:
             self._join(thread, deadline)
