@@ -122,7 +122,7 @@ class Recording:
             return self.in_flight == 0 and any(row[0] == newest for row in self._heard)
 
         def progress() -> float:
-            if not self._finished:
+            if not (self._finished and self._published):
                 return 0.0
             return (self._finished[-1][0] - self._published[0][0] + 1) / messages
 
