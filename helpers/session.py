@@ -126,6 +126,7 @@ class Session:
         self._shared = contextlib.ExitStack()
         self._context = None
         self._closed = False
+        self._failed = False
         self._executors: list[Executor] = []
         self._spin_threads: list[threading.Thread] = []
         self._failures: list[BaseException] = []
@@ -184,6 +185,7 @@ class Session:
         if isinstance(exception, KeyboardInterrupt):
             # What was half made is in the frames alone, and the traceback keeps them.
             clear_frames(traceback)
+        self._failed = exception is not None
         try:
             self.close()
         except BaseException as failure:
@@ -416,10 +418,15 @@ class Session:
             _open_session = None
 
     def _join(self, thread: threading.Thread, deadline: float) -> None:
-        """Wait for the end of a thread. A call in it that waits for an answer fails."""
+        """Wait for the end of a thread. A call in it that waits for an answer fails.
+
+        After an interrupt or a failure, the cell will not set the Event at which a callback waits.
+        """
         thread.join(min(2 * POLL_S, max(0.0, deadline - time.monotonic())))
         while thread.is_alive() and time.monotonic() < deadline:
             self._end_calls()
+            if self._failed:
+                _end_wait(thread)
             thread.join(25 * POLL_S)  # less often than POLL_S: to look for calls takes long
 
     def _end_calls(self) -> None:
@@ -448,6 +455,17 @@ def destroy_nodes(context: rclpy.Context) -> None:
         ):
             with contextlib.suppress(Exception):
                 destroy()
+
+
+def _end_wait(thread: threading.Thread) -> None:
+    """Set the Event at which a thread waits, if it would wait longer than a session does."""
+    frame = sys._current_frames().get(thread.ident)
+    while frame is not None and frame.f_code is not threading.Event.wait.__code__:
+        frame = frame.f_back
+    if frame is not None:
+        event, timeout_s = frame.f_locals['self'], frame.f_locals['timeout']
+        if timeout_s is None or timeout_s > CLOSE_TIMEOUT_S:
+            event.set()
 
 
 def _find(kind: type, context: rclpy.Context) -> Iterator:

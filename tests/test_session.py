@@ -498,6 +498,39 @@ def test_callback_that_does_not_end(threads, monkeypatch):
     wait_for(lambda: python_threads() == before)
 
 
+@EXECUTORS
+@pytest.mark.parametrize('timeout_s', [None, LIMIT_S])
+def test_callback_that_waits_for_an_interrupted_cell(threads, timeout_s):
+    gate, before, waiting, ended = threading.Event(), python_threads(), [], []
+
+    def callback(message):
+        waiting.append(message)
+        gate.wait(timeout_s)
+        ended.append(message)
+
+    with pytest.raises(KeyboardInterrupt) as interrupt, ros_session() as session:
+        spin(session, Listener(callback), threads=threads)
+        spin(session, Talker(1))
+        session.wait_until(lambda: waiting, LIMIT_S)
+        raise KeyboardInterrupt
+    assert ended == waiting
+    assert not hasattr(interrupt.value, '__notes__')
+    assert python_threads() == before
+
+
+@EXECUTORS
+def test_callback_that_only_takes_long_ends_by_itself(threads):
+    gate, pauses = threading.Event(), []
+
+    with pytest.raises(KeyboardInterrupt), ros_session() as session:
+        spin(session, Listener(lambda message: pauses.append(gate.wait(0.5))), threads=threads)
+        Talker(1).publish()
+        session.wait_until_quiet(session._executors[0])
+        raise KeyboardInterrupt
+    assert pauses == [False]
+    assert not gate.is_set()
+
+
 # Deadlocks
 
 
