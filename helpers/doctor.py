@@ -23,6 +23,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from helpers.interrupts import uninterrupted
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -385,14 +387,15 @@ def _why_import_failed(trial: subprocess.CompletedProcess[str]) -> tuple[str, st
 def _run(command: list[str], stdin: str = '') -> subprocess.CompletedProcess[str]:
     """Run a command. One that hangs or cannot start has a return code other than 0."""
     try:
-        return subprocess.run(
-            command,
-            input=stdin,
-            capture_output=True,
-            text=True,
-            errors='replace',
-            timeout=COMMAND_TIMEOUT_S,
-        )
+        with uninterrupted():
+            return subprocess.run(
+                command,
+                input=stdin,
+                capture_output=True,
+                text=True,
+                errors='replace',
+                timeout=COMMAND_TIMEOUT_S,
+            )
     except (OSError, subprocess.TimeoutExpired) as error:
         return subprocess.CompletedProcess(command, returncode=-1, stdout='', stderr=str(error))
 

@@ -21,6 +21,7 @@ from concurrent.futures import thread as thread_pool
 from dataclasses import dataclass
 from traceback import clear_frames
 
+from helpers.interrupts import uninterrupted
 from helpers.progress_bar import ProgressBar
 
 try:
@@ -216,12 +217,12 @@ class Session:
             )
         if executor in self._executors:
             raise ValueError('This executor spins already: call session.spin once per executor.')
-        self._executors.append(executor)
-        thread = threading.Thread(
-            target=self._spin, args=(executor,), name=f'spin {len(self._executors)}', daemon=True
-        )
-        self._spin_threads.append(thread)
-        thread.start()
+        name = f'spin {len(self._executors) + 1}'
+        thread = threading.Thread(target=self._spin, args=(executor,), name=name, daemon=True)
+        with uninterrupted():
+            self._executors.append(executor)
+            self._spin_threads.append(thread)
+            thread.start()
 
     def _spin(self, executor: Executor) -> None:
         try:

@@ -25,10 +25,11 @@ import tempfile
 import textwrap
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
+from helpers.interrupts import uninterrupted
 from helpers.progress_bar import ProgressBar
 from helpers.session import graph_environment
 from helpers.text import wrap
@@ -332,22 +333,6 @@ if os.getppid() == parent:
 """
 
 
-@contextlib.contextmanager
-def _uninterrupted() -> Iterator[None]:
-    """Let an Interrupt wait for the end of the block: a process that starts needs its owner."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread is interrupted
-        return
-    interrupts = []
-    handler = signal.signal(signal.SIGINT, lambda *_: interrupts.append(True))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, handler)
-        if interrupts:
-            signal.raise_signal(signal.SIGINT)
-
-
 def _start(
     name: str, command: list[str], environment: dict[str, str], folder: Path, lines: list[str]
 ) -> tuple[subprocess.Popen, threading.Thread]:
@@ -620,7 +605,7 @@ class Workspace:
         started = time.monotonic()
         process = None
         try:
-            with _uninterrupted():
+            with uninterrupted():
                 process, reader = _start('colcon', command, environment, self.path, lines)
             with ProgressBar(progress) as bar:
                 while reader.is_alive() or process.poll() is None:
@@ -721,14 +706,15 @@ class Workspace:
                 environment['COLCON_PYTHON_EXECUTABLE'] = getattr(
                     sys, '_base_executable', sys.executable
                 )
-            answer = subprocess.run(
-                ['bash', '--norc', '-c', 'source "$0" > /dev/null 2>&1; env -0', str(setup)],
-                env=environment,
-                cwd=self.path,
-                capture_output=True,
-                timeout=STOP_TIMEOUT_S * 4,
-                check=True,
-            )
+            with uninterrupted():
+                answer = subprocess.run(
+                    ['bash', '--norc', '-c', 'source "$0" > /dev/null 2>&1; env -0', str(setup)],
+                    env=environment,
+                    cwd=self.path,
+                    capture_output=True,
+                    timeout=STOP_TIMEOUT_S * 4,
+                    check=True,
+                )
             pairs = os.fsdecode(answer.stdout).split('\0')
             self._sourced = dict(pair.split('=', 1) for pair in pairs if '=' in pair)
         return dict(self._sourced)
@@ -791,7 +777,7 @@ class Workspace:
             self._processes.pop(key).stop()
         command, told = _find_executable(package, executable, environment)
         command = [*command, *arguments] if command else []
-        with _uninterrupted():
+        with uninterrupted():
             process = Process(executable, command, environment, self.path)
             self._processes[key] = process
         process._lines += told

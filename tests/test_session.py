@@ -519,6 +519,24 @@ def test_callback_that_waits_for_an_interrupted_cell(threads, timeout_s):
 
 
 @EXECUTORS
+def test_interrupt_while_a_thread_starts(threads, monkeypatch):
+    start, before = threading.Thread.start, python_threads()
+
+    def interrupted_start(thread):
+        signal.raise_signal(signal.SIGINT)
+        start(thread)
+
+    with pytest.raises(KeyboardInterrupt) as interrupt, ros_session() as session:
+        listener = Listener()
+        with monkeypatch.context() as patch:
+            patch.setattr(threading.Thread, 'start', interrupted_start)
+            spin(session, listener, threads=threads)
+    assert not hasattr(interrupt.value, '__notes__')
+    assert destroyed(listener)
+    assert python_threads() == before
+
+
+@EXECUTORS
 def test_callback_that_only_takes_long_ends_by_itself(threads):
     gate, pauses = threading.Event(), []
 

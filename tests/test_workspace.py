@@ -592,9 +592,17 @@ def test_two_kernels_do_not_share_a_folder(built):
     assert built.result.log.is_file()
 
 
-@pytest.mark.parametrize('start', ['run', 'build'])
-def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch, start):
-    built.environment()  # it starts a shell the first time
+@pytest.mark.parametrize(
+    ('first', 'start'),
+    [
+        (Workspace.environment, lambda workspace: workspace.run('talker_pkg', 'talker')),
+        (Workspace.environment, lambda workspace: workspace.build('talker_pkg')),
+        (Workspace.build, Workspace.environment),
+    ],
+    ids=['run', 'build', 'environment'],
+)
+def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch, first, start):
+    first(built)  # the shell of `environment` starts once after each build
     started = []
 
     class Interrupted(subprocess.Popen):
@@ -605,7 +613,7 @@ def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch, sta
 
     monkeypatch.setattr(subprocess, 'Popen', Interrupted)
     with pytest.raises(KeyboardInterrupt):
-        built.run('talker_pkg', 'talker') if start == 'run' else built.build('talker_pkg')
+        start(built)
     monkeypatch.undo()
     built.close()  # as after each cell that was interrupted
     (process,) = started

@@ -1,0 +1,42 @@
+"""An Interrupt waits for the end of what must not be cut in two."""
+
+import signal
+import threading
+
+import pytest
+
+from helpers.interrupts import uninterrupted
+
+
+def test_an_interrupt_waits_for_the_end():
+    done, handler = [], signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt), uninterrupted():
+        signal.raise_signal(signal.SIGINT)
+        done.append(1)
+    assert done == [1]
+    assert signal.getsignal(signal.SIGINT) is handler
+
+
+def test_an_interrupt_is_not_lost_where_the_block_fails():
+    with pytest.raises(KeyboardInterrupt) as interrupt, uninterrupted():
+        signal.raise_signal(signal.SIGINT)
+        raise ZeroDivisionError
+    assert isinstance(interrupt.value.__context__, ZeroDivisionError)
+
+
+def test_nothing_happens_without_an_interrupt():
+    with uninterrupted():
+        pass
+    with pytest.raises(ZeroDivisionError), uninterrupted():
+        raise ZeroDivisionError
+
+
+def test_other_threads_are_never_interrupted():
+    def block():
+        with uninterrupted():
+            done.append(signal.getsignal(signal.SIGINT))
+
+    done, thread = [], threading.Thread(target=block)
+    thread.start()
+    thread.join()
+    assert done == [signal.getsignal(signal.SIGINT)]
