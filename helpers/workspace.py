@@ -887,7 +887,8 @@ def _scratch() -> Path:
 
 def _empty(folder: Path) -> None:
     if folder.exists():
-        shutil.rmtree(folder)
+        with uninterrupted():  # rmtree makes an OSError of an Interrupt
+            shutil.rmtree(folder)
 
 
 # --- In a notebook -------------------------------------------------------------------------------

@@ -193,6 +193,28 @@ def test_an_interrupted_cell_is_looked_at_and_run_again(tmp_path):
     assert record['failed'][0] == 'code cell 3'
 
 
+@pytest.mark.parametrize('times', [1, 2])
+def test_a_kernel_that_an_interrupt_ends_is_given_a_second_try(tmp_path, times):
+    cell = f"""
+import os, time
+from pathlib import Path
+run = len(list(Path('{tmp_path}').glob('run*')))
+Path(f'{tmp_path}/run{{run}}').touch()
+try:
+    time.sleep(20 if run < 2 else 0)
+except KeyboardInterrupt:
+    if run < {times}:
+        os._exit(1)
+    raise
+"""
+    record = soak.run(notebook(tmp_path, (cell, '')), CONDITION['interrupt'], seed=3)
+    assert record['interrupts']['with a lost kernel'] == 1
+    if times == 1:
+        assert record['failed'] is None
+    else:
+        assert 'The kernel is lost' in record['failed'][1]
+
+
 def test_after_a_killed_kernel_all_cells_run_in_a_fresh_one(tmp_path):
     record = soak.run(notebook(tmp_path, COUNT), CONDITION['kill'], seed=1)
     assert record['failed'] is None

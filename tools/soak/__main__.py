@@ -104,6 +104,7 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
             'interrupted': sum('interrupted_after_s' in row for row in rows),
             'in an import': sum('import_interrupted' in row for row in rows),
             'without a reply': sum('no_reply' in row for row in rows),
+            'with a lost kernel': sum('kernel_lost' in row for row in rows),
         },
         'failed': failures[0] if failures else None,
         'report': rows if failures else [],
