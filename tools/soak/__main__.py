@@ -184,7 +184,7 @@ def recorded(notebooks: list[Path]) -> list[dict]:
     versions = {notebook.stem: version(notebook) for notebook in notebooks}
     lines = RUNS.read_text(encoding='utf-8').splitlines() if RUNS.exists() else []
     records = [json.loads(line) for line in lines]
-    return [r for r in records if versions.get(r['notebook']) == r['version']]
+    return [r for r in records if r.get('version') == versions.get(r['notebook'], '')]
 
 
 def soak(
