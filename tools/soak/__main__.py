@@ -310,9 +310,10 @@ def main(arguments: list[str] | None = None) -> int:
     if unknown := set(wanted) - set(names):
         parser.error(f'There is no condition {min(unknown)!r}: take of {", ".join(names)}.')
     try:
-        notebooks = lessons(options.lesson.replace(',', ' ').split(), FOLDER)
+        chosen = lessons(options.lesson.replace(',', ' ').split(), FOLDER)
     except ValueError as error:
         parser.error(str(error))
+    notebooks = [path for path in chosen if '"cell_type": "code"' in path.read_text('utf-8')]
     if options.report:
         records = [r for r in recorded(notebooks) if r['condition'] in wanted]
     else:

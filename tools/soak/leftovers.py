@@ -164,16 +164,15 @@ class Watch:
         another process, as `fastdds shm clean` does, so it is removed here and not reported.
         """
         deadline = time.monotonic() + END_TIMEOUT_S
-        while (found := self._processes_left(domain_ids)) and time.monotonic() < deadline:
-            time.sleep(LOOK_EVERY_S)
-        for segment in sorted(self._held - self._there):
-            files = [Path(segment), *(Path(segment + end) for end in LOCK_FILES)]
-            left = [file for file in files if file.exists()]
-            if not left or any(segment in _segments(pid) for pid in psutil.pids()):
-                continue  # removed, or somebody else uses a port of this number now
-            if segment not in killed:
-                found.append(f'Shared memory is left: {segment}.')
-            for file in left:
+        while True:
+            found = self._processes_left(domain_ids)
+            time.sleep(LOOK_EVERY_S)  # a process that has just ended closes its files last
+            unused = [segment for segment in self._unused() if segment not in killed]
+            found += [f'Shared memory is left: {segment}.' for segment in unused]
+            if not found or time.monotonic() > deadline:
+                break
+        for segment in self._unused() if found or killed else []:
+            for file in _files_of(segment):
                 file.unlink(missing_ok=True)
         return found + [f'The file {file} is new or has changed.' for file in self._files_left()]
 
@@ -187,6 +186,15 @@ class Watch:
             found += [f'The process {pid} still reserves domain id {domain_id}.' for pid in holders]
         return found
 
+    def _unused(self) -> list[str]:
+        """Return the shared memory that this run has used and nobody uses now.
+
+        A port may be another run's in a moment: Fast DDS counts them through all domains.
+        """
+        there = [s for s in sorted(self._held - self._there) if any(map(Path.exists, _files_of(s)))]
+        used = set().union(*map(_segments, psutil.pids())) if there else set()
+        return [segment for segment in there if segment not in used]
+
     def _files_left(self) -> list[Path]:
         after = files_in(*self.shared)
         changed = {file for file, state in after.items() if self._before.get(file) != state}
@@ -196,6 +204,10 @@ class Watch:
         changed = {file for file in changed if scratch not in file.parts}
         # Of a new folder, the folder is enough.
         return sorted(file for file in changed if file.parent not in changed)
+
+
+def _files_of(segment: str) -> list[Path]:
+    return [Path(segment), *(Path(segment + end) for end in LOCK_FILES)]
 
 
 def _segments(pid: int) -> set[str]:
