@@ -13,7 +13,7 @@ import time
 
 from benchmarks.table import print_table
 
-# The last two take minutes. Each has a function `measure` that returns rows.
+# The first and the last two take minutes. Each has a function `measure` that returns rows.
 NAMES = ('latency', 'recorder', 'model', 'fusion', 'two_threads', 'interface', 'set_up', 'checks')
 IDLE_CORES = 0.1
 

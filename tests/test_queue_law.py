@@ -28,9 +28,6 @@ def heard(table):
 # predict: a run without any chance in it
 
 
-TIMES = ['started_s', 'finished_s']
-
-
 def slow_prediction(period, callback, depth, threads, messages):
     """Step from event to event with a real list as the queue. Return {message: start}."""
     queue, started, free_at = [], {}, [0] * threads
@@ -76,7 +73,9 @@ def test_predict_is_what_a_queue_does(run):
     expected = slow_prediction(period, callback, depth, threads, messages)
     assert heard(table) == list(expected)
     # To the nanosecond, in milliseconds.
-    started, finished = (table[name].dropna().mul(1000).round(6) for name in TIMES)
+    started, finished = (
+        table[name].dropna().mul(1000).round(6) for name in ('started_s', 'finished_s')
+    )
     assert started.tolist() == list(expected.values())
     assert finished.tolist() == [start + callback for start in expected.values()]
     # No worker does two things at a time.

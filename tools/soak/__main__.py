@@ -79,8 +79,9 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
         rows = []
         if report.exists():
             rows = [json.loads(line) for line in report.read_text(encoding='utf-8').splitlines()]
-        facts = {key: value for row in rows for key, value in row.items()}
-        left = watch.left(facts.get('domain_ids', {}), set(facts.get('killed_held', ())))
+        domain_ids = next((row['domain_ids'] for row in rows if 'domain_ids' in row), {})
+        killed_held = {name for row in rows for name in row.get('killed_held', ())}
+        left = watch.left(domain_ids, killed_held)
         failures = [[row['item'], row['failed']] for row in rows if row['failed']]
         if status and not failures:
             failures = [['no cell', f'pytest ended with {status}: {printed}']]

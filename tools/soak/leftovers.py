@@ -171,9 +171,10 @@ class Watch:
             found += [f'Shared memory is left: {segment}.' for segment in unused]
             if not found or time.monotonic() > deadline:
                 break
-        for segment in self._unused() if found or killed else []:
-            for file in _files_of(segment):
-                file.unlink(missing_ok=True)
+        if found or killed:  # otherwise what is unused is about to be another run's
+            for segment in self._unused():
+                for file in _files_of(segment):
+                    file.unlink(missing_ok=True)
         return found + [f'The file {file} is new or has changed.' for file in self._files_left()]
 
     def _processes_left(self, domain_ids: dict[str, int]) -> list[str]:

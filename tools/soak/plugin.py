@@ -169,6 +169,12 @@ def await_reply(kernel: RunningKernel, message: str, timeout_s: float) -> dict:
             return answer['content']
 
 
+def held_by_kernel(kernel: RunningKernel) -> list[str]:
+    """Return the shared memory that a kernel and what it has started use."""
+    process = psutil.Process(kernel.km.provisioner.pid)
+    return sorted(held_by([process, *process.children(recursive=True)]))
+
+
 def await_idle(kernel: RunningKernel, message: str) -> None:
     """Wait for the end of an interrupted message. Raises one of KERNEL_LOST."""
     deadline = time.monotonic() + INTERRUPTED_TIMEOUT_S
@@ -211,9 +217,10 @@ class Interrupted(Again):
         try:
             self._interrupt(after_s)
         except KERNEL_LOST:
-            # In a few of a thousand Interrupts at the start of a cell, ipykernel 7.4 ends, hangs or
-            # breaks a message, also for `x = 1`. What a lesson does wrong, it does twice.
-            self.user_properties += [('kernel_lost', True), ('killed_held', self._held())]
+            # ipykernel does so by itself (environment.md). What a lesson does wrong, it does twice.
+            self.user_properties.append(('kernel_lost', True))
+            with suppress(psutil.Error):  # it has ended
+                self.user_properties.append(('killed_held', held_by_kernel(self.parent.kernel)))
             self._fresh_kernel()
             try:
                 self._interrupt(after_s)
@@ -239,12 +246,6 @@ class Interrupted(Again):
         left = left_in_process(kernel.soak_before, state_of(kernel))
         if left:
             self.raise_cell_error(f'Run for {after_s:.3f} s. {" ".join(left)}', traceback)
-
-    def _held(self) -> list[str]:
-        """Return the shared memory that the kernel uses."""
-        with suppress(psutil.Error):
-            return sorted(held_by([psutil.Process(self.parent.kernel.km.provisioner.pid)]))
-        return []
 
     def _fresh_kernel(self) -> None:
         restart(self.parent)
@@ -307,11 +308,10 @@ class Killed(_OfNotebook):
             await_reply(kernel, message, after_s)
         process = psutil.Process(kernel.km.provisioner.pid)
         process.suspend()  # so that it holds what is noted
-        family = [process, *process.children(recursive=True)]
         self.user_properties += [
             ('killed_in_cell', last + 1),
             ('killed_after_s', after_s),
-            ('killed_held', sorted(held_by(family))),
+            ('killed_held', held_by_kernel(kernel)),
         ]
         process.kill()
         restart(self.parent)
