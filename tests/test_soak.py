@@ -1,5 +1,6 @@
 """The soak: it notices what is left, whoever left it, and runs cells as each mode says."""
 
+import fcntl
 import json
 import os
 import signal
@@ -141,10 +142,51 @@ def test_shared_memory_of_a_killed_process_is_removed_and_not_counted(folders):
     with Watch(mark, [folders / 'home'], [folders / 'checkout']) as watch:
         for end in ('', '_el'):
             Path(segment + end).touch()
-        watch._held |= {segment, older}
+        watch._held |= leftovers._files([segment, f'{segment}_el', older])
     assert watch.left({}, killed={segment}) == []
     assert not Path(f'{segment}_el').exists()
     Path(older).unlink()  # somebody else's: it was there before
+
+
+def test_shared_memory_of_the_same_name_is_not_the_same(folders):
+    """A port that this run had is free again, and then another run's."""
+    port = Path(f'{SHARED_MEMORY}/fastrtps_port_of_test-{os.getpid()}')
+    with Watch('mine', [folders / 'home'], [folders / 'checkout']) as watch:
+        port.touch()
+        watch._held |= leftovers._files([str(port)])
+    other = port.with_name(f'{port.name}_new')
+    other.touch()
+    other.replace(port)
+    assert watch.left({}, killed=set()) == []
+    port.unlink()
+
+
+def test_a_lock_counts_for_the_process_that_holds_it():
+    """A participant opens the locks of other ports too, to see whether they are free."""
+    segment = f'{SHARED_MEMORY}/fastrtps_lock_of_test-{os.getpid()}'
+    lock = Path(f'{segment}_el')
+    try:
+        with lock.open('w') as holder:
+            assert leftovers._segments(os.getpid()) == set()
+            fcntl.flock(holder, fcntl.LOCK_EX)
+            assert leftovers._segments(os.getpid()) == {segment}
+            lock.unlink()  # another file of this name, in /dev/shm or in another name space
+            lock.touch()
+            assert leftovers._segments(os.getpid()) == set()
+    finally:
+        lock.unlink()
+
+
+def test_a_zombie_is_named_and_a_process_that_has_ended_is_not():
+    ended = subprocess.Popen(['true'])
+    process = psutil.Process(ended.pid)
+    while process.status() != psutil.STATUS_ZOMBIE:
+        pass
+    assert [name for _, name in leftovers._named([process])] == [
+        'true (a zombie: nobody has waited for its end)'
+    ]
+    ended.wait()
+    assert not list(leftovers._named([process]))
 
 
 def test_other_processes_are_left_alone(folders):

@@ -12,7 +12,7 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -47,9 +47,10 @@ def state_of_process() -> dict:
             name = (task / 'comm').read_text().strip()
             if name.startswith('dds.') and name not in OF_PROCESS:
                 threads[f'native {task.name}'] = name
+    children = psutil.Process().children(recursive=True)
     return {
         'threads': threads,
-        'children': {str(child.pid): _name(child) for child in psutil.Process().children(True)},
+        'children': {str(child.pid): name for child, name in _named(children)},
         'domain_ids': {str(domain_id): inode for domain_id, inode in _reserved_ids()},
         'shared_memory': sorted(_segments(os.getpid())),
     }
@@ -136,14 +137,14 @@ class Watch:
 
     def __init__(self, mark: str, own: list[Path], shared: list[Path]) -> None:
         self.mark, self.own, self.shared = mark, own, shared
-        self._held: set[str] = set()  # shared memory that a process of this run has used
+        self._held: set[File] = set()  # shared memory that a process of this run has used
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._watch, name=f'watch {mark}')
 
     def __enter__(self) -> Watch:
         self._before = files_in(*self.shared)
-        # A participant also opens the ports of dead processes, to see whether it can have them.
-        self._there = {str(file) for file in Path(SHARED_MEMORY).parent.glob('fastrtps_*')}
+        # A participant also locks the ports of dead processes, to see whether it can have them.
+        self._there = _files(map(str, Path(SHARED_MEMORY).parent.glob('fastrtps_*')))
         self._thread.start()
         return self
 
@@ -153,8 +154,8 @@ class Watch:
 
     def _watch(self) -> None:
         while not self._end.wait(LOOK_EVERY_S):
-            for process in processes_of(self.mark):
-                self._held |= _segments(process.pid)
+            for segment in held_by(processes_of(self.mark)):
+                self._held |= _files(segment + end for end in ('', *LOCK_FILES))
 
     def left(self, domain_ids: dict[str, int], killed: set[str]) -> list[str]:
         """Return a sentence for each thing that is still there once the processes should be gone.
@@ -167,20 +168,19 @@ class Watch:
         while True:
             found = self._processes_left(domain_ids)
             time.sleep(LOOK_EVERY_S)  # a process that has just ended closes its files last
-            unused = [segment for segment in self._unused() if segment not in killed]
-            found += [f'Shared memory is left: {segment}.' for segment in unused]
+            unused = [file for file in self._unused() if _segment(file) not in killed]
+            found += [f'Shared memory is left: {file}.' for file in unused]
             if not found or time.monotonic() > deadline:
                 break
         if found or killed:  # otherwise what is unused is about to be another run's
-            for segment in self._unused():
-                for file in _files_of(segment):
-                    file.unlink(missing_ok=True)
+            for file in self._unused():
+                Path(file).unlink(missing_ok=True)
         return found + [f'The file {file} is new or has changed.' for file in self._files_left()]
 
     def _processes_left(self, domain_ids: dict[str, int]) -> list[str]:
         found = [
-            f'The process {process.pid} still runs: {_name(process)}.'
-            for process in processes_of(self.mark)
+            f'The process {process.pid} still runs: {name}.'
+            for process, name in _named(processes_of(self.mark))
         ]
         for domain_id, inode in domain_ids.items():
             holders = [pid for pid in psutil.pids() if _holds_socket(pid, inode)]
@@ -188,13 +188,14 @@ class Watch:
         return found
 
     def _unused(self) -> list[str]:
-        """Return the shared memory that this run has used and nobody uses now.
+        """Return the files of shared memory that this run has used and nobody uses now.
 
         A port may be another run's in a moment: Fast DDS counts them through all domains.
         """
-        there = [s for s in sorted(self._held - self._there) if any(map(Path.exists, _files_of(s)))]
-        used = set().union(*map(_segments, psutil.pids())) if there else set()
-        return [segment for segment in there if segment not in used]
+        left = self._held - self._there
+        left &= _files(name for name, _ in left)  # of the same name, they may be another run's
+        used = set().union(*map(_segments, psutil.pids())) if left else set()
+        return sorted(name for name, _ in left if _segment(name) not in used)
 
     def _files_left(self) -> list[Path]:
         after = files_in(*self.shared)
@@ -207,17 +208,44 @@ class Watch:
         return sorted(file for file in changed if file.parent not in changed)
 
 
-def _files_of(segment: str) -> list[Path]:
-    return [Path(segment), *(Path(segment + end) for end in LOCK_FILES)]
+File = tuple[str, int]  # its name, and its inode: another file of that name is not the same
+
+
+def _files(names: Iterable[str]) -> set[File]:
+    """Return those of these files that exist."""
+    found = set()
+    for name in names:
+        with suppress(OSError):
+            found.add((name, os.stat(name).st_ino))
+    return found
+
+
+def _segment(file: str) -> str:
+    """Return the segment or port that a file belongs to."""
+    return file[:-3] if file.endswith(LOCK_FILES) else file
 
 
 def _segments(pid: int) -> set[str]:
     """Return the segments and ports of Fast DDS that a process has locked, which is: uses."""
     return {
-        target[:-3]
-        for _, target in _open_files(pid)
-        if target.startswith(SHARED_MEMORY) and target.endswith(LOCK_FILES)
+        _segment(target)
+        for number, target in _open_files(pid)
+        if target.startswith(SHARED_MEMORY)
+        and target.endswith(LOCK_FILES)
+        and _has_locked(pid, number, target)
     }
+
+
+def _has_locked(pid: int, number: int, file: str) -> bool:
+    """Return whether a process has locked a file that it has open, and that is this one here.
+
+    A participant opens the locks of other ports too, to see whether they are free. In another mount
+    namespace, a file of the same name is another file.
+    """
+    with suppress(OSError):
+        here = os.path.samestat(os.stat(f'/proc/{pid}/fd/{number}'), os.stat(file))
+        return here and '\nlock:' in Path(f'/proc/{pid}/fdinfo/{number}').read_text()
+    return False
 
 
 def held_by(processes: list[psutil.Process]) -> set[str]:
@@ -237,8 +265,12 @@ def _holds_socket(pid: int, inode: int) -> bool:
     return any(target == f'socket:[{inode}]' for _, target in _open_files(pid))
 
 
-def _name(process: psutil.Process) -> str:
-    """Return the command of a process, shortened; '?' where it has just ended."""
-    with suppress(psutil.Error):
-        return ' '.join(process.cmdline())[:100] or process.name()
-    return '?'
+def _named(processes: list[psutil.Process]) -> Iterator[tuple[psutil.Process, str]]:
+    """Yield each process with its command, shortened; not one that has ended meanwhile."""
+    for process in processes:
+        try:
+            yield process, ' '.join(process.cmdline())[:100] or process.name()
+        except psutil.ZombieProcess:
+            yield process, f'{process.name()} (a zombie: nobody has waited for its end)'
+        except psutil.NoSuchProcess:
+            continue
