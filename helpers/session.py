@@ -127,7 +127,7 @@ class Session:
         self._shared = contextlib.ExitStack()
         self._context = None
         self._closed = False
-        self._failed = False
+        self._ended_by_exception = False
         self._executors: list[Executor] = []
         self._spin_threads: list[threading.Thread] = []
         self._failures: list[BaseException] = []
@@ -186,7 +186,7 @@ class Session:
         if isinstance(exception, KeyboardInterrupt):
             # What was half made is in the frames alone, and the traceback keeps them.
             clear_frames(traceback)
-        self._failed = exception is not None
+        self._ended_by_exception = exception is not None
         try:
             self.close()
         except BaseException as failure:
@@ -426,7 +426,7 @@ class Session:
         thread.join(min(2 * POLL_S, max(0.0, deadline - time.monotonic())))
         while thread.is_alive() and time.monotonic() < deadline:
             self._end_calls()
-            if self._failed:
+            if self._ended_by_exception:
                 _end_wait(thread)
             thread.join(25 * POLL_S)  # less often than POLL_S: to look for calls takes long
 

@@ -258,7 +258,8 @@ def lines_that_matter(text: str) -> list[str]:
                 end += 1
             block = [x for x in lines[index:end] if ': note: ' not in x]
         elif re.match(
-            r'error: |ERROR|\S*ld: .*(undefined|cannot find|recompile)|.*: undefined ref', line
+            r'error: |ERROR|\S*ld(\.\w+)?: .*(undefined|cannot find|recompile)|.*: undefined ref',
+            line,
         ):
             block = [line]
         else:
@@ -640,7 +641,8 @@ class Workspace:
         own = [
             self._plain(found[1])
             for line in output
-            if (found := re.match(r'\[\d[\d.]*s\] ((?:WARNING|ERROR):.*)', line))
+            # Since Python 3.13 colcon's seconds are negative.
+            if (found := re.match(r'\[-?\d[\d.]*s\] ((?:WARNING|ERROR):.*)', line))
             # The prefix of the wheels is no colcon workspace, and need not be.
             and "doesn't contain any 'local_setup.*' files" not in line
         ]

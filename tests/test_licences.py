@@ -38,8 +38,7 @@ def test_the_licences_are_what_the_packages_say():
             continue
         try:
             assert licences.licence_of(row.name) == row.licence, HINT
-        except PackageNotFoundError:  # of a group that is not installed
-            assert row.lock != 'requirements.lock'
+        except PackageNotFoundError:  # of a group or a Python that is not this one
             continue
         looked_at += 1
     assert looked_at > 200

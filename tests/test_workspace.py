@@ -322,14 +322,15 @@ def test_without_python_headers_one_sentence_says_what_to_install(monkeypatch):
     assert f'run `sudo apt install python{version}-dev`' in missing_tools()
 
 
-def test_of_the_linker_only_its_error_is_kept():
+@pytest.mark.parametrize('ld', ['/usr/bin/ld', '/usr/bin/x86_64-linux-gnu-ld.bfd'])
+def test_of_the_linker_only_its_error_is_kept(ld):
     error = (
-        '/usr/bin/ld: lib/libmy.a(my.cpp.o): relocation R_X86_64_PC32 against symbol `_ZTISt9'
+        f'{ld}: lib/libmy.a(my.cpp.o): relocation R_X86_64_PC32 against symbol `_ZTISt9'
         "exception' can not be used when making a shared object; recompile with -fPIC"
     )
-    text = f"""/usr/bin/ld: lib/libmy.a(my.cpp.o): warning: relocation against `_ZTISt9exception'
+    text = f"""{ld}: lib/libmy.a(my.cpp.o): warning: relocation against `_ZTISt9exception'
 {error}
-/usr/bin/ld: final link failed: bad value
+{ld}: final link failed: bad value
 collect2: error: ld returned 1 exit status
 gmake[2]: *** [CMakeFiles/my.dir/build.make:100: my.so] Error 1"""
     assert lines_that_matter(text) == [error]
