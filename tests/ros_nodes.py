@@ -2,12 +2,16 @@
 
 import contextlib
 import threading
+from pathlib import Path
 
+import psutil
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
+
+from tools.soak.leftovers import LOCK_FILES, held_by
 
 LIMIT_S = 20.0  # for every wait; never reached unless something is broken
 
@@ -116,6 +120,21 @@ class Gate:
 
     def open(self) -> None:
         self._open.set()
+
+
+def kill(process) -> None:
+    """Kill a process, and remove the shared memory that it can no longer remove.
+
+    Its ports stay: the next participant that wants their numbers takes them.
+    """
+    with contextlib.suppress(psutil.NoSuchProcess):
+        held = held_by([psutil.Process(process.pid)])
+        process.kill()
+        process.wait()
+        for segment in held:
+            if 'port' not in segment:
+                for end in ('', *LOCK_FILES):
+                    Path(segment + end).unlink(missing_ok=True)
 
 
 def spin(session, *nodes, threads: int = 1):

@@ -19,7 +19,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle, InvalidNodeNameException
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
-from ros_nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
+from ros_nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, kill, spin
 from std_msgs.msg import String
 
 from helpers import session as module
@@ -55,7 +55,7 @@ def running(*arguments, **environment):
     try:
         yield process
     finally:
-        process.kill()
+        kill(process)
         process.communicate()
 
 

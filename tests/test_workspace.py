@@ -12,6 +12,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from ros_nodes import kill
 
 from helpers import workspace as module
 from helpers.session import reserve_domain_id, ros_session
@@ -519,7 +520,7 @@ def test_waiting_is_bounded_and_says_what_was_printed(built):
         talker.wait_for('Publishing')
         with pytest.raises(TimeoutError, match="a line with 'never' of talker. Its .*Publish"):
             talker.wait_for('never', timeout_s=0.1)
-        talker._process.send_signal(signal.SIGKILL)
+        kill(talker._process)
         with pytest.raises(RuntimeError, match='^talker ended with code -9 before a line'):
             talker.wait_for('never')
 
