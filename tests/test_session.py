@@ -468,6 +468,7 @@ def test_saturated_reentrant_group(threads, default_event_callbacks):
         assert destroyed(listener)
         assert len(inside) == threads
 
+    gc.collect()  # what other tests have left
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter('always')
         saturate()
@@ -576,6 +577,7 @@ def ask(threads, style='call', groups=1, work=None):
     ],
 )
 def test_deadlock_ends_with_the_session(threads, style, groups, answer):
+    gc.collect()  # what other tests have left
     with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter('always')
         assert ask(threads, style, groups) == answer

@@ -119,6 +119,7 @@ def test_what_a_killed_process_leaves_is_named(folders, monkeypatch):
     (domain_id,) = state['domain_ids']
     with_child = watch.left(state['domain_ids'], killed=set())
     os.kill(child, signal.SIGKILL)
+    process.communicate()
     monkeypatch.undo()  # it may take a moment
     assert sum(f'The process {child} still runs: ' in sentence for sentence in with_child) == 1
     assert f'The process {child} still reserves domain id {domain_id}.' in with_child
