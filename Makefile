@@ -11,12 +11,12 @@ present: set_up ## open JupyterLab on a lesson as slides whose cells run: LESSON
 	@$(call open_lab,true,/lab/workspaces/present/tree/$(deck)?reset)
 
 test: set_up lint ## all checks: lint, tests of the helpers, every notebook compared with its saved outputs
-	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope $(PYTEST_ARGS)
+	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(PYTEST_ARGS)
 
 test-browser: ## the real JupyterLab in Chromium, as students and instructors use it; it takes minutes
 	@[ -n "$(CHROMIUM)" ] || { echo '$(no_chromium)' >&2; exit 1; }
 	@tools/set_up.sh browser
-	@CHROMIUM="$(CHROMIUM)" $(PYTHON) -m pytest -n 2 --dist worksteal -o faulthandler_timeout=600 tests/browser $(PYTEST_ARGS)
+	@CHROMIUM="$(CHROMIUM)" $(PYTHON) -m pytest -n 2 --dist worksteal --max-worker-restart 0 -o faulthandler_timeout=600 tests/browser $(PYTEST_ARGS)
 
 hub: ## a JupyterHub for a class on this machine; HUB_ARGS=... changes how. See environment.md
 	@tools/hub/set_up.sh
@@ -66,7 +66,8 @@ set_up:
 
 PYTHON := .venv/bin/python
 
-# Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker.
+# Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None
+# is replaced: where one has crashed, pytest-xdist may wait for its successor for ever.
 WORKERS := 4
 
 CHROMIUM ?= $(shell command -v chromium || command -v chromium-browser || command -v google-chrome)
