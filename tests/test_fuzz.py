@@ -58,7 +58,7 @@ OTHERS = [
         pd.NaT,
         pd.Timestamp('2026-01-01', tz='UTC'),
         pd.Timedelta('1s'),
-        np.datetime64('NaT'),
+        np.datetime64('NaT', 'ns'),
     ),
     *(pd.DataFrame(), pd.Series([1.0]), float, lambda: 0),
 ]
