@@ -183,7 +183,8 @@ def bundled() -> set[str]:
     """
     found = set()
     for file in Path(sysconfig.get_path('purelib')).glob('ros_*.libs/*'):
-        if '__rosidl_' in file.name:  # generated from the messages of a package that has its row
+        own = file.name.rpartition('-')[0] + '.so'
+        if Path(sys.prefix, 'lib', own).exists():  # a copy of what a package with a row brings
             continue
         name = re.match(r'[a-z]+[a-z0-9]*(-ust)?', file.name)[0]
         if name not in BUNDLED:
