@@ -11,7 +11,7 @@ from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from tools.soak.leftovers import LOCK_FILES, held_by
+from tools.soak.leftovers import files_of, held_by
 
 LIMIT_S = 20.0  # for every wait; never reached unless something is broken
 
@@ -133,8 +133,8 @@ def kill(process) -> None:
         process.wait()
         for segment in held:
             if 'port' not in segment:
-                for end in ('', *LOCK_FILES):
-                    Path(segment + end).unlink(missing_ok=True)
+                for file in files_of(segment):
+                    Path(file).unlink(missing_ok=True)
 
 
 def spin(session, *nodes, threads: int = 1):

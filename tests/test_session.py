@@ -481,6 +481,7 @@ def test_saturated_reentrant_group(threads, default_event_callbacks):
 def test_callback_that_does_not_end(threads, monkeypatch):
     monkeypatch.setattr(module, 'CLOSE_TIMEOUT_S', 0.3)
     gate, before = Gate(), python_threads()
+    started = None
     with (
         pytest.raises(RuntimeError, match=r'1 callback\(s\) did not end within 0\.3 s'),
         ros_session() as session,
@@ -489,6 +490,8 @@ def test_callback_that_does_not_end(threads, monkeypatch):
         spin(session, talker)
         spin(session, listener, threads=threads)
         session.wait_until(lambda: gate.inside == 1, LIMIT_S)
+        started = time.monotonic()
+    assert time.monotonic() - started >= 0.3
     assert python_threads() > before  # the callback has not ended
     assert not context.ok()
     assert destroyed(talker)

@@ -103,13 +103,18 @@ def assert_reason(name: str) -> None:
     assert re.search(rf'^\| `{re.escape(name)}(\[\w+\])?` \| .{{10,}} \|$', reasons, re.MULTILINE)
 
 
+def wanted_here(lock: str) -> list[Requirement]:
+    """Return the pins of a lock file that are for this Python and this platform."""
+    pins = map(Requirement, re.findall(r'^[a-z].*(?= \\)', lock, re.MULTILINE))
+    return [pin for pin in pins if pin.marker.evaluate()]
+
+
 def test_the_environment_holds_what_the_lock_says_and_nothing_else():
     locks = [LOCK, *(GROUP_LOCKS[g] for g in GROUPS if Path(sys.prefix, f'with_{g}').exists())]
-    lines = [line for lock in locks for line in re.findall(r'^[a-z].*(?= \\)', lock, re.MULTILINE)]
     locked = {
         (requirement.name, requirement.specifier)
-        for requirement in map(Requirement, lines)
-        if requirement.marker.evaluate()
+        for lock in locks
+        for requirement in wanted_here(lock)
     }
     # A wheel of ROS 2 also holds the metadata of an older format: that is no package of its own.
     packages = [package for package in distributions() if package.read_text('WHEEL')]

@@ -13,9 +13,6 @@ folder=$(realpath "$1")
 shift
 [ "$(id -u)" = 0 ] || say 'Only root may change the root folder: run it with sudo.'
 [ -x "$folder/bin/sh" ] || say "There is no distribution in $folder: CONTRIBUTING.md says how to make one."
-for tool in git make c++; do
-    [ -x "$folder/usr/bin/$tool" ] || say "The distribution in $folder has no $tool: install it there."
-done
 
 checkout=$(realpath "$(dirname "$0")/..")
 # A namespace of mounts, which ends with the command. Not chroot: the tests make namespaces of their
@@ -35,6 +32,9 @@ exec unshare --mount --pid --fork --propagation private sh -euc '
     pivot_root . mnt/before
     cd /
     umount --lazy /mnt/before
+    for tool in git make c++; do
+        command -v "$tool" > /dev/null || { echo "This distribution has no $tool: install it there." >&2; exit 2; }
+    done
     rm -rf ros2_notebooks
     git -c safe.directory=* clone --quiet /mnt/checkout ros2_notebooks
     cd ros2_notebooks

@@ -155,7 +155,7 @@ class Watch:
     def _watch(self) -> None:
         while not self._end.wait(LOOK_EVERY_S):
             for segment in held_by(processes_of(self.mark)):
-                self._held |= _files(segment + end for end in ('', *LOCK_FILES))
+                self._held |= _files(files_of(segment))
 
     def left(self, domain_ids: dict[str, int], killed: set[str]) -> list[str]:
         """Return a sentence for each thing that is still there once the processes should be gone.
@@ -220,6 +220,11 @@ def _files(names: Iterable[str]) -> set[File]:
     return found
 
 
+def files_of(segment: str) -> list[str]:
+    """Return the names of the files that a segment or port may have."""
+    return [segment, *(segment + end for end in LOCK_FILES)]
+
+
 def _segment(file: str) -> str:
     """Return the segment or port that a file belongs to."""
     return file[:-3] if file.endswith(LOCK_FILES) else file
@@ -268,9 +273,9 @@ def _holds_socket(pid: int, inode: int) -> bool:
 def _named(processes: list[psutil.Process]) -> Iterator[tuple[psutil.Process, str]]:
     """Yield each process with its command, shortened; not one that has ended meanwhile."""
     for process in processes:
-        try:
-            yield process, ' '.join(process.cmdline())[:100] or process.name()
-        except psutil.ZombieProcess:
-            yield process, f'{process.name()} (a zombie: nobody has waited for its end)'
-        except psutil.NoSuchProcess:
-            continue
+        with suppress(psutil.NoSuchProcess):
+            try:
+                name = ' '.join(process.cmdline())[:100] or process.name()
+            except psutil.ZombieProcess:
+                name = f'{process.name()} (a zombie: nobody has waited for its end)'
+            yield process, name
