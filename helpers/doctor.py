@@ -116,7 +116,7 @@ def check_message() -> Check:
     from rclpy.task import Future
     from std_msgs.msg import String
 
-    from helpers.session import destroy_nodes, reserve_domain_id
+    from helpers.session import destroy_nodes, one_process_at_a_time, reserve_domain_id
 
     name = 'one message to itself'
     try:
@@ -126,9 +126,10 @@ def check_message() -> Check:
         context.init(domain_id=reserve_domain_id(), initialize_logging=False)
         try:
             executor = SingleThreadedExecutor(context=context)
-            node = rclpy.create_node(
-                'doctor', context=context, enable_rosout=False, start_parameter_services=False
-            )
+            with one_process_at_a_time():
+                node = rclpy.create_node(
+                    'doctor', context=context, enable_rosout=False, start_parameter_services=False
+                )
             executor.add_node(node)
             # Transient local: the message arrives also where discovery ends after publish().
             qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

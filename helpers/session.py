@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import fcntl
 import gc
 import os
 import socket
@@ -39,6 +40,8 @@ except ImportError as error:
     ) from error
 
 CLOSE_TIMEOUT_S = 5.0
+SHARED_MEMORY = '/dev/shm'
+TURN_TIMEOUT_S = 5.0
 POLL_S = 0.01
 QUIET_ROUNDS = 20
 DISCOVERY = ('LOCALHOST', 'SUBNET')
@@ -167,7 +170,10 @@ class Session:
             # rclpy's own handlers would shut the context down when the notebook is interrupted.
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        self._log_node = Node('_session_log', enable_rosout=False, start_parameter_services=False)
+        with one_process_at_a_time():  # the first node makes the participant
+            self._log_node = Node(
+                '_session_log', enable_rosout=False, start_parameter_services=False
+            )
         self._log_subscription = self._log_node.create_subscription(
             Log,
             '/rosout',
@@ -446,16 +452,50 @@ class Session:
 
 def destroy_nodes(context: rclpy.Context) -> None:
     """Destroy all nodes of a context, also those that nobody knows any more."""
-    for node in _find(Node, context):
-        for destroy in (
-            node.destroy_node,
-            lambda node=node: Node.destroy_node(node),  # past a mistake in an own destroy_node
-            # A node whose __init__ failed or was interrupted has only some of its parts:
-            # destroy_node misses one before it comes to the handle.
-            lambda node=node: node.handle.destroy_when_not_in_use(),
-        ):
-            with contextlib.suppress(Exception):
-                destroy()
+    nodes = list(_find(Node, context))
+    with one_process_at_a_time():  # the last node ends the participant
+        for node in nodes:
+            _destroy(node)
+
+
+def _destroy(node: Node) -> None:
+    for destroy in (
+        node.destroy_node,
+        lambda: Node.destroy_node(node),  # past a mistake in an own destroy_node
+        # A node whose __init__ failed or was interrupted has only some of its parts: destroy_node
+        # misses one before it comes to the handle.
+        lambda: node.handle.destroy_when_not_in_use(),
+    ):
+        with contextlib.suppress(Exception):
+            destroy()
+
+
+@contextlib.contextmanager
+def one_process_at_a_time() -> Iterator[None]:
+    """Wait for the turn of this process to make or to end a participant.
+
+    Fast DDS counts some ports in shared memory through all domains. It reports an error, in the
+    middle of a cell, where one process wants the number that another one is just giving back, and
+    takes the next number. After `TURN_TIMEOUT_S` it is nobody's turn: the error is better than to
+    wait for a process that was stopped.
+    """
+    try:
+        folder = os.open(SHARED_MEMORY, os.O_RDONLY)
+    except OSError:  # no shared memory, no such port
+        yield
+        return
+    try:
+        deadline = time.monotonic() + TURN_TIMEOUT_S
+        while time.monotonic() < deadline:
+            with contextlib.suppress(BlockingIOError):
+                fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            time.sleep(POLL_S)
+        yield
+    finally:
+        # A child that was forked meanwhile has the folder open, too: closing would not unlock it.
+        fcntl.flock(folder, fcntl.LOCK_UN)
+        os.close(folder)
 
 
 def _end_wait(thread: threading.Thread) -> None:

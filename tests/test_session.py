@@ -1,4 +1,5 @@
 import contextlib
+import fcntl
 import gc
 import os
 import random
@@ -277,6 +278,72 @@ def test_discovery_in_the_network(shared_id, monkeypatch):
 def test_bad_domain_or_discovery(arguments, error, said):
     with pytest.raises(error, match=said):
         ros_session(**arguments)
+
+
+@pytest.fixture
+def turn(tmp_path, monkeypatch):
+    """Return an open folder. Who locks it has the turn to make or to end a participant."""
+    monkeypatch.setattr(module, 'SHARED_MEMORY', str(tmp_path))
+    folder = os.open(tmp_path, os.O_RDONLY)
+    yield folder
+    os.close(folder)
+
+
+def has(turn):
+    """Return whether this lock can be taken. It is given back."""
+    try:
+        fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    fcntl.flock(turn, fcntl.LOCK_UN)
+    return True
+
+
+def test_a_session_waits_for_its_turn_to_make_and_to_end_its_participant(turn, monkeypatch):
+    free = set()
+
+    class Noting(Node):
+        def __init__(self, *arguments, **options):
+            free.add(('made', has(turn)))
+            super().__init__(*arguments, **options)
+
+        def destroy_node(self):
+            free.add(('ended', has(turn)))
+            super().destroy_node()
+
+    monkeypatch.setattr(module, 'Node', Noting)
+    with ros_session():
+        assert has(turn)
+    assert has(turn)
+    assert free == {('made', False), ('ended', False)}
+
+
+def test_a_session_opens_when_the_turn_of_another_process_is_over(turn, monkeypatch):
+    lock, refused = fcntl.flock, []
+
+    def flock(folder, operation):
+        try:
+            lock(folder, operation)
+        except BlockingIOError:
+            refused.append(folder)
+            lock(turn, fcntl.LOCK_UN)
+            raise
+
+    lock(turn, fcntl.LOCK_EX)
+    monkeypatch.setattr(fcntl, 'flock', flock)
+    with ros_session():
+        assert len(refused) == 1
+
+
+@pytest.mark.parametrize('folder', [None, '/proc/no such folder'])
+def test_a_session_opens_without_a_turn(turn, folder, monkeypatch):
+    fcntl.flock(turn, fcntl.LOCK_EX)  # and whoever has it was stopped
+    monkeypatch.setattr(module, 'TURN_TIMEOUT_S', 2 * module.POLL_S)
+    if folder is not None:
+        monkeypatch.setattr(module, 'SHARED_MEMORY', folder)
+    with ros_session():
+        assert rclpy.ok()
+    assert not rclpy.ok()
 
 
 def test_open_twice():
