@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+import threading
 from pathlib import Path
 
 import nbformat
@@ -17,7 +18,7 @@ from helpers.doctor import SHARED_MEMORY
 from tools.soak import __main__ as soak
 from tools.soak import leftovers
 from tools.soak.conditions import CONDITIONS, CannotRunError, Condition, busy_loops, python_of
-from tools.soak.leftovers import MARK, Watch
+from tools.soak.leftovers import MARK, Watch, state_of_process
 from tools.soak.plugin import HINTS, IN_IMPORT
 
 CONDITION = {condition.name: condition for condition in CONDITIONS}
@@ -68,6 +69,17 @@ def test_what_is_left_in_a_kernel_is_named():
     assert f'The process {child} still runs: sleep 9.' in left
     assert 'The kernel holds 2 domain ids instead of one.' in left
     assert any(sentence.startswith('The kernel still uses /dev/shm/fastrtps_') for sentence in left)
+
+
+def test_a_child_that_ends_in_a_moment_is_not_left():
+    with subprocess.Popen(['sleep', '0.1']) as ends, subprocess.Popen(['sleep', '60']) as stays:
+        reaper = threading.Thread(target=ends.wait)
+        reaper.start()
+        children = state_of_process()['children']
+        reaper.join()
+        stays.kill()
+    assert children[str(stays.pid)] == 'sleep 60'
+    assert str(ends.pid) not in children
 
 
 # What is left when the kernel is gone

@@ -70,6 +70,8 @@ def run(notebook: Path, condition: Condition, seed: int) -> dict:
         ]
         if condition.sentence:  # the kernel may die, which nbval notices at its time-out only
             command += ['--exitfirst', '--nbval-cell-timeout=20']
+        if condition.mode == 'kill':  # one of its items runs many cells
+            command += ['-o', f'faulthandler_timeout={RUN_TIMEOUT_S:g}']
         environment = _environment(folder) | {MARK: mark}
         environment |= condition.environment(random.Random(seed))
         started = time.monotonic()
