@@ -141,9 +141,10 @@ def check_message() -> Check:
             executor.spin_until_future_complete(heard, timeout_sec=MESSAGE_TIMEOUT_S)
             took_ms = (time.monotonic() - started) * 1000
             executor.shutdown()
-        finally:  # also when the cell is interrupted
-            destroy_nodes(context)
-            context.try_shutdown()
+        finally:  # also when the cell is interrupted, here or before
+            with uninterrupted():
+                destroy_nodes(context)
+                context.try_shutdown()
     except Exception as error:  # whatever the RMW raises is what was found
         return Check(name, _last_line(str(error)), 'see "Trouble" in environment.md')
     if not heard.done() or heard.result() != message:

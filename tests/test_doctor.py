@@ -13,7 +13,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
 from helpers import doctor
-from helpers.session import ros_session
+from helpers.session import destroy_nodes, ros_session
 from tools.soak.leftovers import left_in_process, state_of_process
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -118,6 +118,18 @@ def test_an_interrupted_message_leaves_nothing(monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(SingleThreadedExecutor, 'spin_until_future_complete', interrupted)
+    before = state_of_process()
+    with pytest.raises(KeyboardInterrupt):
+        doctor.check_message()
+    assert left_in_process(before, state_of_process()) == []
+
+
+def test_an_interrupted_clean_up_leaves_nothing(monkeypatch):
+    def interrupted(context):
+        signal.raise_signal(signal.SIGINT)
+        destroy_nodes(context)
+
+    monkeypatch.setattr('helpers.session.destroy_nodes', interrupted)
     before = state_of_process()
     with pytest.raises(KeyboardInterrupt):
         doctor.check_message()
