@@ -13,12 +13,13 @@ from pathlib import Path
 import nbformat
 import psutil
 import pytest
+from ros_nodes import LIMIT_S
 
 from helpers.doctor import SHARED_MEMORY
 from tools.soak import __main__ as soak
 from tools.soak import leftovers
 from tools.soak.conditions import CONDITIONS, CannotRunError, Condition, busy_loops, python_of
-from tools.soak.leftovers import MARK, Watch, state_of_process
+from tools.soak.leftovers import MARK, Watch
 from tools.soak.plugin import HINTS, IN_IMPORT
 
 CONDITION = {condition.name: condition for condition in CONDITIONS}
@@ -71,15 +72,15 @@ def test_what_is_left_in_a_kernel_is_named():
     assert any(sentence.startswith('The kernel still uses /dev/shm/fastrtps_') for sentence in left)
 
 
-def test_a_child_that_ends_in_a_moment_is_not_left():
+def test_a_child_that_ends_in_a_moment_is_not_left(monkeypatch):
     with subprocess.Popen(['sleep', '0.1']) as ends, subprocess.Popen(['sleep', '60']) as stays:
-        reaper = threading.Thread(target=ends.wait)
-        reaper.start()
-        children = state_of_process()['children']
-        reaper.join()
+        children = [psutil.Process(child.pid) for child in (ends, stays)]
+        threading.Thread(target=ends.wait).start()
+        monkeypatch.setattr(leftovers, 'MOMENT_S', LIMIT_S)
+        assert leftovers._that_stay(children[:1]) == []
+        monkeypatch.setattr(leftovers, 'MOMENT_S', 0.1)
+        assert leftovers._that_stay(children) == children[1:]
         stays.kill()
-    assert children[str(stays.pid)] == 'sleep 60'
-    assert str(ends.pid) not in children
 
 
 # What is left when the kernel is gone
