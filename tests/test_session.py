@@ -548,7 +548,6 @@ def test_saturated_reentrant_group(threads, default_event_callbacks):
 def test_callback_that_does_not_end(threads, monkeypatch):
     monkeypatch.setattr(module, 'CLOSE_TIMEOUT_S', 0.3)
     gate, before = Gate(), python_threads()
-    started = None
     with (
         pytest.raises(RuntimeError, match=r'1 callback\(s\) did not end within 0\.3 s'),
         ros_session() as session,
