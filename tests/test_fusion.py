@@ -14,8 +14,8 @@ from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.time import Time
-from ros_nodes import LIMIT_S
 from sensor_msgs.msg import Imu, NavSatFix
+from support.nodes import LIMIT_S
 
 from helpers.fusion import (
     PROCESS_NOISE,

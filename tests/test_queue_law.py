@@ -9,7 +9,7 @@ from hypothesis import assume, event, example, given, settings
 from hypothesis import strategies as st
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
-from ros_nodes import LIMIT_S, Listener, Talker, spin
+from support.nodes import LIMIT_S, Listener, Talker, spin
 
 from helpers.queue_model import REST, explain, predict
 from helpers.recording import COLUMNS, Recording

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
-from ros_nodes import LIMIT_S, Gate, Listener, Talker, spin
+from support.nodes import LIMIT_S, Gate, Listener, Talker, spin
 
 from helpers.queue_model import explain, predict
 from helpers.recording import COLUMNS, Recording, check_table

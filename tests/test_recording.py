@@ -5,9 +5,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from rclpy.callback_groups import ReentrantCallbackGroup
-from ros_nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Int64, String
+from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 
 from helpers.recording import COLUMNS, CallbackRecording, Recording, check_table
 from helpers.session import ros_session

@@ -20,8 +20,9 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle, InvalidNodeNameException
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
-from ros_nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, kill, spin
 from std_msgs.msg import String
+from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
+from support.processes import kill
 
 from helpers import session as module
 from helpers.session import (
@@ -38,7 +39,7 @@ EXECUTORS = pytest.mark.parametrize('threads', [1, 3], ids=['single', 'multi'])
 
 def start_python(script, **environment):
     """Start a Python process. A variable whose value is None is removed from its environment."""
-    here = os.path.dirname(__file__)  # ros_nodes
+    here = os.path.dirname(__file__)
     variables = {**os.environ, 'PYTHONPATH': here, **environment}
     return subprocess.Popen(
         [sys.executable, '-c', textwrap.dedent(script)],
@@ -213,7 +214,7 @@ def is_free(domain):
 
 def test_domain_that_two_processes_share(shared_id):
     other = f"""
-        from ros_nodes import Talker, spin
+        from support.nodes import Talker, spin
         from helpers.session import ros_session
         with ros_session(domain_id={shared_id}) as session:
             spin(session, Talker(10**6))
@@ -481,7 +482,7 @@ def test_session_that_was_never_closed(threads):
 def test_session_that_is_open_when_python_ends(threads):
     started = time.monotonic()
     said = run_python(f"""
-        from ros_nodes import Listener, Talker, spin
+        from support.nodes import Listener, Talker, spin
         from helpers.session import ros_session
         session = ros_session().open()
         talker, listener = Talker(10**6, period_s=0.001), Listener()
@@ -497,7 +498,7 @@ def test_session_that_is_open_when_python_ends(threads):
 def test_held_callback_does_not_keep_python_from_ending():
     run_python("""
         import threading
-        from ros_nodes import Listener, Talker, spin
+        from support.nodes import Listener, Talker, spin
         from helpers import session as module
         module.CLOSE_TIMEOUT_S = 0.2
         session = module.ros_session().open()
@@ -697,7 +698,7 @@ def test_interrupt_of_a_deadlock(threads):
     with running(f"""
         import threading
         import rclpy
-        from ros_nodes import Answerer, Asker, spin
+        from support.nodes import Answerer, Asker, spin
         from helpers.session import ros_session
 
         try:
@@ -926,7 +927,7 @@ def test_interrupt(wait):
     with running(f"""
         import threading
         import rclpy
-        from ros_nodes import Listener, Talker, spin
+        from support.nodes import Listener, Talker, spin
         from helpers.session import ros_session
 
         for turn in ('first', 'second'):
@@ -1106,7 +1107,7 @@ def test_log_of_a_process(tmp_path):
     """Nothing but what the cell prints arrives at the pipes, and no home is needed."""
     said = run_python(
         """
-        from ros_nodes import Listener, Talker, spin
+        from support.nodes import Listener, Talker, spin
         from helpers.session import ros_session
         with ros_session() as session:
             talker = Talker(3)

@@ -13,7 +13,7 @@ from pathlib import Path
 import nbformat
 import psutil
 import pytest
-from ros_nodes import LIMIT_S
+from support.nodes import LIMIT_S
 
 from helpers.doctor import SHARED_MEMORY
 from tools.soak import __main__ as soak

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from ros_nodes import kill
+from support.processes import kill
 
 from helpers import workspace as module
 from helpers.session import reserve_domain_id, ros_session

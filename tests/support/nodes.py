@@ -1,17 +1,13 @@
-"""Nodes and small helpers that several tests use."""
+"""Nodes that several tests use, and how to hold their callbacks and spin them."""
 
 import contextlib
 import threading
-from pathlib import Path
 
-import psutil
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
-
-from tools.soak.leftovers import files_of, held_by
 
 LIMIT_S = 20.0  # for every wait; never reached unless something is broken
 
@@ -120,21 +116,6 @@ class Gate:
 
     def open(self) -> None:
         self._open.set()
-
-
-def kill(process) -> None:
-    """Kill a process, and remove the shared memory that it can no longer remove.
-
-    Its ports stay: the next participant that wants their numbers takes them.
-    """
-    with contextlib.suppress(psutil.NoSuchProcess):
-        held = held_by([psutil.Process(process.pid)])
-        process.kill()
-        process.wait()
-        for segment in held:
-            if 'port' not in segment:
-                for file in files_of(segment):
-                    Path(file).unlink(missing_ok=True)
 
 
 def spin(session, *nodes, threads: int = 1):

@@ -1,0 +1,77 @@
+"""Python processes that tests start, and what this process has running."""
+
+import contextlib
+import os
+import re
+import subprocess
+import sys
+import textwrap
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import psutil
+
+from support.nodes import LIMIT_S
+
+HERE = Path(__file__).parents[1]  # for `import support` in a process
+# Threads of Fast DDS that belong to no participant: they live until the process ends.
+OF_PROCESS = ('dds.shm.wdog', 'dds.log')
+SEGMENT = re.compile(r'/dev/shm/fastrtps_[0-9a-f]{16}')
+
+
+@contextlib.contextmanager
+def running(script: str, **environment: str | None) -> Iterator[subprocess.Popen]:
+    """Run a Python script beside the block. A variable that is None is not in its environment."""
+    variables = {**os.environ, 'PYTHONPATH': str(HERE), **environment}
+    process = subprocess.Popen(
+        [sys.executable, '-c', textwrap.dedent(script)],
+        env={name: value for name, value in variables.items() if value is not None},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield process
+    finally:
+        kill(process)
+        process.communicate()
+
+
+def run_python(script: str, **environment: str | None) -> str:
+    """Run a script that must succeed without a word on stderr, and return its stdout."""
+    with running(script, **environment) as process:
+        out, err = process.communicate(timeout=3 * LIMIT_S)
+    assert (process.returncode, err) == (0, '')
+    return out
+
+
+def kill(process: subprocess.Popen | psutil.Process) -> None:
+    """Kill a process, and remove the shared memory that it can no longer remove.
+
+    Its ports stay: the next participant that wants their numbers takes them.
+    """
+    with contextlib.suppress(OSError):
+        held = segments(process.pid)
+        process.kill()
+        process.wait()
+        for segment in held:
+            for file in (segment, f'{segment}_el'):  # and the lock that says it is in use
+                Path(file).unlink(missing_ok=True)
+
+
+def segments(pid: int | str = 'self') -> set[str]:
+    """Return the segments of Fast DDS's shared memory that a process uses, without its ports."""
+    return set(SEGMENT.findall(Path(f'/proc/{pid}/maps').read_text()))
+
+
+def traces() -> set[str]:
+    """Return what is in this process and can be left behind: threads and shared memory."""
+    found = {f'{thread.name} {thread.ident}' for thread in threading.enumerate()} | segments()
+    for task in Path('/proc/self/task').iterdir():
+        with contextlib.suppress(OSError):  # it has ended
+            name = (task / 'comm').read_text().strip()
+            if name.startswith('dds.') and name not in OF_PROCESS:
+                found.add(f'{name} {task.name}')
+    return found
