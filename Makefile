@@ -10,8 +10,11 @@ present: set_up ## open JupyterLab on a lesson as slides whose cells run: LESSON
 	@[ -n "$(deck)" ] || { echo 'Name one lesson, for example: make present LESSON=02' >&2; exit 1; }
 	@$(call open_lab,true,/lab/workspaces/present/tree/$(deck)?reset)
 
-test: set_up lint ## all checks: lint, tests of the helpers, every notebook compared with its saved outputs
+test: set_up lint ## lint, tests of the helpers, every notebook compared with its saved outputs
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(PYTEST_ARGS)
+
+test-tools: set_up ## the tools: an installation from nothing, the soak, the licences, the benchmarks
+	@$(PYTHON) -m pytest -n 2 --dist worksteal --max-worker-restart 0 tests/tools $(PYTEST_ARGS)
 
 test-browser: ## the real JupyterLab in Chromium, as students and instructors use it; it takes minutes
 	@[ -n "$(CHROMIUM)" ] || { echo '$(no_chromium)' >&2; exit 1; }
@@ -61,8 +64,8 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-browser hub test-hub notebooks lesson slides soak bench lint lock licences clean \
-	set_up
+.PHONY: help lab present test test-tools test-browser hub test-hub notebooks lesson slides soak bench lint lock \
+	licences clean set_up
 
 PYTHON := .venv/bin/python
 
