@@ -1,1 +1,1 @@
-"""Measurements for an idle machine: a module an idea, all run by `python -m benchmarks`."""
+"""Measurements for an idle machine, run by `python -m benchmarks`."""
