@@ -29,7 +29,7 @@ def run(lost=(), delay_s=0.01, overlap=False):
 
 DRAW = {
     'sequence_gaps': plots.sequence_gaps,
-    'before_and_after': lambda table: plots.before_and_after(table, table),
+    'before_and_after': lambda table: plots.before_and_after(table, table, ('a', 'b')),
     'timeline': plots.timeline,
     'queue_length': lambda table: plots.queue_length(table, 3),
     'latency': lambda table: plots.latency(table, 0.1),
@@ -140,7 +140,7 @@ def test_what_was_compared_is_named():
     assert 'a line for each of: wheels; all. Plus signs' in text
     assert '3 sigma every 5 seconds.' in text
     errors = {'wheels': pd.DataFrame({'t': t, 'distance': t + 1})}
-    text = said(plots.error, errors, {'no GPS': (1, 2.5)}, 'distance (m)', True)
+    text = said(plots.error, errors, {'no GPS': (1, 2.5)}, True)
     assert 'One line for each of: wheels. The vertical axis is logarithmic.' in text
     assert 'Shaded: no GPS, 1 to 2.5 s.' in text
     results = pd.DataFrame({'lost (%)': [50, 0]}, index=pd.Index([1, 4], name='threads'))

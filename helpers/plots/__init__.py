@@ -1,0 +1,30 @@
+"""Pictures of recorded and of predicted runs, of graphs and of drives, all in one style.
+
+Every function takes tables and draws them; it knows no node and no filter. The axes have units, the
+legend counts, and no meaning hangs on a colour alone. Each picture is described in words, too: see
+`helpers.alt_text`. A table that cannot be drawn raises TypeError or ValueError, with one sentence.
+"""
+
+from helpers.alt_text import describe
+from helpers.plots.comparisons import bars, sweep
+from helpers.plots.drives import error, frame_tree, innovation, path
+from helpers.plots.graphs import interface_tree, topic_graph, who_waits
+from helpers.plots.runs import before_and_after, latency, queue_length, sequence_gaps, timeline
+
+__all__ = [
+    'bars',
+    'before_and_after',
+    'describe',
+    'error',
+    'frame_tree',
+    'innovation',
+    'interface_tree',
+    'latency',
+    'path',
+    'queue_length',
+    'sequence_gaps',
+    'sweep',
+    'timeline',
+    'topic_graph',
+    'who_waits',
+]

@@ -1,0 +1,234 @@
+"""Pictures of a drive: where the robot was, how far off an estimate is, which frame is whose."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Ellipse
+
+from helpers.alt_text import describe
+from helpers.plots.style import (
+    GREY,
+    HEARD,
+    INK,
+    LINE_LOOKS,
+    NORMAL,
+    WIDTH,
+    check_count,
+    checked,
+    checked_span,
+    crosses,
+    in_words,
+    label_axes,
+    new_axes,
+)
+
+TRUTH = '#c3c9ce'
+
+
+def path(
+    truth: pd.DataFrame,
+    estimates: Mapping[str, pd.DataFrame],
+    fixes: pd.DataFrame | None = None,
+    ellipses_s: float | None = None,
+    title: str = 'The path, seen from above',
+) -> Axes:
+    """Draw where the robot was, and where each of up to four estimates says that it was.
+
+    `truth` and each estimate have the columns `x` and `y` in metres. `fixes` adds what GPS said
+    (columns `gps_x`, `gps_y`). With `ellipses_s` each estimate needs `t` (s), `var_x`, `cov_x_y`
+    and `var_y` (m^2), too: every so many seconds an ellipse shows 3 sigma, where the robot should
+    be 99 times of 100.
+
+    Raises TypeError or ValueError for a bad table, and for no or too many estimates.
+    """
+    truth = checked('truth', truth, 'x', 'y')
+    more = ('t', 'var_x', 'cov_x_y', 'var_y') if ellipses_s else ()
+    estimates = _checked_lines('estimate', estimates, 'x', 'y', *more)
+    if fixes is not None:
+        fixes = checked('fixes', fixes, 'gps_x', 'gps_y')
+
+    ax = new_axes(height=5.6)
+    handles = ax.plot(truth.x, truth.y, color=TRUTH, lw=6, label='truth', solid_capstyle='round')
+    if fixes is not None:
+        look = {'marker': '+', 'color': GREY, 'ls': 'none', 'ms': 6}
+        handles += ax.plot(fixes.gps_x, fixes.gps_y, label='GPS', **look)
+    for look, (name, table) in zip(LINE_LOOKS, estimates.items(), strict=False):
+        handles += ax.plot(table.x, table.y, lw=1.8, label=name, **look)
+        if ellipses_s:
+            for row in table[(table.t // ellipses_s).diff() > 0].dropna().itertuples():
+                ax.add_patch(_ellipse(row, look))
+    start = truth.iloc[0]
+    handles.append(ax.scatter(start.x, start.y, s=70, color=INK, zorder=5, label='start'))
+    ax.set_aspect('equal', 'datalim')
+    label_axes(ax, title, 'x (m)', 'y (m)', handles)
+    describe(
+        ax,
+        'Seen from above: a wide line for the truth, and a line for each of: '
+        + f'{in_words(estimates)}.'
+        + (' Plus signs are the positions that GPS gave.' if fixes is not None else '')
+        + (f' Ellipses show 3 sigma every {ellipses_s:g} seconds.' if ellipses_s else ''),
+    )
+    return ax
+
+
+def _ellipse(row, look: dict) -> Ellipse:
+    """Return the 3-sigma ellipse of a position, from the eigenvalues of its covariance."""
+    covariance = np.array([[row.var_x, row.cov_x_y], [row.cov_x_y, row.var_y]])
+    variances, axes = np.linalg.eigh(covariance)
+    width, height = 2 * 3 * np.sqrt(variances.clip(min=0))
+    angle = math.degrees(math.atan2(axes[1, 0], axes[0, 0]))
+    return Ellipse((row.x, row.y), width, height, angle=angle, fill=False, lw=1.2, **look)
+
+
+def error(
+    errors: Mapping[str, pd.DataFrame],
+    spans_s: Mapping[str, tuple[float, float]] | None = None,
+    log: bool = False,
+    title: str = 'How far off each estimate is',
+) -> Axes:
+    """Draw the error of up to four estimates over time.
+
+    Each table has the columns `t` (s) and `distance` (m). `spans_s` shades times in which
+    something happened: `{'no GPS': (40, 80)}`, in seconds. `log` makes the vertical axis
+    logarithmic, from 1 cm up.
+
+    Raises TypeError or ValueError for a bad table or span, and for no or too many tables.
+    """
+    errors = _checked_lines('error', errors, 't', 'distance')
+    spans = {name: checked_span(span) for name, span in (spans_s or {}).items()}
+    ax = new_axes()
+    handles = []
+    for look, (name, table) in zip(LINE_LOOKS, errors.items(), strict=False):
+        handles += ax.plot(table.t, table.distance, lw=2, label=name, **look)
+    for name, span in spans.items():
+        look = {'facecolor': '#f0f0f0', 'edgecolor': '#c9c9c9', 'hatch': '//', 'label': name}
+        handles.append(ax.axvspan(*span, zorder=0, lw=0, **look))
+    if log:
+        ax.set_yscale('log')
+    ax.set_ylim(bottom=0.01 if log else 0)
+    label_axes(ax, title, 'time (s)', 'distance from the truth (m)', handles)
+    shaded = (f' Shaded: {name}, {first:g} to {last:g} s.' for name, (first, last) in spans.items())
+    scale = ' The vertical axis is logarithmic.' if log else ''
+    describe(ax, f'One line for each of: {in_words(errors)}.{scale}{"".join(shaded)}')
+    return ax
+
+
+def innovation(innovations: pd.DataFrame, title: str = 'Measured minus expected') -> Axes:
+    """Draw the innovations of one variable over time, with the band of 3 sigma.
+
+    `innovations` has one row a measurement, in the order of time: `t` (s), `innovation` and `sigma`
+    (m), `accepted` (bool). A dot is a measurement that the filter used, a cross one that its gate
+    kept out.
+
+    Raises TypeError or ValueError for a bad table.
+    """
+    innovations = checked('innovations', innovations, 't', 'innovation', 'sigma', 'accepted')
+    accepted = innovations.accepted.astype(bool)
+    used, kept_out = innovations[accepted], innovations[~accepted]
+    ax = new_axes()
+    three = 3 * innovations.sigma
+    look = {'facecolor': '#56B4E9', 'alpha': 0.3, 'lw': 0, 'label': '3 sigma'}
+    handles = [ax.fill_between(innovations.t, -three, three, **look)]
+    for edge in (-three, three):
+        ax.plot(innovations.t, edge, color=HEARD, lw=1.2)
+    ax.axhline(0, color=INK, lw=1)
+    look = {'color': INK, 'ms': 4.5, 'label': f'used {len(used)}'}
+    handles += ax.plot(used.t, used.innovation, 'o', **look)
+    if len(kept_out):
+        label = f'kept out {len(kept_out)}'
+        handles.append(crosses(ax, kept_out.t, kept_out.innovation, label))
+    label_axes(ax, title, 'time (s)', 'innovation (m)', handles)
+    describe(
+        ax,
+        'One dot for each measurement that was used, and a band of 3 sigma around zero. '
+        + ('Crosses were kept out.' if len(kept_out) else 'None was kept out.'),
+    )
+    return ax
+
+
+def frame_tree(transforms: pd.DataFrame, title: str = 'The tree of frames') -> Axes:
+    """Draw a tree of frames, from the left: one arrow a transform, its line tells who publishes it.
+
+    `transforms` has one row a transform, with the columns `parent`, `child` and `publisher` (all
+    text).
+
+    Raises TypeError or ValueError for a bad table, for more than four publishers, and where the
+    transforms make no tree: a frame with two parents, two roots, or a circle.
+    """
+    transforms = checked('transforms', transforms, texts=('parent', 'child', 'publisher'))
+    depths, rows = _tree_layout(transforms)
+    publishers = transforms.publisher.unique()
+    check_count('publishers', publishers, len(LINE_LOOKS))
+    looks = dict(zip(publishers, LINE_LOOKS, strict=False))
+    widths = pd.Series({frame: 0.13 * len(frame) + 0.25 for frame in depths})  # inches
+    widest = widths.groupby(pd.Series(depths)).max()
+    gap = 0.75
+    left = (widest + gap).cumsum().shift(fill_value=0)
+    centre = left + widest / 2
+    width = left.iloc[-1] + widest.iloc[-1]
+
+    ax = new_axes(0.75 * (max(rows.values()) + 1) + 1.2, max(WIDTH, width + 0.4))
+    look = {'boxstyle': 'round,pad=0.5', 'facecolor': 'white', 'edgecolor': INK}
+    text = {'fontsize': NORMAL, 'family': 'monospace', 'ha': 'center', 'va': 'center', 'bbox': look}
+    for frame, depth in depths.items():
+        ax.text(centre[depth], -rows[frame], frame, **text)
+    for row in transforms.itertuples():
+        depth, look = depths[row.parent], looks[row.publisher]
+        tail = centre[depth] + widths[row.parent] / 2 + 0.1, -rows[row.parent]
+        head = centre[depth + 1] - widths[row.child] / 2 - 0.1, -rows[row.child]
+        ax.plot(*zip(tail, head, strict=True), lw=2.2, **look)
+        ax.plot(*head, marker='>', ms=9, color=look['color'])
+    handles = [Line2D([], [], lw=2.2, label=name, **look) for name, look in looks.items()]
+    ax.set_xlim(-0.2, max(width, WIDTH - 0.4) + 0.2)
+    ax.set_ylim(-max(rows.values()) - 0.6, 0.6)
+    label_axes(ax, title, '', '', handles)
+    ax.set_axis_off()
+    edges = (f'{row.parent} to {row.child} by {row.publisher}' for row in transforms.itertuples())
+    describe(ax, f'One arrow for each transform, and who publishes it: {in_words(edges)}.')
+    return ax
+
+
+def _tree_layout(transforms: pd.DataFrame) -> tuple[dict[str, int], dict[str, float]]:
+    """Return each frame's depth and its row: the leaves have rows 0, 1, 2, ..."""
+    twice = transforms.child[transforms.child.duplicated()]
+    if len(twice):
+        raise ValueError(f'The frame {twice.iloc[0]} has two parents: a tree allows one.')
+    roots = [name for name in transforms.parent.unique() if name not in {*transforms.child}]
+    if len(roots) != 1:
+        raise ValueError(f'A tree has one root, these transforms have {len(roots)}.')
+    children = transforms.groupby('parent', sort=False)['child'].agg(list).to_dict()
+    depths: dict[str, int] = {}
+    rows: dict[str, float] = {}
+    leaves = 0
+
+    def place(frame: str, depth: int) -> None:
+        nonlocal leaves
+        depths[frame] = depth
+        for child in children.get(frame, []):
+            place(child, depth + 1)
+        if frame in children:
+            rows[frame] = float(np.mean([rows[child] for child in children[frame]]))
+        else:
+            rows[frame] = leaves
+            leaves += 1
+
+    place(roots[0], 0)
+    if len(depths) <= len(transforms):
+        raise ValueError('Some of these transforms make a circle.')
+    return depths, rows
+
+
+def _checked_lines(what: str, tables: Mapping[str, pd.DataFrame], *columns: str):
+    """Return the checked tables by name, or raise TypeError or ValueError."""
+    if not isinstance(tables, Mapping):
+        raise TypeError(f'Give each {what} a name: {{"a name": table}}.')
+    check_count(f'{what}s', tables, len(LINE_LOOKS))
+    return {
+        name: checked(f'The {what} {name!r}', table, *columns) for name, table in tables.items()
+    }

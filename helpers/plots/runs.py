@@ -1,0 +1,339 @@
+"""Pictures of a run: what was heard and what was lost, which thread worked, who waited how long.
+
+The tables are those of `recording` and `queue_model`: one row a message, columns `seq`,
+`published_s`, `started_s`, `finished_s`, `thread`. A table describes a finished run: a message that
+was never heard counts as lost.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Text
+from matplotlib.ticker import MaxNLocator
+
+from helpers.alt_text import describe
+from helpers.plots.style import (
+    DPI,
+    GREY,
+    GROUP_COLOURS,
+    GROUP_HATCHES,
+    HEARD,
+    INK,
+    LOST_TEXT,
+    NORMAL,
+    PALE,
+    PUBLISHED,
+    SMALL,
+    WIDE,
+    check_count,
+    checked_span,
+    crosses,
+    in_words,
+    label_axes,
+    new_axes,
+    say,
+)
+from helpers.recording import check_table
+
+MOST_SEQ_LABELS, MOST_GAP_LABELS = 25, 15
+TIME_LABEL = 'time since the first publish (s)'
+
+# The descriptions in words: nbval compares them, so no number that moves may be in them.
+
+
+def sequence_gaps(table: pd.DataFrame, title: str | None = None, ax: Axes | None = None) -> Axes:
+    """Draw what was published and what was heard: sequence number over time.
+
+    A small dot is a message at the time it was published, a large dot the start of its callback,
+    a cross a message that was lost, at the time it was published. The line from a small dot to its
+    large one is the time that the message waited. Draws into `ax`, or into a new figure.
+
+    Raises TypeError or ValueError for a bad table.
+    """
+    table = check_table(table)
+    ax = ax or new_axes()
+    _draw_gaps(ax, table, title or f'Messages: {_loss(table)}')
+    describe(ax, _gaps_in_words(table), title or '')
+    _label_gaps(ax, table)
+    return ax
+
+
+def before_and_after(before: pd.DataFrame, after: pd.DataFrame, labels: tuple[str, str]) -> Figure:
+    """Draw the sequence gaps of two runs beside each other, on the same axes.
+
+    Each title has its label, and says how many messages the run lost. Returns the Figure, since it
+    has two Axes.
+
+    Raises TypeError or ValueError for a bad table.
+    """
+    tables = [check_table(before), check_table(after)]
+    figure = plt.figure(figsize=WIDE, dpi=DPI, layout='constrained')
+    panels = figure.subplots(1, 2, sharex=True, sharey=True)
+    for ax, table, label in zip(panels, tables, labels, strict=True):
+        _draw_gaps(ax, table, f'{label}: {_loss(table)}', scale=0.5)
+        describe(ax, _gaps_in_words(table), label)
+    panels[1].set_ylabel('')
+    return figure
+
+
+def _draw_gaps(ax: Axes, table: pd.DataFrame, title: str, scale: float = 1.0) -> None:
+    """Draw the marks and what surrounds them. `scale` is the area of a mark."""
+    heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
+    scale *= min(1.0, max(0.2, 60 / len(table)))  # many marks must be smaller to stay apart
+    ax.hlines(heard.seq, heard.published_s, heard.started_s, color=PALE, lw=1.2, zorder=1)
+    ax.margins(x=0.04, y=0.09)
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    small = {'s': 14 * scale, 'color': PUBLISHED, 'zorder': 2, 'label': f'published {len(table)}'}
+    large = {'s': 52 * scale, 'color': HEARD, 'zorder': 3, 'label': f'heard {len(heard)}'}
+    handles = [
+        ax.scatter(table.published_s, table.seq, **small),
+        ax.scatter(heard.started_s, heard.seq, **large),
+        crosses(ax, lost.published_s, lost.seq, f'lost {len(lost)}', scale),
+    ]
+    label_axes(ax, title, TIME_LABEL, 'sequence number', handles)
+
+
+def _label_gaps(ax: Axes, table: pd.DataFrame) -> None:
+    """Write the sequence number at each heard message, and at each gap how many were lost."""
+    heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
+    texts = []
+    if len(heard) <= MOST_SEQ_LABELS:
+        # Below and to the right of a heard message nothing else can be: no message with a
+        # smaller number comes later, unless several threads overlap.
+        look = {'xytext': (3, -4), 'ha': 'left', 'va': 'top', 'color': 'black'}
+        for message in heard.itertuples():
+            texts.append(_label(ax, str(message.seq), message.started_s, message.seq, look))
+    # Consecutive rows share a gap: within one, row number minus rank among the lost is constant.
+    gaps = [gap for _, gap in lost.groupby(lost.index - np.arange(len(lost)))]
+    if len(gaps) <= MOST_GAP_LABELS:
+        look = {'xytext': (-4, 1), 'ha': 'right', 'va': 'bottom', 'color': LOST_TEXT}
+        for gap in gaps:
+            x, y = gap.published_s.mean(), gap.seq.mean()
+            texts.append(_label(ax, f'{len(gap)} lost', x, y, look))
+    _remove_overlaps(ax, texts, heard[['started_s', 'seq']].to_numpy(float))
+
+
+def _label(ax: Axes, text: str, x: float, y: float, look: dict) -> Text:
+    """Write a text beside the point (x, y)."""
+    return ax.annotate(text, (x, y), textcoords='offset points', fontsize=SMALL, zorder=5, **look)
+
+
+def _remove_overlaps(ax: Axes, texts: list[Text], marks: np.ndarray) -> None:
+    """Remove each text that covers an earlier one, or one of the `marks`, rows of (x, y).
+
+    A text that leaves the axes on the left is first turned to the right side of its point.
+    """
+    ax.figure.draw_without_rendering()  # the layout must be final before sizes mean anything
+    marks = ax.transData.transform(marks)
+    kept = []
+    for text in texts:
+        if text.get_window_extent().x0 < ax.bbox.x0:
+            text.set(ha='left', position=(8, 0))
+        box = text.get_window_extent()
+        if box.count_overlaps(kept) or box.count_contains(marks):
+            text.remove()
+        else:
+            kept.append(box)
+
+
+def timeline(
+    table: pd.DataFrame | Mapping[str, pd.DataFrame],
+    span_s: tuple[float, float] | None = None,
+    title: str = 'One bar for each callback, with its sequence number',
+    ax: Axes | None = None,
+    time_label: str = TIME_LABEL,
+) -> Axes:
+    """Draw one lane a thread and one bar a callback, with its sequence number where it fits.
+
+    `table` is one table, or one for each callback group: `{'group name': table, ...}`. Then each
+    group has a colour and a hatch of its own. `span_s` shows only the time from `span_s[0]` to
+    `span_s[1]`, in seconds. Draws into `ax`, or into a new figure.
+
+    Raises TypeError or ValueError for a bad table, no or too many groups, or a bad span.
+    """
+    groups = table if isinstance(table, Mapping) else {'callbacks': table}
+    check_count('callback groups', groups, len(GROUP_COLOURS))
+    groups = {str(name): check_table(one) for name, one in groups.items()}
+    span_s = span_s and checked_span(span_s)
+    bars = pd.concat([t[t.started_s.notna()].assign(group=name) for name, t in groups.items()])
+    unknown = bars.loc[bars.thread.isna(), 'seq']
+    if len(unknown):
+        raise ValueError(
+            f'It is not known which thread ran the callback of message {unknown.iloc[0]}.'
+        )
+    # A callback that had not finished when the recording ended runs to the end of the picture.
+    bars['finished_s'] = bars.finished_s.fillna(bars[['started_s', 'finished_s']].max().max())
+    threads = sorted(bars.thread.unique(), key=_natural)
+    bars['lane'] = bars.thread.map({thread: lane for lane, thread in enumerate(threads)})
+
+    ax = ax or new_axes()
+    looks = {
+        name: {'facecolor': colour, 'hatch': hatch, 'edgecolor': GREY, 'lw': 0.8, 'label': name}
+        for name, colour, hatch in zip(groups, GROUP_COLOURS, GROUP_HATCHES, strict=False)
+    }
+    for name, look in looks.items():
+        own = bars[bars.group == name]
+        ax.barh(own.lane, own.finished_s - own.started_s, left=own.started_s, height=0.72, **look)
+    ax.set_yticks(range(len(threads)), threads)
+    ax.set_ylim(max(len(threads), 1) - 0.5, -0.5)  # the first thread on top
+    # Axes that share their time show the longest run of all.
+    last_s = max(one.dataLim.x1 for one in ax.get_shared_x_axes().get_siblings(ax))
+    ax.set_xlim(span_s or (0, 1.02 * last_s if math.isfinite(last_s) else 1))
+    handles = [Patch(**look) for look in looks.values()] if isinstance(table, Mapping) else None
+    label_axes(ax, title, time_label, 'thread', handles, grid='x')
+    named = f' The groups are: {in_words(groups)}.' if handles else ''
+    describe(
+        ax,
+        'One lane for each thread that ran a callback, one bar for each callback, with its '
+        f'sequence number where it fits.{named} {_overlap_in_words(bars)}',
+    )
+    if bars.empty:
+        say(ax, 'no callback was called')
+    _label_bars(ax, bars)
+    return ax
+
+
+def _natural(name: str) -> list:
+    """Sort key that puts 'worker 2' before 'worker 10'."""
+    return [int(part) if part.isdecimal() else part for part in re.split(r'(\d+)', name)]
+
+
+def _label_bars(ax: Axes, bars: pd.DataFrame) -> None:
+    """Write the sequence number on each bar that is wide enough for it."""
+    first, last = ax.get_xlim()
+    ax.figure.draw_without_rendering()
+    glow = [withStroke(linewidth=3, foreground=(1, 1, 1, 0.7))]
+    look = {'fontsize': SMALL, 'ha': 'center', 'va': 'center', 'path_effects': glow}
+    for bar in bars[(bars.started_s < last) & (bars.finished_s > first)].itertuples():
+        left, right = max(bar.started_s, first), min(bar.finished_s, last)
+        text = ax.text((left + right) / 2, bar.lane, str(bar.seq), **look)
+        (left, _), (right, _) = ax.transData.transform([(left, 0), (right, 0)])
+        if text.get_window_extent().width > 0.95 * (right - left):
+            text.remove()
+
+
+def queue_length(table: pd.DataFrame, depth: int, ax: Axes | None = None) -> Axes:
+    """Draw how many messages wait in the subscription's queue, KEEP_LAST with history `depth`.
+
+    A message enters when it is published. It leaves when its callback starts, or when the
+    `depth`-th newer message arrives: that one pushes it out, and a cross marks the loss. Therefore
+    the length never exceeds `depth`. Draws into `ax`, or into a new figure.
+
+    Raises TypeError or ValueError for a bad table, and ValueError for a `depth` below 1.
+    """
+    table = check_table(table)
+    if depth < 1:
+        raise ValueError(f'depth must be a whole number of at least 1, not {depth!r}.')
+    entered, started = table.published_s.to_numpy(), table.started_s.to_numpy()
+    pushed_out = table.published_s.shift(-depth).to_numpy()
+    # A message is taken a little before its callback starts, so a newer one may come in between.
+    left = np.fmax(entered, np.fmin(started, pushed_out))
+    left = left[~(np.isnan(started) & np.isnan(pushed_out))]  # the others still wait at the end
+    lost_at = pushed_out[np.isnan(started) & ~np.isnan(pushed_out)]
+    # What enters and leaves in the same nanosecond did not wait: add up before drawing.
+    times, place = np.unique(np.round(np.concatenate([entered, left]), 9), return_inverse=True)
+    change = np.concatenate([np.ones(len(entered)), -np.ones(len(left))])
+    waiting = np.cumsum(np.bincount(place, weights=change))
+
+    ax = ax or new_axes()
+    (line,) = ax.step(times, waiting, where='post', color=HEARD, lw=2, label='messages waiting')
+    ax.fill_between(times, waiting, step='post', color=HEARD, alpha=0.18, lw=0)
+    limit = ax.axhline(depth, color=INK, ls='--', lw=1.8, label=f'depth {depth}')
+    handles = [line, limit]
+    if len(lost_at):
+        label = f'pushed out: {len(lost_at)}'
+        handles.append(crosses(ax, lost_at, np.full(len(lost_at), depth), label))
+    ax.set_ylim(-0.04 * depth, 1.12 * depth)  # a line at zero must be seen, too
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    label_axes(ax, 'How full is the queue?', TIME_LABEL, 'messages waiting', handles)
+    crossed = (
+        'Crosses mark when a message was pushed out.' if len(lost_at) else 'None is pushed out.'
+    )
+    describe(
+        ax,
+        f'A line in steps: how many messages wait. It never goes above {depth}, the depth, which '
+        f'is a dashed line. {crossed}',
+    )
+    return ax
+
+
+def latency(
+    table: pd.DataFrame,
+    period_s: float | None = None,
+    title: str = 'How long each message waited for its callback',
+) -> Axes:
+    """Draw for each heard message the time from publishing to the start of its callback, in ms.
+
+    With `period_s`, the publisher's period in seconds, a second axis on the right counts in
+    periods. Crosses at the bottom are lost messages, which have no latency.
+
+    Raises TypeError or ValueError for a bad table.
+    """
+    table = check_table(table)
+    heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
+
+    ax = new_axes()
+    delay_ms = 1000 * (heard.started_s - heard.published_s)
+    look = {'color': HEARD, 'ms': 7, 'lw': 1.5, 'label': f'heard {len(heard)}'}
+    handles = ax.plot(heard.published_s, delay_ms, 'o-', **look)
+    highest = max(delay_ms.max(), 1.0) if len(heard) else 1.0
+    if len(lost):
+        below = np.full(len(lost), -0.05 * highest)
+        handles.append(crosses(ax, lost.published_s, below, f'lost {len(lost)}'))
+    ax.set_ylim(-0.09 * highest, 1.1 * highest)
+    label_axes(
+        ax, title, 'time of publishing, since the first publish (s)', 'latency (ms)', handles
+    )
+    periods = ''
+    if period_s:
+        periods = ' The axis on the right counts it in periods of the publisher.'
+        period_ms = 1000 * period_s
+        there_and_back = (lambda ms: ms / period_ms, lambda periods: periods * period_ms)
+        right = ax.secondary_yaxis('right', functions=there_and_back)
+        right.set_ylabel('latency (periods)', fontsize=NORMAL)
+        right.tick_params(labelsize=SMALL)
+        right.spines['right'].set_visible(True)
+    describe(
+        ax,
+        'One dot for each message that was heard: how long it waited.'
+        f'{periods} {_loss_in_words(table, "crosses at the bottom")}',
+    )
+    if heard.empty:
+        say(ax, 'no message was heard')
+    return ax
+
+
+def _loss(table: pd.DataFrame) -> str:
+    lost = int(table.started_s.isna().sum())
+    return f'{lost} of {len(table)} lost' if lost else 'none lost'
+
+
+def _gaps_in_words(table: pd.DataFrame) -> str:
+    return (
+        f'{len(table)} messages. A small dot is a message when it was published, a large dot the '
+        f'start of its callback. {_loss_in_words(table, "crosses")}'
+    )
+
+
+def _loss_in_words(table: pd.DataFrame, marks: str) -> str:
+    lost = table.started_s.isna()
+    if not lost.any():
+        return 'None was lost.'
+    return f'{"All" if lost.all() else "Some"} were lost: {marks}.'
+
+
+def _overlap_in_words(bars: pd.DataFrame) -> str:
+    """Say whether two bars ever overlap: one begins before an earlier one has ended."""
+    bars = bars.sort_values('started_s')
+    overlap = (bars.started_s.iloc[1:].to_numpy() < bars.finished_s.cummax().iloc[:-1]).any()
+    return 'Some callbacks overlap.' if overlap else 'No two callbacks overlap.'

@@ -1,0 +1,128 @@
+"""What all pictures share: colours, sizes, axes, boxes, arrows.
+
+The colours are those of Okabe and Ito ("Color Universal Design", 2008), which people with any kind
+of colour vision can tell apart. All sizes are set here and not through rcParams, because the axes
+may be the caller's own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import matplotlib.pyplot as plt
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
+from matplotlib.text import Text
+
+from helpers.values import check_columns, column_of_numbers, column_of_text
+
+PUBLISHED, HEARD, LOST = '#9aa5ae', '#0072B2', '#D55E00'
+LOST_TEXT = '#9c4300'  # a darker vermillion: letters need more contrast than marks
+INK, GREY, PALE = '#222222', '#555555', '#cfd6db'
+# One colour and one hatch a callback group. Light enough for black numbers on top.
+GROUP_COLOURS = ('#56B4E9', '#E69F00', '#009E73', '#CC79A7', '#F0E442')
+GROUP_HATCHES = ('', '//', '..', '\\\\', 'xx')
+# One look a line, where several are compared: all differ in colour, and in how they are dashed.
+LINE_LOOKS = (
+    {'color': HEARD, 'ls': '-'},
+    {'color': LOST, 'ls': (0, (5, 2))},
+    {'color': '#000000', 'ls': (0, (1, 1.2))},
+    {'color': '#009E73', 'ls': (0, (5, 2, 1, 2))},
+)
+
+SMALL, NORMAL, LARGE = 12, 13, 15  # font sizes in points, readable from the last row of a room
+WIDTH, HEIGHT = 9, 4  # inches
+WIDE = (11, 4.4)
+DPI = 110
+
+
+def new_axes(height: float = HEIGHT, width: float = WIDTH) -> Axes:
+    """Return the axes of a new figure. The sizes are in inches."""
+    return plt.figure(figsize=(width, height), dpi=DPI, layout='constrained').add_subplot()
+
+
+def canvas(title: str, height: float) -> Axes:
+    """Return new axes without ticks and frame, for boxes and arrows."""
+    ax = new_axes(height)
+    ax.set_axis_off()
+    ax.set_title(title, fontsize=LARGE, loc='left')
+    return ax
+
+
+def label_axes(
+    ax: Axes, title: str, xlabel: str, ylabel: str, handles: list | None = None, grid: str = 'both'
+) -> None:
+    """Give the axes their texts, a grid, and above them a legend, where it cannot hide data."""
+    ax.set_title(title, fontsize=LARGE, loc='left', pad=34 if handles else 10)
+    ax.set_xlabel(xlabel, fontsize=NORMAL)
+    ax.set_ylabel(ylabel, fontsize=NORMAL)
+    ax.tick_params(labelsize=SMALL)
+    ax.spines[['top', 'right']].set_visible(False)
+    ax.grid(True, axis=grid, color='#e4e7ea', linewidth=0.8)
+    ax.set_axisbelow(True)
+    if handles:
+        ax.legend(
+            handles=handles,
+            loc='lower left',
+            bbox_to_anchor=(0, 1),
+            ncols=len(handles),
+            fontsize=SMALL,
+            frameon=False,
+            borderaxespad=0.3,
+            borderpad=0.2,
+            handletextpad=0.5,
+            handlelength=1.6,
+            columnspacing=1.6,
+        )
+
+
+def crosses(ax: Axes, x, y, label: str, scale: float = 1.0) -> PathCollection:
+    """Mark what was lost: the same cross in every picture. `scale` is the area of a mark."""
+    look = {'marker': 'x', 's': 40 * scale, 'linewidths': 2 * scale**0.5, 'color': LOST}
+    return ax.scatter(x, y, label=label, zorder=4, clip_on=False, **look)
+
+
+def box(ax: Axes, x: float, y: float, text: str, style: str, colour: str = '#FFFFFF') -> Text:
+    """Write a text in a box, centred at (x, y). `style` is one of matplotlib's box styles."""
+    look = {'boxstyle': style, 'facecolor': colour, 'edgecolor': INK, 'linewidth': 1.4}
+    centred = {'ha': 'center', 'va': 'center', 'linespacing': 1.5}
+    return ax.text(x, y, text, fontsize=NORMAL, bbox=look, **centred)
+
+
+def say(ax: Axes, text: str) -> None:
+    """Write a text into the middle of the axes, where there is nothing to draw."""
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha='center', va='center', fontsize=LARGE)
+
+
+def in_words(names: Iterable) -> str:
+    """Return a list of names for a sentence."""
+    return '; '.join(map(str, names))
+
+
+def checked(
+    what: str, table: pd.DataFrame, *numbers: str, texts: Iterable[str] = ()
+) -> pd.DataFrame:
+    """Return the columns of a table that has rows, with numbers or text in them.
+
+    Raises TypeError or ValueError for any other table.
+    """
+    check_columns(table, [*numbers, *texts], what)
+    if table.empty:
+        raise ValueError(f'{what} is empty: it needs at least one row.')
+    columns = {name: column_of_numbers(table, name) for name in numbers}
+    return pd.DataFrame(columns | {name: column_of_text(table, name) for name in texts})
+
+
+def check_count(what: str, items, most: int) -> None:
+    """Raise ValueError unless there are 1 to `most` items: each needs a look of its own."""
+    if not 1 <= len(items) <= most:
+        raise ValueError(f'One picture can show 1 to {most} {what}, not {len(items)}.')
+
+
+def checked_span(span_s: tuple[float, float]) -> tuple[float, float]:
+    """Return the two times of a span, in seconds, or raise ValueError."""
+    first, last = span_s
+    if not first < last:
+        raise ValueError(f'A span is two times in seconds, the earlier one first, not {span_s!r}.')
+    return first, last
