@@ -96,7 +96,7 @@ def check_rclpy() -> Check:
 
 def check_domain() -> Check:
     """Reserve this process's domain id and keep discovery on this machine."""
-    from helpers.session import configure_discovery, reserve_domain_id
+    from helpers.domain import configure_discovery, reserve_domain_id
 
     name = 'domain and discovery'
     configure_discovery()
@@ -116,7 +116,8 @@ def check_message() -> Check:
     from rclpy.task import Future
     from std_msgs.msg import String
 
-    from helpers.session import destroy_nodes, one_process_at_a_time, reserve_domain_id
+    from helpers.domain import one_process_at_a_time, reserve_domain_id
+    from helpers.session import destroy_nodes
 
     name = 'one message to itself'
     try:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from helpers.rclpy_private import can_ask
+
 SHOW_AFTER_S = 2.0
 REFRESH_S = 0.2
 
@@ -45,9 +47,9 @@ class ProgressBar:
 
 
 def _somebody_watches() -> bool:
-    """Whether a person runs this cell: JupyterLab can answer input(), nbval and nbclient cannot."""
+    """Whether a person runs this cell, and not nbval or nbclient."""
     try:
         from IPython import get_ipython
     except ImportError:
         return False
-    return getattr(getattr(get_ipython(), 'kernel', None), '_allow_stdin', False)
+    return can_ask(getattr(get_ipython(), 'kernel', None))

@@ -15,7 +15,8 @@ import pytest
 from support.processes import kill
 
 from helpers import workspace as module
-from helpers.session import reserve_domain_id, ros_session
+from helpers.domain import reserve_domain_id
+from helpers.session import ros_session
 from helpers.workspace import Workspace, lines_that_matter, mend_wheels, missing_tools
 
 ROOT = Path(__file__).resolve().parent.parent

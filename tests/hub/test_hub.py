@@ -335,7 +335,7 @@ for _table in (table, short_table, best_effort_table):
     for _seq in _table.loc[_table['published_s'].isna(), 'seq']:
         print(_seq)
 """
-DOMAIN = 'import helpers.session; print(helpers.session.reserve_domain_id())'
+DOMAIN = 'import helpers.domain; print(helpers.domain.reserve_domain_id())'
 # Everybody talks on one topic until everybody has heard something.
 TALK = """
 import threading
@@ -344,7 +344,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 
-_session = ros_session().open()
+_session = ros_session().__enter__()
 _heard = []
 _node = Node('student')
 _publisher = _node.create_publisher(String, 'topic', 10)
@@ -359,6 +359,7 @@ _before = len(_heard)
 _session.wait_until(lambda: len(_heard) >= _before + 5 and {expected!r} <= set(_heard), 60)
 print(*set(_heard))
 """
+CLOSE = '_session.__exit__(None, None, None)'
 # Somebody in the domain of a student, as no session does it.
 GUEST = """
 import os, sys, time, rclpy
@@ -395,7 +396,7 @@ async def everybody_talks(students: list[Student], hour: ClassHour) -> None:
         guest.terminate()
         guest.wait(END_S)
     hour.heard = {name: set(text.split()) for name, text in zip(kernels, heard, strict=True)}
-    await asyncio.gather(*(kernel.text('_session.close()') for kernel in kernels.values()))
+    await asyncio.gather(*(kernel.text(CLOSE) for kernel in kernels.values()))
 
 
 @contextlib.contextmanager
@@ -422,7 +423,7 @@ async def one_too_many(hub: Hub) -> list[str]:
             outputs = await kernel.run(TALK.format(name=LATE))
             said += [output.get('evalue', 'no error') for output in outputs] or ['open']
             taken.close()
-    await kernel.text('_session.close()')
+    await kernel.text(CLOSE)
     await student.log_out()
     return said
 

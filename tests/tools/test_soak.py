@@ -33,7 +33,8 @@ def test_what_is_left_in_a_kernel_is_named():
         import json, socket, subprocess, threading
         from domain_coordinator import domain_id
         from domain_coordinator.impl import PORT_BASE
-        from helpers.session import reserve_domain_id, ros_session
+        from helpers.domain import reserve_domain_id
+        from helpers.session import ros_session
         from tools.soak.leftovers import left_in_process, state_of_process
 
         before, gate = state_of_process(), threading.Event()
@@ -53,7 +54,7 @@ def test_what_is_left_in_a_kernel_is_named():
         child = subprocess.Popen(['sleep', '9'])
         another = domain_id()
         another.__enter__()
-        ros_session().open()
+        ros_session().__enter__()
         while 'dds.ev.0' not in state_of_process()['threads'].values():
             pass  # a thread gives itself its name
         print(json.dumps([nothing, left_in_process(before, state_of_process()), child.pid]))
@@ -96,11 +97,12 @@ def folders(tmp_path):
 
 LEAVES_ALL = """
     import json, os, signal, subprocess, sys, time
-    from helpers.session import reserve_domain_id, ros_session
+    from helpers.domain import reserve_domain_id
+    from helpers.session import ros_session
     from tools.soak.leftovers import held_by, state_of_process
     import psutil
 
-    session = ros_session().open()
+    session = ros_session().__enter__()
     child = os.fork()
     if child == 0:
         while True:

@@ -1,0 +1,123 @@
+"""Who can hear this process: its domain id, its discovery range, and its turn in shared memory."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import socket
+import time
+from collections.abc import Iterator
+
+SHARED_MEMORY = '/dev/shm'
+TURN_TIMEOUT_S = 5.0
+POLL_S = 0.01
+
+_reserved = contextlib.ExitStack()
+_domain_id: int | None = None
+
+
+def reserve_domain_id() -> int:
+    """Return a domain id (1 to 100) that belongs to this process until it ends.
+
+    Raises RuntimeError where all of them are taken.
+    """
+    global _domain_id
+    if _domain_id is None:
+        from domain_coordinator import domain_id
+
+        try:
+            _domain_id = _reserved.enter_context(domain_id())
+        except RuntimeError as error:
+            raise RuntimeError(
+                'All 100 ROS domain ids of this machine are in use: '
+                'shut down the kernels that you no longer need, then run this cell again.'
+            ) from error
+    return _domain_id
+
+
+@contextlib.contextmanager
+def share_domain_id(domain_id: int) -> Iterator[int]:
+    """Keep `reserve_domain_id` of all processes away from this id, which several may share.
+
+    Raises ValueError where a process has reserved it for itself.
+    """
+    from domain_coordinator.impl import PORT_BASE
+
+    # The coordinator holds the port of an id without this option. Two sockets can share a port
+    # only where both have it.
+    with socket.socket() as mark:
+        mark.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            mark.bind(('', PORT_BASE + domain_id))
+        except OSError:
+            raise ValueError(
+                f'Domain {domain_id} is reserved on this machine: agree on another one. '
+                'No kernel reserves 0 and 101.'
+            ) from None
+        yield domain_id
+
+
+def check_domain(domain_id: int | None, discovery: str) -> None:
+    """Raise TypeError or ValueError where a session cannot use this domain and this range."""
+    if domain_id is not None:
+        said = f'domain_id must be a whole number from 0 to 101, not {domain_id!r}.'
+        if isinstance(domain_id, bool) or not isinstance(domain_id, int):
+            raise TypeError(said)
+        if not 0 <= domain_id <= 101:
+            raise ValueError(said)
+    if discovery not in ('LOCALHOST', 'SUBNET'):
+        raise ValueError(f"discovery must be 'LOCALHOST' or 'SUBNET', not {discovery!r}.")
+    if discovery == 'SUBNET' and domain_id is None:
+        raise ValueError(
+            "discovery='SUBNET' needs the domain id that the other machines use, for example "
+            "ros_session(domain_id=42, discovery='SUBNET')."
+        )
+
+
+def configure_discovery(discovery: str = 'LOCALHOST') -> None:
+    """Let the nodes of this process be discovered on this machine only, or in its network.
+
+    With 'SUBNET', ROS_STATIC_PEERS stays what it is.
+    """
+    os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = discovery
+    # Both would widen or replace the range.
+    os.environ.pop('ROS_LOCALHOST_ONLY', None)
+    if discovery == 'LOCALHOST':
+        os.environ.pop('ROS_STATIC_PEERS', None)
+
+
+def domain_variables(domain_id: int, discovery: str) -> dict[str, str]:
+    """Return the variables with which another process hears this one."""
+    variables = {'ROS_DOMAIN_ID': str(domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': discovery}
+    if discovery == 'SUBNET' and 'ROS_STATIC_PEERS' in os.environ:
+        variables['ROS_STATIC_PEERS'] = os.environ['ROS_STATIC_PEERS']
+    return variables
+
+
+@contextlib.contextmanager
+def one_process_at_a_time() -> Iterator[None]:
+    """Wait for the turn of this process to make or to end a participant.
+
+    Fast DDS counts some ports in shared memory through all domains. It reports an error, in the
+    middle of a cell, where one process wants the number that another one is just giving back, and
+    takes the next number. After `TURN_TIMEOUT_S` it is nobody's turn: the error is better than to
+    wait for a process that was stopped.
+    """
+    try:
+        folder = os.open(SHARED_MEMORY, os.O_RDONLY)
+    except OSError:  # no shared memory, no such port
+        yield
+        return
+    try:
+        deadline = time.monotonic() + TURN_TIMEOUT_S
+        while time.monotonic() < deadline:
+            with contextlib.suppress(BlockingIOError):
+                fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            time.sleep(POLL_S)
+        yield
+    finally:
+        # A child that was forked meanwhile has the folder open, too: closing would not unlock it.
+        fcntl.flock(folder, fcntl.LOCK_UN)
+        os.close(folder)

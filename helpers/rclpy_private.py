@@ -1,0 +1,114 @@
+"""Every private name that we touch: of rclpy, and of the Python and the ipykernel that it runs in.
+
+A new version may take one away. `NAMES` says in which version each was read. A test says which one
+is gone, and another one that no other module touches any.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import warnings
+from concurrent.futures import thread as thread_pool
+from types import FrameType
+
+from rclpy.client import Client
+from rclpy.executors import Executor
+
+# What has the name: the name, and the versions in which it was read.
+NAMES = {
+    'an executor': {
+        '_is_shutdown': 'rclpy 7.1.6',
+        '_tasks': 'rclpy 7.1.6',
+        '_wait_for_ready_callbacks': 'rclpy 7.1.6',
+    },
+    'a MultiThreadedExecutor': {'_executor': 'rclpy 7.1.6', '_futures': 'rclpy 7.1.6'},
+    'a client': {'_pending_requests': 'rclpy 7.1.6'},
+    'a ThreadPoolExecutor': {'_threads': 'Python 3.11.7', '_max_workers': 'Python 3.11.7'},
+    'a kernel': {'_allow_stdin': 'ipykernel 7.4.0'},
+}
+
+
+def end_spin(executor: Executor) -> None:
+    """Let the spin of an executor end. Executor.shutdown() destroys what the spin still uses."""
+    executor._is_shutdown = True
+    executor.wake()
+
+
+def pool_threads(executor: Executor) -> list[threading.Thread]:
+    """Return the threads of the pool of an executor that has one."""
+    pool = getattr(executor, '_executor', None)
+    return [] if pool is None else list(pool._threads)
+
+
+def end_pool(executor: Executor) -> None:
+    """Let the threads of the pool end. rclpy leaves that to the garbage collector."""
+    pool = getattr(executor, '_executor', None)
+    if pool is not None:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def failures_in_pool(executor: Executor) -> list[BaseException]:
+    """Return what the callbacks raised that a pool ran: rclpy raises it at a later spin, or never.
+
+    An exception that rclpy has raised itself is no longer among them.
+    """
+    tasks = [task for task in list(getattr(executor, '_futures', ())) if task.done()]
+    return [task.exception() for task in tasks if task.exception() is not None]
+
+
+def cancel_tasks(executor: Executor) -> None:
+    """Cancel what never started: its coroutine would warn when it is collected."""
+    for task, *_ in list(executor._tasks):
+        if not task.executing():
+            task.cancel()
+
+
+def fail_calls(client: Client, failure: Exception) -> None:
+    """Let all calls of a client that wait for an answer raise this exception."""
+    for future in list(client._pending_requests.values()):
+        with warnings.catch_warnings(action='ignore'):  # a done callback that fails
+            future.set_exception(failure)
+        future.exception()  # or rclpy says that nobody has read it
+
+
+def states(executor: Executor, spin_thread: threading.Thread) -> set[str]:
+    """Return what the threads that run an executor's callbacks do: 'working', 'waiting', 'free'."""
+    pool = getattr(executor, '_executor', None)
+    threads = [spin_thread] if pool is None else list(pool._threads)
+    found = {_state(frame) for _, frame in frames(threads)}
+    if pool is not None and len(threads) < pool._max_workers:
+        found.add('free')  # the pool starts a thread when it needs one
+    return found
+
+
+def _state(frame: FrameType) -> str:
+    code = frame.f_code
+    if code.co_filename == threading.__file__:
+        return 'waiting'
+    idle_in_pool = code.co_filename == thread_pool.__file__
+    if idle_in_pool or code is Executor._wait_for_ready_callbacks.__code__:
+        return 'free'
+    return 'working'
+
+
+def frames(threads: list[threading.Thread]) -> list[tuple[threading.Thread, FrameType]]:
+    """Return the innermost frame of each thread. A thread that has ended has none."""
+    current = sys._current_frames()
+    return [(thread, current[thread.ident]) for thread in threads if thread.ident in current]
+
+
+def end_wait(thread: threading.Thread, longer_than_s: float) -> None:
+    """Set the Event at which a thread waits, if it would wait longer than this."""
+    for _, frame in frames([thread]):
+        while frame is not None and frame.f_code is not threading.Event.wait.__code__:
+            frame = frame.f_back
+        if frame is not None:
+            event, timeout_s = frame.f_locals['self'], frame.f_locals['timeout']
+            if timeout_s is None or timeout_s > longer_than_s:
+                event.set()
+
+
+def can_ask(kernel: object) -> bool:
+    """Return whether who runs the cell can answer input(): JupyterLab can, nbval cannot."""
+    return getattr(kernel, '_allow_stdin', False)

@@ -1,0 +1,245 @@
+"""Kernels of one machine do not hear each other, unless they agree to."""
+
+import contextlib
+import fcntl
+import os
+import random
+
+import pytest
+import rclpy
+from domain_coordinator import domain_id as reserved_domain_id
+from rclpy.node import Node
+from support.nodes import LIMIT_S, Listener, spin
+from support.processes import run_python, running
+
+from helpers import domain
+from helpers.domain import configure_discovery, reserve_domain_id
+from helpers.session import graph_environment, ros_session
+
+
+def domain_of_session():
+    return rclpy.get_default_context().get_domain_id()
+
+
+def test_domain_of_its_own():
+    domains = []
+    for _ in range(2):
+        with ros_session():
+            domains.append(domain_of_session())
+    assert domains == [reserve_domain_id()] * 2
+    elsewhere = run_python('from helpers import domain; print(domain.reserve_domain_id())')
+    assert {1 <= domains[0] <= 100, 1 <= int(elsewhere) <= 100} == {True}
+    assert int(elsewhere) != domains[0]
+
+
+def test_no_domain_left():
+    # The real reservation, in a range of ports that no other process of this machine needs.
+    said = run_python("""
+        import contextlib, socket
+        import domain_coordinator.impl
+        domain_coordinator.impl.PORT_BASE = 21000
+        sockets = [socket.socket() for _ in range(100)]
+        for number, taken in enumerate(sockets, 1):
+            with contextlib.suppress(OSError):
+                taken.bind(('', 21000 + number))
+        from helpers.session import ros_session
+        try:
+            with ros_session():
+                print('never')
+        except RuntimeError as error:
+            print(error)
+        sockets[41].close()
+        with ros_session():
+            print('open')
+    """)
+    assert said.splitlines() == [
+        'All 100 ROS domain ids of this machine are in use: '
+        'shut down the kernels that you no longer need, then run this cell again.',
+        'open',
+    ]
+
+
+def test_processes_do_not_hear_each_other():
+    other = """
+        import rclpy
+        from helpers.session import configure_discovery, ros_session
+        from rclpy.node import Node
+        from std_msgs.msg import String
+        name, domain = {name!r}, {domain}
+        if domain is None:
+            session = ros_session().__enter__()
+        else:
+            configure_discovery()
+            rclpy.init(domain_id=domain)
+        node = Node(name)
+        publisher = node.create_publisher(String, 'topic', 10)
+        node.create_timer(0.02, lambda: publisher.publish(String(data=name)))
+        print('talking', flush=True)
+        rclpy.spin(node)
+    """
+    with ros_session() as session:
+        listener = Listener()
+        spin(session, listener)
+        with running(other.format(name='stranger', domain=None)) as stranger:
+            assert stranger.stdout.readline() == 'talking\n'
+            # The guest, who talks in our domain, is heard although it began later.
+            with running(other.format(name='guest', domain=domain_of_session())):
+                session.wait_until(lambda: len(listener.heard) >= 25, LIMIT_S)
+            assert stranger.poll() is None
+        assert set(listener.heard) == {'guest'}
+
+
+@pytest.fixture
+def shared_id():
+    """Return a domain id that nobody on this machine has reserved."""
+    with reserved_domain_id(lambda: random.randint(30, 100)) as free:
+        pass
+    return free
+
+
+def is_free(domain_id):
+    with contextlib.suppress(RuntimeError), reserved_domain_id(lambda: domain_id):
+        return True
+    return False
+
+
+def test_domain_that_two_processes_share(shared_id):
+    other = f"""
+        from support.nodes import Talker, spin
+        from helpers.session import ros_session
+        with ros_session(domain_id={shared_id}) as session:
+            spin(session, Talker(10**6))
+            input()
+    """
+    with ros_session(domain_id=shared_id) as session:
+        assert domain_of_session() == shared_id
+        listener = Listener()
+        spin(session, listener)
+        with running(other):
+            session.wait_until(lambda: listener.heard, LIMIT_S)
+        assert not is_free(shared_id)  # no kernel that wants to be alone comes into this domain
+    assert is_free(shared_id)
+
+
+def test_domain_of_somebody_else(shared_id):
+    with (
+        reserved_domain_id(lambda: shared_id),
+        pytest.raises(ValueError, match=f'Domain {shared_id} is reserved on this machine: agree'),
+        ros_session(domain_id=shared_id),
+    ):
+        pass
+    assert not rclpy.ok()
+    with ros_session(domain_id=shared_id):
+        pass
+
+
+def test_hostile_variables(monkeypatch, shared_id):
+    """A session is on this machine only, whatever the shell says, unless it asks for more."""
+    shell = {'ROS_DOMAIN_ID': '0', 'ROS_LOCALHOST_ONLY': '0', 'ROS_STATIC_PEERS': '192.0.2.1'}
+    for name, value in {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', **shell}.items():
+        monkeypatch.setenv(name, value)
+    wide = {
+        'ROS_DOMAIN_ID': str(shared_id),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET',
+        'ROS_STATIC_PEERS': '192.0.2.1',
+    }
+    narrow = {
+        'ROS_DOMAIN_ID': str(reserve_domain_id()),
+        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
+    }
+    for options, expected in (
+        ({'domain_id': shared_id, 'discovery': 'SUBNET'}, wide),
+        ({}, narrow),
+    ):
+        with ros_session(**options):
+            assert graph_environment() == expected
+            assert str(domain_of_session()) == expected['ROS_DOMAIN_ID']
+            for name in ('ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_STATIC_PEERS'):
+                assert os.environ.get(name) == expected.get(name)
+            assert 'ROS_LOCALHOST_ONLY' not in os.environ
+        assert graph_environment() == narrow
+    configure_discovery()  # also where nothing is to be removed
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'error', 'said'),
+    [
+        ({'domain_id': '42'}, TypeError, "a whole number from 0 to 101, not '42'"),
+        ({'domain_id': True}, TypeError, 'a whole number from 0 to 101, not True'),
+        ({'domain_id': 102}, ValueError, 'a whole number from 0 to 101, not 102'),
+        ({'domain_id': -1}, ValueError, 'a whole number from 0 to 101, not -1'),
+        ({'discovery': 'subnet'}, ValueError, "'LOCALHOST' or 'SUBNET', not 'subnet'"),
+        ({'discovery': 'SUBNET'}, ValueError, 'needs the domain id that the other machines use'),
+    ],
+)
+def test_bad_domain_or_discovery(arguments, error, said):
+    with pytest.raises(error, match=said):
+        ros_session(**arguments)
+
+
+# The turn to make or to end a participant
+
+
+@pytest.fixture
+def turn(tmp_path, monkeypatch):
+    """Return an open folder. Who locks it has the turn to make or to end a participant."""
+    monkeypatch.setattr(domain, 'SHARED_MEMORY', str(tmp_path))
+    folder = os.open(tmp_path, os.O_RDONLY)
+    yield folder
+    os.close(folder)
+
+
+def has(turn):
+    """Return whether this lock can be taken. It is given back."""
+    try:
+        fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    fcntl.flock(turn, fcntl.LOCK_UN)
+    return True
+
+
+def test_a_session_waits_for_its_turn_to_make_and_to_end_its_participant(turn, monkeypatch):
+    free = set()
+
+    class Noting(Node):
+        def __init__(self, *arguments, **options):
+            free.add(('made', has(turn)))
+            super().__init__(*arguments, **options)
+
+        def destroy_node(self):
+            free.add(('ended', has(turn)))
+            super().destroy_node()
+
+    monkeypatch.setattr('helpers.session.Node', Noting)
+    with ros_session():
+        assert has(turn)
+    assert has(turn)
+    assert free == {('made', False), ('ended', False)}
+
+
+def test_a_session_opens_when_the_turn_of_another_process_is_over(turn, monkeypatch):
+    lock, refused = fcntl.flock, []
+
+    def flock(folder, operation):
+        try:
+            lock(folder, operation)
+        except BlockingIOError:
+            refused.append(folder)
+            lock(turn, fcntl.LOCK_UN)
+            raise
+
+    lock(turn, fcntl.LOCK_EX)
+    monkeypatch.setattr(fcntl, 'flock', flock)
+    with ros_session():
+        assert len(refused) == 1
+
+
+@pytest.mark.parametrize('folder', [None, '/proc/no such folder'])
+def test_a_session_opens_without_a_turn(turn, folder, monkeypatch):
+    fcntl.flock(turn, fcntl.LOCK_EX)  # and whoever has it was stopped
+    monkeypatch.setattr(domain, 'TURN_TIMEOUT_S', 0.02)
+    if folder is not None:
+        monkeypatch.setattr(domain, 'SHARED_MEMORY', folder)
+    with ros_session():
+        assert rclpy.ok()
