@@ -112,7 +112,7 @@ def fusion(sizes: Sequence[int] = (600, 6_000, 60_000)) -> Iterable[Row]:
     """One step of the filter, in drives of different lengths."""
     costs = {}
     for steps in sizes:
-        measurements = simulate(seed=9, seconds=steps / 50, rate=50).measurements
+        measurements = simulate(seed=9, seconds=steps / 50).measurements
         costs[steps] = [each / len(measurements) for each in seconds(fuse, measurements)]
     return growth('one of {} steps of the filter', costs)
 

@@ -1,0 +1,30 @@
+"""One pose from several imperfect sensors: an extended Kalman filter for a robot on a floor.
+
+`filter` has the filter, message by message, as a node uses it. `tables` lets it run over a table
+of what the sensors said. `drives` simulates such tables, together with the truth. `evaluation`
+compares an estimate with the truth, and with what the filter says of its own errors.
+"""
+
+from helpers.fusion.drives import Drive, simulate
+from helpers.fusion.evaluation import chi_square_bounds, covariances, errors, nees, rmse
+from helpers.fusion.filter import PROCESS_NOISE, STATE, ExtendedKalmanFilter, Innovation, motion
+from helpers.fusion.tables import SENSORS, VARIANCES, fuse, innovations
+
+__all__ = [
+    'PROCESS_NOISE',
+    'SENSORS',
+    'STATE',
+    'VARIANCES',
+    'Drive',
+    'ExtendedKalmanFilter',
+    'Innovation',
+    'chi_square_bounds',
+    'covariances',
+    'errors',
+    'fuse',
+    'innovations',
+    'motion',
+    'nees',
+    'rmse',
+    'simulate',
+]

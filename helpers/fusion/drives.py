@@ -1,0 +1,150 @@
+"""A simulated drive: what imperfect sensors say, and apart from it, what is true."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from numbers import Integral
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from helpers.fusion import settings
+from helpers.fusion.filter import STATE
+from helpers.fusion.tables import VARIANCES
+from helpers.values import shown
+
+RATE_HZ = 50
+GPS_EVERY = 50  # rows
+MOST_SECONDS = 20_000  # a million rows
+
+# What the wheels say: so many times the speed, so many times the turning rate, and so much more.
+WHEEL_SCALE = 1.04
+TURN_SCALE = 1.05
+TURN_BIAS = 0.012  # rad/s
+GYRO_BIAS = 0.002  # rad/s
+GPS_JUMP_M = 20.0
+
+
+class Drive(NamedTuple):
+    """A simulated drive: what the sensors said, and apart from it, what was true."""
+
+    measurements: pd.DataFrame
+    truth: pd.DataFrame
+
+
+def simulate(
+    seed: int,
+    seconds: float = 120.0,
+    *,
+    slip: tuple[float, float] | None = None,
+    slip_speed: float = 0.5,
+    gps_outliers: int = 0,
+    gps_gap: tuple[float, float] | None = None,
+    imu_mounting: float = 0.0,
+    variances: Mapping[str, float] | None = None,
+) -> Drive:
+    """Drive a unicycle for some seconds, and return what its sensors say and what is true.
+
+    The robot starts at 0, 0 towards x, speeds up for two seconds, then swings between forwards and
+    backwards, and turns left and right: the path of the drives in tests/data. Wheels and IMU speak
+    50 times a second, GPS once. The noise of each column is white and normal with VARIANCES, of
+    which `variances` replaces some. So GPS is off by sigma = 0.5 m along each axis, 0.71 m in the
+    plane; the errors of a real GPS last for minutes. The seed decides the noise and the outliers,
+    nothing else.
+
+    Not all is noise: the wheels report 4 % too much speed, 5 % too much turning and 0.012 rad/s
+    besides, the gyro 0.002 rad/s too much. While the wheels slip (`slip`: from, to in s) they
+    report `slip_speed` m/s more than the robot moves. The IMU is mounted turned by `imu_mounting`
+    rad, and reports in its own frame. `gps_outliers` of the fixes, never the first, jump 20 m away.
+    There is no fix during `gps_gap` (from, to in s).
+
+    Returns `Drive(measurements, truth)`. The measurements have the columns that `fuse` reads, and
+    `ay`, the IMU's other acceleration (m/s^2), which a turned IMU needs; there is no gravity in
+    them. The truth has `t` and the columns of STATE, with the centripetal acceleration as `ay`.
+
+    Raises ValueError or TypeError for a setting that cannot be used.
+    """
+    if not isinstance(seed, Integral) or seed < 0:
+        raise ValueError(f'seed must be a whole number from 0, not {shown(seed)}.')
+    if settings.positive('seconds', seconds) > MOST_SECONDS:
+        raise ValueError(f'seconds must be at most {MOST_SECONDS}, not {shown(seconds)}.')
+    slip_speed = settings.number('slip_speed', slip_speed)
+    imu_mounting = settings.number('imu_mounting', imu_mounting)
+    variances = settings.variances('variances', variances, VARIANCES)
+    t = np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
+    slips, gap = _during('slip', slip, t), _during('gps_gap', gps_gap, t)
+    fix = (np.arange(len(t)) % GPS_EVERY == 0) & ~gap
+    later = np.flatnonzero(fix)[1:]
+    if not isinstance(gps_outliers, Integral) or not 0 <= gps_outliers <= len(later):
+        raise ValueError(
+            f'gps_outliers must be a whole number, 0 to {len(later)}, not {shown(gps_outliers)}.'
+        )
+    truth = _path(t)
+    rng = np.random.default_rng(seed)
+    measurements = _said(truth, slip_speed * slips, imu_mounting)
+    sigma = np.sqrt([variances['ax' if name == 'ay' else name] for name in measurements])
+    measurements += rng.normal(0, sigma, measurements.shape)
+    measurements['imu_yaw'] = _angle(measurements['imu_yaw'])
+    measurements.insert(0, 't', t)
+    direction = rng.uniform(-math.pi, math.pi, gps_outliers)
+    measurements.loc[rng.choice(later, gps_outliers, replace=False), ['gps_x', 'gps_y']] += (
+        GPS_JUMP_M * np.column_stack([np.cos(direction), np.sin(direction)])
+    )
+    measurements.loc[~fix, ['gps_x', 'gps_y']] = np.nan
+    return Drive(measurements, truth)
+
+
+def _said(truth: pd.DataFrame, slipping: np.ndarray, imu_mounting: float) -> pd.DataFrame:
+    """Return what the sensors would say without noise."""
+    cos, sin = math.cos(imu_mounting), math.sin(imu_mounting)
+    return pd.DataFrame(
+        {
+            'vx': WHEEL_SCALE * truth['vx'] + slipping,
+            'vyaw': TURN_SCALE * truth['vyaw'] + TURN_BIAS,
+            'imu_yaw': truth['yaw'] + imu_mounting,
+            'imu_vyaw': truth['vyaw'] + GYRO_BIAS,
+            'ax': cos * truth['ax'] + sin * truth['ay'],
+            'ay': cos * truth['ay'] - sin * truth['ax'],
+            'gps_x': truth['x'],
+            'gps_y': truth['y'],
+        }
+    )
+
+
+def _during(name: str, interval: tuple[float, float] | None, t: np.ndarray) -> np.ndarray:
+    """Return which of the times lie in the interval; its end does not."""
+    if interval is None:
+        return np.zeros(len(t), bool)
+    try:
+        start, end = (settings.number(name, edge) for edge in interval)
+        ordered = start < end
+    except (TypeError, ValueError):
+        ordered = False
+    if not ordered:
+        raise ValueError(f'{name} must be (from, to) in seconds, not {shown(interval)}.')
+    return (start <= t) & (t < end)
+
+
+def _path(t: np.ndarray) -> pd.DataFrame:
+    """Return the truth at the times `t`: speed and turning rate are given, the rest integrated."""
+
+    def speed(t):
+        return 0.5 * np.minimum(t, 2) + 0.75 * (np.sin(0.4 * t) - math.sin(0.8)) * (t > 2)
+
+    def yaw(t):
+        return 0.05 * t + 1.5 * (1 - np.cos(0.2 * t))
+
+    between = (t[1:] + t[:-1]) / 2
+    steps = np.diff(t) * speed(between) * np.array([np.cos(yaw(between)), np.sin(yaw(between))])
+    x, y = np.concatenate([np.zeros((2, 1)), np.cumsum(steps, axis=1)], axis=1)
+    vx, vyaw = speed(t), 0.05 + 0.3 * np.sin(0.2 * t)
+    ax = np.where(t <= 2, 0.5, 0.3 * np.cos(0.4 * t))
+    columns = x, y, _angle(yaw(t)), vx, np.zeros(len(t)), vyaw, ax, vx * vyaw
+    return pd.DataFrame({'t': t} | dict(zip(STATE, columns, strict=True)))
+
+
+def _angle(radians):
+    """Return the same angle between -pi and pi."""
+    return radians - math.tau * np.round(radians / math.tau)

@@ -1,0 +1,94 @@
+"""How good is an estimate, and does the filter know it?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from helpers.fusion.tables import POSE, columns_of, covariance_column
+from helpers.values import is_number, items, shown
+
+MOST_NUMBERS = 10**6
+
+
+def covariances(estimate: pd.DataFrame, names: Sequence[str] = ('x', 'y')) -> np.ndarray:
+    """Return the covariance of `names`, parts of the pose, in each row of what `fuse` returned.
+
+    The shape is (rows, k, k).
+    """
+    if not items(names) or not all(name in POSE for name in names):
+        raise ValueError(f'names must be some of {", ".join(POSE)}, not {shown(names)}.')
+    columns = columns_of(estimate, {covariance_column(a, b) for a in names for b in names})
+    matrix = [[columns[covariance_column(a, b)] for b in names] for a in names]
+    return np.array(matrix).transpose(2, 0, 1)
+
+
+def errors(estimate: pd.DataFrame, truth: pd.DataFrame) -> pd.DataFrame:
+    """Return how far off the estimate is: `t`, `x`, `y`, `distance` (m), `yaw` (rad, -pi to pi).
+
+    `truth` has the columns `t`, `x`, `y`, `yaw`. Between its rows it is interpolated; it must
+    cover the times of the estimate.
+    """
+    estimate, truth = (columns_of(table, ('t', *POSE)) for table in (estimate, truth))
+    t, known = estimate['t'], truth['t']
+    if not (len(known) and np.all(np.diff(known) > 0)):
+        raise ValueError('The truth needs rows whose times increase.')
+    if not np.all((known[0] <= t) & (t <= known[-1])):
+        raise ValueError('The truth must cover all times of the estimate.')
+    x, y = (estimate[name] - np.interp(t, known, truth[name]) for name in ('x', 'y'))
+    yaw = estimate['yaw'] - np.interp(t, known, np.unwrap(truth['yaw']))
+    yaw -= math.tau * np.round(yaw / math.tau)
+    return pd.DataFrame({'t': t, 'x': x, 'y': y, 'yaw': yaw, 'distance': np.hypot(x, y)})
+
+
+def rmse(estimate: pd.DataFrame, truth: pd.DataFrame) -> float:
+    """Return the root mean square of the distances (m) that `errors` finds.
+
+    It is the error in the plane: noise with sigma along each of two axes has sigma times root 2.
+    Rows of the estimate that are NaN do not count.
+    """
+    return float(np.sqrt((errors(estimate, truth)['distance'] ** 2).mean()))
+
+
+def nees(estimate: pd.DataFrame, truth: pd.DataFrame) -> np.ndarray:
+    """Return the normalised estimation error squared of each row: error' covariance^-1 error.
+
+    The error is that of the position: in a consistent filter it is chi-square with 2 degrees of
+    freedom.
+    """
+    off = errors(estimate, truth)[['x', 'y']].to_numpy()
+    weighted = np.linalg.solve(covariances(estimate), off[..., None])[..., 0]
+    return np.sum(off * weighted, axis=1)
+
+
+def chi_square_bounds(dof: int, runs: int = 1) -> tuple[float, float]:
+    """Return the two values between which the mean of `runs` NIS or NEES lies in 95 % of cases.
+
+    `dof` is how many numbers each has: 1 for a yaw, 2 for a position. The runs are independent,
+    and the same probability is left on both sides.
+    """
+    whole = all(is_number(n) and n == int(n) and n > 0 for n in (dof, runs))
+    if not whole or dof * runs > MOST_NUMBERS:
+        raise ValueError(
+            'dof and runs must be whole numbers from 1, together at most '
+            f'{MOST_NUMBERS:,} numbers, not {shown(dof)} and {shown(runs)}.'
+        )
+    return tuple(_chi_square(int(dof * runs), p) / runs for p in (0.025, 0.975))
+
+
+def _chi_square(dof: int, probability: float) -> float:
+    """Return the value that a chi-square number stays below with this probability."""
+    # P(more than x) = [erfc(sqrt(x / 2)) if dof is odd] + sum of exp(-x / 2) (x / 2)^j / j!
+    j = np.arange(dof % 2 / 2, dof / 2)
+    factorials = np.array([math.lgamma(i + 1) for i in j])
+    low, high = 0.0, dof + 40 * math.sqrt(dof) + 100
+    for _ in range(60):
+        x = (low + high) / 2
+        more = np.exp(j * math.log(x / 2) - x / 2 - factorials).sum()
+        if dof % 2:
+            more += math.erfc(math.sqrt(x / 2))
+        low, high = (x, high) if 1 - more < probability else (low, x)
+    return x

@@ -1,0 +1,196 @@
+"""The filter over a table of what the sensors said: the estimate, and the innovations.
+
+The same calls of the filter as in a node that gets all messages in order, without the messages.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import combinations_with_replacement
+
+import numpy as np
+import pandas as pd
+
+from helpers.fusion import settings
+from helpers.fusion.filter import STATE, ExtendedKalmanFilter, Innovation, part_of_state
+from helpers.values import check_columns, column_of_numbers, items, shown
+
+# The variance of the noise of each column, per axis. `vy` is no column: wheels that cannot move
+# sideways say 0.
+VARIANCES = {
+    'vx': 0.0025,
+    'vy': 0.01,
+    'vyaw': 0.0025,
+    'imu_yaw': 0.0004,
+    'imu_vyaw': 0.0001,
+    'ax': 0.01,
+    'gps_x': 0.25,
+    'gps_y': 0.25,
+}
+
+# What a row says, in the order in which it is applied: each message has the column of each part of
+# the state that it measures. The IMU's parts are applied one after the other.
+MESSAGES = {
+    'odom': ({'vx': 'vx', 'vy': 'vy', 'vyaw': 'vyaw'},),
+    'imu': ({'yaw': 'imu_yaw'}, {'vyaw': 'imu_vyaw'}, {'ax': 'ax'}),
+    'gps': ({'x': 'gps_x', 'y': 'gps_y'},),
+}
+SENSORS = tuple(MESSAGES)
+POSE = STATE[:3]
+
+
+def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options) -> pd.DataFrame:
+    """Estimate the path from a table of what the sensors said.
+
+    `measurements` has the column `t` (s, increasing) and those of the chosen sensors, NaN where a
+    sensor is silent: `vx` (m/s) and `vyaw` (rad/s) for 'odom'; `imu_yaw` (rad), `imu_vyaw` (rad/s)
+    and `ax` (m/s^2) for 'imu'; `gps_x` and `gps_y` (m) for 'gps'. In a row, odom is applied first
+    (with vy = 0, because its wheels cannot move sideways), then yaw, vyaw and ax of the imu one
+    after the other, then gps: the calls of `ExtendedKalmanFilter.process` that MESSAGES lists.
+
+    The options, each a dict:
+    - `process_noise`: replaces some of PROCESS_NOISE, {'x': 0.002, 'y': 0.002};
+    - `variances`: replaces some of VARIANCES, {'vx': 0.25};
+    - `config`: the parts of the state that a sensor measures, where not all that it can,
+      {'odom': ('vx', 'vy')};
+    - `gate`: the Mahalanobis distance at which a message of a sensor is kept out, {'gps': 3.0}. The
+      other sensors have none.
+
+    Returns a table with a row for each time: `t`, `x`, `y`, `yaw`, `vx`, `vy`, `vyaw`, and the
+    covariance of the pose: `var_x`, `cov_x_y`, `cov_x_yaw`, `var_y`, `cov_y_yaw`, `var_yaw` (NaN
+    before the first message). `covariances` makes matrices of them.
+
+    Raises ValueError or TypeError, with a sentence that says what to change, for a table or an
+    option that cannot be used.
+    """
+    times, states, matrices = [], [], []
+    for ekf, t, _ in _run(measurements, sensors, options):
+        known = np.nan if ekf.t is None else 1.0
+        times.append(t)
+        states.append(known * ekf.state[:6])
+        matrices.append(known * ekf.covariance[:3, :3])
+    columns = {'t': times} | dict(zip(STATE[:6], np.array(states).T, strict=True))
+    matrices = np.array(matrices)
+    for a, b in combinations_with_replacement(POSE, 2):
+        columns[covariance_column(a, b)] = matrices[:, POSE.index(a), POSE.index(b)]
+    return pd.DataFrame(columns)
+
+
+def innovations(
+    measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
+) -> pd.DataFrame:
+    """Return how each message of `fuse`, with the same arguments, differed from the expected.
+
+    One row for each number measured: `t`, `sensor`, `variable` (its name in STATE), `innovation`
+    (measured minus expected), `sigma` (the standard deviation that the filter expects of it), and
+    of the whole message `nis`, `dof` (how many numbers it measured) and `accepted`.
+    """
+    rows = [
+        (t, sensor, *number, message.nis, len(names), message.accepted)
+        for _, t, heard in _run(measurements, sensors, options)
+        for sensor, names, message in heard
+        for number in zip(names, message.value, np.sqrt(message.covariance.diagonal()), strict=True)
+    ]
+    columns = ['t', 'sensor', 'variable', 'innovation', 'sigma', 'nis', 'dof', 'accepted']
+    return pd.DataFrame(rows, columns=columns)
+
+
+def covariance_column(a: str, b: str) -> str:
+    """Return the column of `fuse` with the covariance of two parts of the pose."""
+    first, second = sorted((a, b), key=POSE.index)
+    return f'var_{a}' if a == b else f'cov_{first}_{second}'
+
+
+def columns_of(table: pd.DataFrame, names: Iterable[str]) -> dict[str, np.ndarray]:
+    """Return columns as arrays of numbers."""
+    names = list(names)
+    check_columns(table, names)
+    return {name: column_of_numbers(table, name) for name in names}
+
+
+Heard = list[tuple[str, Sequence[str], Innovation]]
+
+
+def _run(
+    measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping
+) -> Iterator[tuple[ExtendedKalmanFilter, float, Heard]]:
+    """Feed the rows to a filter. After each, yield it, its time and the innovations."""
+    settings.chosen('options', options, ('process_noise', 'variances', 'config', 'gate'))
+    ekf = ExtendedKalmanFilter(options.get('process_noise'))
+    variances = settings.variances('variances', options.get('variances'), VARIANCES)
+    gates = settings.chosen('gate', options.get('gate'), SENSORS)
+    gates = {sensor: settings.positive(f'gate[{sensor!r}]', gates[sensor]) for sensor in gates}
+    sensors = _sensors(sensors)
+    messages = _messages(sensors, options.get('config'))
+    table = _table(measurements, {name for _, parts in messages for name in parts.values()})
+    prepared = []
+    for sensor, parts in messages:
+        values = np.column_stack([table[column] for column in parts.values()])
+        noise = np.diag([variances[column] for column in parts.values()])
+        message = tuple(parts), part_of_state(tuple(parts)), noise
+        prepared.append((sensor, message, values, (~np.isnan(values)).sum(axis=1).tolist()))
+    if not any(any(said) for *_, said in prepared):
+        raise ValueError(f'The table has no measurement of {", ".join(sensors)}: all are NaN.')
+    for row, t in enumerate(table['t'].tolist()):
+        heard = []
+        for sensor, message, all_values, said in prepared:
+            if not said[row]:
+                continue
+            names, part, noise = message
+            values = all_values[row]
+            if said[row] < len(values):
+                there = np.flatnonzero(~np.isnan(values))
+                names = tuple(names[i] for i in there)
+                values, noise = values[there], noise[np.ix_(there, there)]
+                part = part_of_state(names)
+            innovation = ekf.process_unchecked(t, part, values, noise, gates.get(sensor))
+            if innovation is not None:
+                heard.append((sensor, names, innovation))
+        if ekf.t is not None:
+            ekf.predict(t)
+        yield ekf, t, heard
+
+
+def _sensors(sensors) -> list[str]:
+    chosen = items(sensors)
+    if isinstance(sensors, str) or not chosen or not all(name in SENSORS for name in chosen):
+        raise ValueError(
+            f'sensors must be a tuple of some of {", ".join(SENSORS)}, not {shown(sensors)}.'
+        )
+    return [sensor for sensor in SENSORS if sensor in chosen]
+
+
+def _messages(sensors: list[str], config) -> list[tuple[str, dict[str, str]]]:
+    """Return the messages of the sensors, without the parts that are not to be used."""
+    config = settings.chosen('config', config, SENSORS)
+    for sensor, names in config.items():
+        can = [name for parts in MESSAGES[sensor] for name in parts]
+        if isinstance(names, str) or not items(names) or not all(n in can for n in names):
+            raise ValueError(
+                f'config[{sensor!r}] must be some of the names {", ".join(can)}, '
+                f'not {shown(names)}.'
+            )
+    messages = [
+        (sensor, {n: column for n, column in parts.items() if n in config.get(sensor, parts)})
+        for sensor in sensors
+        for parts in MESSAGES[sensor]
+    ]
+    return [(sensor, parts) for sensor, parts in messages if parts]
+
+
+def _table(measurements: pd.DataFrame, columns: set[str]) -> dict[str, np.ndarray]:
+    """Return `t` and the columns as arrays."""
+    with_vy = 'vy' in columns  # no column: the wheels say it whenever they say something
+    if with_vy:
+        columns = columns - {'vy'} | {'vx', 'vyaw'}
+    table = columns_of(measurements, ['t', *sorted(columns)])
+    if len(measurements) == 0:
+        raise ValueError('The table is empty.')
+    if np.isnan(table['t']).any():
+        raise ValueError('Every row needs its time: the column t has a NaN.')
+    if (np.diff(table['t']) <= 0).any():
+        raise ValueError('The times must increase from row to row: sort t, and join equal times.')
+    if with_vy:
+        silent = np.isnan(table['vx']) & np.isnan(table['vyaw'])
+        table['vy'] = np.where(silent, np.nan, 0.0)
+    return table
