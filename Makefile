@@ -14,7 +14,7 @@ test: set_up lint ## lint, tests of the helpers, every notebook compared with it
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(PYTEST_ARGS)
 
 test-tools: set_up ## the tools: an installation from nothing, the soak, the licences, the benchmarks
-	@$(PYTHON) -m pytest -n 2 --dist worksteal --max-worker-restart 0 tests/tools $(PYTEST_ARGS)
+	@$(PYTHON) -m pytest -n 2 --dist worksteal --max-worker-restart 0 -o faulthandler_timeout=600 tests/tools $(PYTEST_ARGS)
 
 test-browser: ## the real JupyterLab in Chromium, as students and instructors use it; it takes minutes
 	@[ -n "$(CHROMIUM)" ] || { echo '$(no_chromium)' >&2; exit 1; }

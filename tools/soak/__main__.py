@@ -4,17 +4,16 @@
     python -m tools.soak --rounds 10 --conditions idle,busy --lesson 02
     python -m tools.soak --minutes 8                    begin no run after 8 minutes
     python -m tools.soak --seed 1234 ...                the random times of an earlier run
-    python -m tools.soak --report                       all runs so far
+    python -m tools.soak --report                       the table only
 
-A run counts until its notebook, or what all notebooks use, has changed. What has run least often
-comes first, so that several sittings add up. Ctrl+C ends it with the table of what was done. Every
-run is a line of JSON in .soak/runs.jsonl.
+Every run is a line of JSON in .soak/runs.jsonl. It counts until its notebook, or what all notebooks
+use, has changed. What counts is not done again, so that several sittings add up to the rounds that
+are asked for. Ctrl+C ends a sitting.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import hashlib
 import json
 import math
@@ -25,105 +24,100 @@ import subprocess
 import sys
 import tempfile
 import time
-import uuid
 from collections import Counter
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from itertools import cycle, islice
+from contextlib import suppress
 from pathlib import Path
 
+import pandas as pd
 import psutil
 
 from tools.notebooks import FOLDER, lessons
-from tools.soak.conditions import CACHE, CONDITIONS, ROOT, CannotRunError, Condition
-from tools.soak.leftovers import MARK, Watch, processes_of
+from tools.soak.conditions import CACHE, CONDITIONS, ROOT, CannotRunError, Condition, sandbox
+from tools.soak.leftovers import adopt_orphans, files_of
 
 RUNS = CACHE / 'runs.jsonl'
 # What a notebook uses: with the notebook, all that can change how a run of it ends.
 USED = ('helpers', 'conftest.py', 'pyproject.toml', 'requirements.lock', 'tests/nbval_sanitize.cfg')
 RUN_TIMEOUT_S = 1800.0
-DOCTOR_TIMEOUT_S = 60.0
 LONGEST_TEXT = 1600
+EVENTS = {
+    'interrupted_after_s': 'interrupted',
+    'import_interrupted': 'in an import',
+    'no_reply': 'without a reply',
+    'kernel_lost': 'with a lost kernel',
+}
 
 
 # --- One run -------------------------------------------------------------------------------------
 
 
-def run(notebook: Path, condition: Condition, seed: int) -> dict:
-    """Run a notebook once in a condition and return the record of it.
+def run(notebooks: list[Path], condition: Condition, seed: int) -> list[dict]:
+    """Run some notebooks once, at the same time, and return a record for each.
 
-    `failed` is None or [cell, text] of what failed first, `seconds` the run's, `cells` those of
-    each cell. Raises CannotRunError where this machine cannot offer the condition.
+    `failed` is None or [cell, text] of what failed first, `cells` the seconds of each cell. Raises
+    CannotRunError where this machine cannot offer the condition.
     """
-    mark = uuid.uuid4().hex
     with tempfile.TemporaryDirectory(prefix='soak-', ignore_cleanup_errors=True) as name:
         folder = Path(name)
         own = [folder / 'home', folder / 'tmp']
         for empty in (*own, folder / 'jupyter'):
             empty.mkdir()
-        python, before = condition.python(), condition.before(folder)
+        python = [condition.python(), '-m']
+        before = sandbox(condition.mounts, folder)
         report = folder / 'report.jsonl'
         command = [
-            *(*before, python, '-m', 'pytest', notebook, '-c', ROOT / 'pyproject.toml'),
+            *(*before, *python, 'pytest', *notebooks, '-c', ROOT / 'pyproject.toml'),
             *('--rootdir', ROOT, '-p', 'no:cacheprovider', '--color=no', '-p', 'tools.soak.plugin'),
             *('--soak-mode', condition.mode, '--soak-seed', str(seed), '--soak-report', report),
         ]
+        if len(notebooks) > 1:
+            command += ['-n', str(condition.at_once), '--dist', 'loadscope']
         if condition.sentence:  # the kernel may die, which nbval notices at its time-out only
             command += ['--exitfirst', '--nbval-cell-timeout=20']
         if condition.mode == 'kill':  # one of its items runs many cells
             command += ['-o', f'faulthandler_timeout={RUN_TIMEOUT_S:g}']
-        environment = _environment(folder) | {MARK: mark}
-        environment |= condition.environment(random.Random(seed))
-        started = time.monotonic()
-        with Watch(mark, own, [ROOT]) as watch:
-            status, printed = _call(command, environment, RUN_TIMEOUT_S)
-        seconds = time.monotonic() - started
+        variables = _variables(folder) | condition.variables(random.Random(seed))
+        files_before = files_of(ROOT, *own)
+        with condition.beside():
+            status, printed = _call(command, variables, condition.cores)
+        new = sorted({file for file, _ in files_of(ROOT, *own) - files_before})
         rows = []
         if report.exists():
             rows = [json.loads(line) for line in report.read_text(encoding='utf-8').splitlines()]
-        domain_ids = next((row['domain_ids'] for row in rows if 'domain_ids' in row), {})
-        killed_held = {name for row in rows for name in row.get('killed_held', ())}
-        left = watch.left(domain_ids, killed_held)
-        failures = [[row['item'], row['failed']] for row in rows if row['failed']]
-        if status and not failures:
-            failures = [['no cell', f'pytest ended with {status}: {printed}']]
-        if left:
-            failures.append(['after the run', ' '.join(left)])
-        if failures and condition.sentence:
-            doctor = [*before, python, '-m', 'helpers.doctor']
-            if condition.sentence in _call(doctor, environment, DOCTOR_TIMEOUT_S)[1]:
-                failures = []
-    return {
-        'notebook': notebook.stem,
-        'condition': condition.name,
-        'seed': seed,
-        'seconds': round(seconds, 1),
-        'cells': {
-            row['item']: round(row['seconds'], 3)
-            for row in rows
-            if row['item'].startswith('code cell')
-        },
-        'interrupts': {
-            'interrupted': sum('interrupted_after_s' in row for row in rows),
-            'in an import': sum('import_interrupted' in row for row in rows),
-            'without a reply': sum('no_reply' in row for row in rows),
-            'with a lost kernel': sum('kernel_lost' in row for row in rows),
-        },
-        'failed': failures[0] if failures else None,
-        'report': rows if failures else [],
+        if new:
+            text = f'These files are new or have changed: {", ".join(new)}.'
+            rows.append({'notebook': None, 'item': 'after the run', 'failed': text})
+        if status and not any(row['failed'] for row in rows):
+            text = f'pytest ended with {status}: {printed}'
+            rows.append({'notebook': None, 'item': 'no cell', 'failed': text})
+        if condition.sentence and any(row['failed'] for row in rows):
+            said = _call([*before, *python, 'helpers.doctor'], variables)[1]
+            if condition.sentence in said:
+                rows = [row | {'failed': None} for row in rows]
+    # What belongs to no notebook belongs to each that ran.
+    return [
+        _record([row for row in rows if row['notebook'] in (notebook.stem, None)])
+        | {'notebook': notebook.stem, 'condition': condition.name, 'seed': seed}
+        for notebook in notebooks
+    ]
+
+
+def _record(rows: list[dict]) -> dict:
+    failed = [[row['item'], row['failed']] for row in rows if row['failed']]
+    cells = {
+        row['item']: round(row['seconds'], 3) for row in rows if row['item'].startswith('code cell')
     }
+    events = {name: sum(key in row for row in rows) for key, name in EVENTS.items()}
+    return {'failed': failed[0] if failed else None, 'cells': cells, 'events': events} | (
+        {'report': rows} if failed else {}
+    )
 
 
-def _environment(folder: Path) -> dict[str, str]:
-    """Return the variables of a run: a home, a temporary folder and a Jupyter of its own."""
-    inherited = dict(os.environ)
-    # The wheels set these when this Python started. Another Python must set its own.
-    inherited.pop('_ROS_WHEELS_BOOTSTRAP_COMPLETE', None)
-    libraries = inherited.pop('LD_LIBRARY_PATH', '').split(os.pathsep)
-    libraries = [path for path in libraries if path and not path.startswith(sys.prefix)]
-    if libraries:
-        inherited['LD_LIBRARY_PATH'] = os.pathsep.join(libraries)
-    return inherited | {
+def _variables(folder: Path) -> dict[str, str]:
+    """Return all variables of a run: a home, a temporary folder and a Jupyter of its own."""
+    return {
+        'PATH': os.environ['PATH'],
+        'LANG': 'C.UTF-8',
         'HOME': str(folder / 'home'),
         'TMPDIR': str(folder / 'tmp'),
         'JUPYTER_CONFIG_DIR': str(folder / 'jupyter'),
@@ -136,40 +130,31 @@ def _environment(folder: Path) -> dict[str, str]:
     }
 
 
-def _call(command: list, environment: dict[str, str], timeout_s: float) -> tuple[int, str]:
+def _call(command: list, variables: dict[str, str], cores: int | None = None) -> tuple[int, str]:
     """Run a command and return its exit code and what it printed. Nothing of it stays behind."""
+    adopt_orphans()
     process = subprocess.Popen(
         command,
         cwd=ROOT,
-        env=environment,
+        env=variables,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         errors='replace',
         start_new_session=True,  # Ctrl+C is for this tool
+        preexec_fn=lambda: os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores]),
     )
-    mark = environment[MARK]
-    _running.add(mark)
     try:
-        printed, _ = process.communicate(timeout=timeout_s)
+        printed, _ = process.communicate(timeout=RUN_TIMEOUT_S)
         return process.returncode, printed
     except subprocess.TimeoutExpired:
-        return -1, f'it took longer than {timeout_s:g} s'
+        return -1, f'it took longer than {RUN_TIMEOUT_S:g} s'
     finally:
-        _running.discard(mark)
-        if process.poll() is None:
-            _kill(mark)
-            process.wait()
-
-
-_running: set[str] = set()  # the marks of the runs that go on
-
-
-def _kill(mark: str) -> None:
-    for process in processes_of(mark):
-        with contextlib.suppress(psutil.Error):
-            process.kill()
+        for each in psutil.Process().children(recursive=True):
+            with suppress(psutil.NoSuchProcess):
+                each.kill()
+        process.wait()
 
 
 # --- Many runs -----------------------------------------------------------------------------------
@@ -187,127 +172,96 @@ def recorded(notebooks: list[Path]) -> list[dict]:
     versions = {notebook.stem: version(notebook) for notebook in notebooks}
     lines = RUNS.read_text(encoding='utf-8').splitlines() if RUNS.exists() else []
     records = [json.loads(line) for line in lines]
-    return [r for r in records if r.get('version') == versions.get(r['notebook'], '')]
+    return [r for r in records if r['version'] == versions.get(r['notebook'])]
 
 
 def soak(
     notebooks: list[Path], conditions: list[Condition], rounds: int, minutes: float, seed: int
-) -> list[dict]:
-    """Run and record every notebook `rounds` times in every condition; return the records."""
-    versions = {notebook.stem: version(notebook) for notebook in notebooks}
+) -> None:
+    """Run every notebook in every condition until `rounds` runs of it are recorded."""
     deadline = time.monotonic() + 60 * minutes
-    counts = Counter((r['notebook'], r['condition']) for r in recorded(notebooks))
-    jobs: list[tuple[int, int, Condition, list[Path]]] = []
+    done = Counter((r['notebook'], r['condition']) for r in recorded(notebooks))
+    refused = set()
     for number in range(rounds):
         for condition in conditions:
-            # As many at once as the condition asks for, also where fewer notebooks are wanted.
-            several = list(islice(cycle(notebooks), max(len(notebooks), condition.at_once)))
-            groups = [several] if condition.at_once > 1 else [[notebook] for notebook in several]
-            for group in groups:
-                done = min(counts[notebook.stem, condition.name] for notebook in group)
-                jobs.append((done + number, number, condition, group))
-    records, refused = [], {}
+            wanted = [path for path in notebooks if done[path.stem, condition.name] <= number]
+            for group in [wanted] if condition.at_once > 1 else [[path] for path in wanted]:
+                if not group or time.monotonic() > deadline or condition.name in refused:
+                    break
+                try:
+                    _run_and_record(group, condition, seed + number)
+                except CannotRunError as error:
+                    refused.add(condition.name)
+                    print(f'{condition.name}: skipped. {error}', flush=True)
+
+
+def _run_and_record(group: list[Path], condition: Condition, seed: int) -> None:
+    versions = {path.stem: version(path) for path in group}
+    started = time.monotonic()
+    records = run(group, condition, seed)
     RUNS.parent.mkdir(exist_ok=True)
     with RUNS.open('a', encoding='utf-8') as file:
-        for _, number, condition, group in sorted(jobs, key=lambda job: job[0]):
-            if time.monotonic() > deadline:
-                break
-            if condition.name in refused:
-                continue
-            try:
-                for record in _together(group, condition, seed + 100 * number):
-                    added = {'version': versions[record['notebook']], 'time': time.time()}
-                    records.append(record | added)
-                    print(json.dumps(records[-1]), file=file, flush=True)
-                    print(_line(record), flush=True)
-            except CannotRunError as error:
-                refused[condition.name] = str(error)
-                print(f'{condition.name}: skipped. {error}', flush=True)
-            except KeyboardInterrupt:
-                print('Interrupted: the runs that were going on do not count.')
-                break
-    return records
-
-
-def _together(group: list[Path], condition: Condition, seed: int) -> Iterator[dict]:
-    """Run notebooks at the same time and yield their records, each as it ends."""
-    with condition.beside(), ThreadPoolExecutor(condition.at_once) as pool:
-        going_on = [
-            pool.submit(run, notebook, condition, seed + number)
-            for number, notebook in enumerate(group)
-        ]
-        try:
-            for done in as_completed(going_on):
-                yield done.result()
-        finally:  # interrupted
-            pool.shutdown(wait=False, cancel_futures=True)
-            for mark in list(_running):
-                _kill(mark)
+        for record in records:
+            record['version'] = versions[record['notebook']]
+            print(json.dumps(record), file=file)
+            ended = f'failed: {record["failed"][0]}' if record['failed'] else 'passed'
+            print(
+                f'{condition.name:<16} {record["notebook"]:<40} '
+                f'{time.monotonic() - started:6.0f} s  seed {seed}  {ended}',
+                flush=True,
+            )
 
 
 # --- The table -----------------------------------------------------------------------------------
 
 
 def table(records: list[dict]) -> str:
-    """Return one row for each notebook, and below it one line for each condition."""
-    rows = [('notebook', 'runs', 'failures', 'slowest cell', 'first failure')]
-    texts = []
-    for notebook in sorted({record['notebook'] for record in records}):
-        of_notebook = [record for record in records if record['notebook'] == notebook]
-        failed = [record for record in of_notebook if record['failed']]
-        cells = ((s, cell) for record in of_notebook for cell, s in record['cells'].items())
-        slowest_s, slowest = max(cells, default=(0, 'none'))
-        first = f'{failed[0]["condition"]}, {failed[0]["failed"][0]}' if failed else ''
-        rows.append(
-            (notebook, len(of_notebook), len(failed), f'{slowest_s:.1f} s, {slowest}', first)
-        )
-        if failed:
-            texts += ['', _line(failed[0]), _short(failed[0]['failed'][1])]
-    widths = [max(len(str(row[column])) for row in rows) for column in range(5)]
-    lines = [
-        '  '.join(str(word).ljust(width) for word, width in zip(row, widths, strict=True)).rstrip()
-        for row in rows
+    """Return one row for each notebook, one for each condition, and what failed first."""
+    runs = pd.DataFrame(records)
+    runs['slowest_s'] = [max(cells.values(), default=0) for cells in runs['cells']]
+    runs['slowest'] = [max(cells, key=cells.get, default='none') for cells in runs['cells']]
+    runs['first failure'] = [
+        f'{r["condition"]}, {r["failed"][0]}, seed {r["seed"]}' if r['failed'] else None
+        for r in records
     ]
-    runs = Counter(record['condition'] for record in records)
-    failures = Counter(record['condition'] for record in records if record['failed'])
-    conditions = [f'{name} {failures[name]} of {runs[name]}' for name in runs]
-    lines += ['', f'Failures by condition: {", ".join(conditions)}.']
-    interrupts = sum((Counter(record['interrupts']) for record in records), Counter())
-    if interrupts:
-        counts = ', '.join(f'{count} {what}' for what, count in interrupts.items())
-        lines.append(f'Cells: {counts}.')
-    return '\n'.join(lines + texts)
+    lesson = runs.groupby('notebook')
+    slowest = runs.loc[lesson['slowest_s'].idxmax()].set_index('notebook')
+    rows = pd.DataFrame(
+        {
+            'runs': lesson.size(),
+            'failures': lesson['failed'].count(),
+            'slowest cell': slowest['slowest_s'].map('{:.1f} s, '.format) + slowest['slowest'],
+            'first failure': lesson['first failure'].first().fillna(''),
+        }
+    )
+    of_condition = runs.groupby('condition')['failed'].agg(runs='size', failures='count')
+    events = sum((Counter(record['events']) for record in records), Counter())
+    texts = [rows.to_string(), of_condition.to_string()]
+    if events:
+        texts.append(f'Cells: {", ".join(f"{count} {what}" for what, count in events.items())}.')
+    first = {r['notebook']: r for r in reversed(records) if r['failed']}
+    texts += [f'{name}: {_short(first[name]["failed"][1])}' for name in sorted(first)]
+    return '\n\n'.join(texts)
 
 
 def _short(text: str) -> str:
     """Return the beginning and the end of a long text: all of it is in the file of runs."""
-    return (
-        text
-        if len(text) <= LONGEST_TEXT
-        else f'{text[: LONGEST_TEXT // 2]}\n...\n{text[-LONGEST_TEXT // 2 :]}'
-    )
-
-
-def _line(record: dict) -> str:
-    failed = record['failed']
-    return (
-        f'{record["condition"]:<16} {record["notebook"]:<40} {record["seconds"]:6.0f} s  '
-        f'seed {record["seed"]}  {"failed: " + failed[0] if failed else "passed"}'
-    )
+    half = LONGEST_TEXT // 2
+    return text if len(text) <= LONGEST_TEXT else f'{text[:half]}\n...\n{text[-half:]}'
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the tool; return 1 where a run failed, otherwise 0."""
+    names = [condition.name for condition in CONDITIONS]
     parser = argparse.ArgumentParser(
         prog='make soak', description='Run the notebooks in hard conditions.'
     )
-    names = [condition.name for condition in CONDITIONS]
     parser.add_argument('--rounds', type=int, default=1, metavar='N', help='of each condition')
     parser.add_argument('--conditions', default='', metavar='A,B', help=', '.join(names))
     parser.add_argument('--lesson', default='', metavar='NN', help='for example 02 or "02 03"')
     parser.add_argument('--minutes', type=float, default=math.inf, help='begin no run after these')
     parser.add_argument('--seed', type=int, help='of the random times; printed with each run')
-    parser.add_argument('--report', action='store_true', help='all runs so far')
+    parser.add_argument('--report', action='store_true', help='the table only')
     options = parser.parse_args(arguments)
     wanted = options.conditions.replace(',', ' ').split() or names
     if unknown := set(wanted) - set(names):
@@ -317,13 +271,15 @@ def main(arguments: list[str] | None = None) -> int:
     except ValueError as error:
         parser.error(str(error))
     notebooks = [path for path in chosen if '"cell_type": "code"' in path.read_text('utf-8')]
-    if options.report:
-        records = [r for r in recorded(notebooks) if r['condition'] in wanted]
-    else:
+    if not options.report:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         seed = options.seed if options.seed is not None else random.randrange(10**6)
         conditions = [condition for condition in CONDITIONS if condition.name in wanted]
-        records = soak(notebooks, conditions, options.rounds, options.minutes, seed)
+        try:
+            soak(notebooks, conditions, options.rounds, options.minutes, seed)
+        except KeyboardInterrupt:
+            print('Interrupted: the run that was going on does not count.')
+    records = [r for r in recorded(notebooks) if r['condition'] in wanted]
     print(f'\n{table(records)}' if records else 'No run was done.')
     return int(any(record['failed'] for record in records))
 

@@ -5,19 +5,31 @@ from __future__ import annotations
 import contextlib
 import os
 import random
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 CACHE = ROOT / '.soak'  # git ignores it, `make clean` removes it
-VERSIONS = ('3.11', '3.12', '3.13', '3.14')
 BUSY_LOOPS = 4
-BUSY = 'while True: pass'
+
+# What a run sees of the file system. $0 is the folder of the run, $1 its interpreter.
+SHM_OF_ITS_OWN = 'mount -t tmpfs tmpfs /dev/shm'
+SHM_FULL_BEFORE_ROS = """
+mount -t tmpfs -o size=64k tmpfs /dev/shm
+cat /dev/zero > /dev/shm/full 2> /dev/null || true
+"""
+# ROS 2 has run before: then LTTng's own page is there.
+SHM_FULL = """
+mount -t tmpfs -o size=64k tmpfs /dev/shm
+"$1" -c 'import rclpy'
+cat /dev/zero > /dev/shm/full 2> /dev/null || true
+"""
+SHM_READ_ONLY = 'mount -t tmpfs -o ro tmpfs /dev/shm'
+HOME_READ_ONLY = f'{SHM_OF_ITS_OWN}\nmount -t tmpfs -o ro tmpfs "$0/home"'
 
 
 class CannotRunError(Exception):
@@ -28,21 +40,37 @@ class CannotRunError(Exception):
 class Condition:
     """How the notebooks are run.
 
-    `mode` is one of tools/soak/plugin.py. `python()`, `before(folder)` and `environment(chance)`
-    return the interpreter, the words that stand before its command, and variables; they raise
-    CannotRunError. `beside()` surrounds the runs. Where a notebook cannot run, helpers.doctor must
-    say `sentence`.
+    `mode` is one of tools/soak/plugin.py, `mounts` the shell commands before a run. `python()` and
+    `variables(chance)` return the interpreter and environment variables; `beside()` surrounds the
+    run. Where a notebook cannot run, helpers.doctor must say `sentence`.
     """
 
     name: str
-    says: str
     mode: str = 'once'
     at_once: int = 1
+    cores: int | None = None
+    mounts: str = SHM_OF_ITS_OWN
     python: Callable[[], str] = lambda: sys.executable
-    before: Callable[[Path], list[str]] = lambda folder: []
-    environment: Callable[[random.Random], dict[str, str]] = lambda chance: {}
-    beside: Callable[[], AbstractContextManager] = field(default=nullcontext)
+    variables: Callable[[random.Random], dict[str, str]] = lambda chance: {}
+    beside: Callable[[], AbstractContextManager] = nullcontext
     sentence: str | None = None
+
+
+def sandbox(mounts: str, folder: Path) -> list[str]:
+    """Return the words before a command that let it see these mounts. Others do not see them.
+
+    Raises CannotRunError where this user may not mount.
+    """
+    user = ['--user', '--map-root-user'] if os.getuid() else []
+    words = ['unshare', *user, '--mount', 'sh', '-euc', f'{mounts}\nexec "$@"', str(folder)]
+    trial = subprocess.run(
+        [*words[:-2], f'{SHM_OF_ITS_OWN}\nexec "$@"', folder, 'true'],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    if trial.returncode:
+        raise CannotRunError(f'This user may not mount, root may: {trial.stderr.strip()}')
+    return words
 
 
 def python_of(version: str) -> str:
@@ -68,59 +96,14 @@ def python_of(version: str) -> str:
 @contextlib.contextmanager
 def busy_loops() -> Iterator[None]:
     """Keep all cores busy."""
-    loops = [subprocess.Popen([sys.executable, '-ISc', BUSY]) for _ in range(BUSY_LOOPS)]
+    command = [sys.executable, '-ISc', 'while True: pass']
+    loops = [subprocess.Popen(command) for _ in range(BUSY_LOOPS)]
     try:
         yield
     finally:
         for loop in loops:
             loop.kill()
             loop.wait()
-
-
-def one_core(folder: Path) -> list[str]:
-    """Give all processes of a run the same core."""
-    if not shutil.which('taskset'):
-        raise CannotRunError('There is no taskset: run `sudo apt install util-linux`.')
-    return ['taskset', '--cpu-list', str(min(os.sched_getaffinity(0)))]
-
-
-def mounted(commands: str) -> Callable[[Path], list[str]]:
-    """Return a `before` that changes what a run sees of the file system, for this run only."""
-
-    def before(folder: Path) -> list[str]:
-        if os.getuid():
-            raise CannotRunError('Only root may mount: run it as root, for example in a container.')
-        start = ['unshare', '--mount', 'sh', '-euc', f'{commands}\nexec "$@"', str(folder)]
-        try:
-            trial = subprocess.run([*start, 'true'], stderr=subprocess.PIPE, text=True)
-        except FileNotFoundError:
-            raise CannotRunError(
-                'There is no unshare: run `sudo apt install util-linux`.'
-            ) from None
-        if trial.returncode:
-            raise CannotRunError(f'This root may not mount: {trial.stderr.strip()}')
-        return start
-
-    return before
-
-
-# ROS 2 has run before: then LTTng's own page is there.
-FULL = """
-mount -t tmpfs -o size=64k tmpfs /dev/shm
-"$1" -c 'import rclpy'
-cat /dev/zero > /dev/shm/full 2> /dev/null || true
-"""
-FULL_BEFORE_ROS = """
-mount -t tmpfs -o size=64k tmpfs /dev/shm
-cat /dev/zero > /dev/shm/full 2> /dev/null || true
-"""
-READ_ONLY = """
-mount -t tmpfs -o ro tmpfs /dev/shm
-"""
-# $0 is the folder of the run, $1 the interpreter.
-HOME_READ_ONLY = """
-mount -t tmpfs -o ro tmpfs "$0/home"
-"""
 
 
 def abroad(chance: random.Random) -> dict[str, str]:
@@ -137,25 +120,20 @@ def abroad(chance: random.Random) -> dict[str, str]:
 
 
 CONDITIONS = [
-    Condition('idle', 'nothing else'),
+    Condition('idle'),
     *(
-        Condition(f'python{version}', f'Python {version}', python=lambda v=version: python_of(v))
-        for version in VERSIONS
+        Condition(f'python{version}', python=lambda v=version: python_of(v))
+        for version in ('3.11', '3.12', '3.13', '3.14')
     ),
-    Condition('busy', f'{BUSY_LOOPS} busy loops beside it', beside=busy_loops),
-    Condition('one-core', 'one core for all processes', before=one_core),
-    Condition('parallel', '8 notebooks at once', at_once=8),
-    Condition('abroad', 'another time zone, language and hash seed', environment=abroad),
-    Condition('twice', 'all cells, then all cells again in the same kernel', mode='twice'),
-    Condition('interrupt', 'each cell interrupted, then run again', mode='interrupt'),
-    Condition('kill', 'a kernel killed in a cell, then all cells in a fresh one', mode='kill'),
-    Condition('shm-full', '/dev/shm is full', before=mounted(FULL)),
-    Condition(
-        'shm-full-before',
-        '/dev/shm was full before ROS 2 ran for the first time',
-        before=mounted(FULL_BEFORE_ROS),
-        sentence='/dev/shm is full',
-    ),
-    Condition('shm-read-only', '/dev/shm cannot be written', before=mounted(READ_ONLY)),
-    Condition('home', 'the home cannot be written', before=mounted(HOME_READ_ONLY)),
+    Condition('busy', beside=busy_loops),
+    Condition('one-core', cores=1),
+    Condition('parallel', at_once=8),
+    Condition('abroad', variables=abroad),
+    Condition('twice', mode='twice'),
+    Condition('interrupt', mode='interrupt'),
+    Condition('kill', mode='kill'),
+    Condition('shm-full', mounts=SHM_FULL),
+    Condition('shm-full-before', mounts=SHM_FULL_BEFORE_ROS, sentence='/dev/shm is full'),
+    Condition('shm-read-only', mounts=SHM_READ_ONLY),
+    Condition('home', mounts=HOME_READ_ONLY),
 ]

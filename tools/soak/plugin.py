@@ -7,8 +7,9 @@ The comparison stays nbval's own, with the settings of pyproject.toml. `--soak-m
 - `interrupt`  each cell is interrupted at a random time, then run again and compared
 - `kill`       the kernel is killed in the middle of a random cell, then all cells in a fresh one
 
-After the last cell, in every mode, the kernel must have nothing that it had not at its start. A
-line of JSON for each cell goes to the file `--soak-report`.
+After the last cell, in every mode, the kernel must have nothing that it had not at its start; after
+the last notebook, nothing may be left of the run. A line of JSON for each cell goes to the file
+`--soak-report`.
 """
 
 from __future__ import annotations
@@ -27,35 +28,44 @@ import pytest
 from nbval.kernel import RunningKernel
 from nbval.plugin import IPyNbCell, IPyNbFile
 
-from tools.soak.leftovers import held_by, left_in_process
+from tools.soak.leftovers import adopt_orphans, left_by_processes, left_in_process, shared_memory
 
-MODES = ('once', 'twice', 'interrupt', 'kill')
 LOOK = """
 import json
-from tools.soak import leftovers
-print(json.dumps(leftovers.state_of_process()))
+from tools.soak.leftovers import state_of_process
+print(json.dumps(state_of_process()))
 """
 SHORTEST_S, LONGEST_S = 0.001, 10.0
 INTERRUPTED_TIMEOUT_S = 60.0
-ALIVE_EVERY_S = 1.0
 OUTPUT_TIMEOUT_S = 60.0  # of a kernel that is alive, on a busy machine
 REPLY_TIMEOUT_S = 2.0  # it was sent before the kernel became idle
 # From the second try on, the check of an exercise also prints hints. A fresh run has none.
 HINTS = re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE)
-
-KERNEL_LOST = (Empty, RuntimeError, ValueError)  # no answer, a dead kernel, a broken message
-
+# No answer, a dead kernel, a broken message.
+KERNEL_LOST = (Empty, TimeoutError, RuntimeError, ValueError)
 # In IPython's traceback: the top level of a module.
 IN_IMPORT = re.compile(r'^File (<frozen importlib|.+\.py:\d+$)', re.MULTILINE)
 COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
 
 
+# --- pytest's hooks ------------------------------------------------------------------------------
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options of this plugin."""
     group = parser.getgroup('soak')
-    group.addoption('--soak-mode', choices=MODES, default='once')
+    group.addoption('--soak-mode', choices=('once', 'twice', 'interrupt', 'kill'), default='once')
     group.addoption('--soak-seed', default='0')
     group.addoption('--soak-report', type=Path)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Report what the cells do; at the end, when all kernels have ended, what is left."""
+    if not hasattr(config, 'workerinput'):  # pytest-xdist's workers report to this process
+        adopt_orphans()
+        report = _Report(config.option.soak_report)
+        config.pluginmanager.register(report)
+        config.add_cleanup(report.end)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -66,46 +76,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         if mode == 'kill':
             items.append(Killed.from_parent(file, name='the kernel that is killed', cells=cells))
         if mode == 'interrupt':
-            items += [_like(cell, Interrupted, cell.name) for cell in cells]
-        else:
-            items += cells
+            cells = [_like(cell, Interrupted, cell.name) for cell in cells]
+        items += cells
         if mode == 'twice':
             items += [_like(cell, Again, f'{cell.name} again') for cell in cells]
         items.append(NothingLeft.from_parent(file, name='what is left in the kernel'))
-
-
-@pytest.hookimpl(trylast=True)
-def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Look at a kernel before its first cell."""
-    look_at(item.parent.kernel)
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Report to a file, where one is named."""
-    if config.option.soak_report:
-        config.pluginmanager.register(_Report(config.option.soak_report))
-
-
-class _Report:
-    """Writes one line of JSON for what was done, and for what failed before and after it."""
-
-    def __init__(self, file: Path) -> None:
-        self.file = file
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if report.when == 'call' or report.failed:
-            row = {
-                'item': _item(report.nodeid.rpartition('::')[2]),
-                'seconds': report.duration,
-                'failed': COLOURS.sub('', report.longreprtext) if report.failed else None,
-            }
-            with self.file.open('a', encoding='utf-8') as file:
-                print(json.dumps(row | dict(report.user_properties)), file=file)
-
-
-def _item(name: str) -> str:
-    """Return the name of an item, with nbval's `Cell 0` as the tests call it: `code cell 1`."""
-    return re.sub(r'^Cell (\d+)', lambda found: f'code cell {int(found[1]) + 1}', name)
 
 
 def _like(cell: IPyNbCell, kind: type[IPyNbCell], name: str) -> IPyNbCell:
@@ -114,19 +89,57 @@ def _like(cell: IPyNbCell, kind: type[IPyNbCell], name: str) -> IPyNbCell:
     )
 
 
+@pytest.hookimpl(trylast=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Look at a kernel before its first cell."""
+    look_at(item.parent.kernel)
+
+
+class _Report:
+    """Writes one line of JSON for what was done, and for what failed before and after it."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        self.killed_held: set[str] = set()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.when == 'call' or report.failed:
+            notebook, item = Path(report.location[0]).stem, report.nodeid.rpartition('::')[2]
+            properties = dict(report.user_properties)
+            self.killed_held |= set(properties.pop('killed_held', ()))
+            failed = COLOURS.sub('', report.longreprtext) if report.failed else None
+            self.write(notebook, item, failed, {'seconds': report.duration} | properties)
+
+    def end(self) -> None:
+        if left := left_by_processes(self.killed_held):
+            self.write(None, 'after the run', ' '.join(left), {})
+
+    def write(self, notebook: str | None, item: str, failed: str | None, more: dict) -> None:
+        # nbval's `Cell 0` is called as the tests call it: `code cell 1`.
+        item = re.sub(r'^Cell (\d+)', lambda found: f'code cell {int(found[1]) + 1}', item)
+        row = {'notebook': notebook, 'item': item, 'failed': failed} | more
+        with self.file.open('a', encoding='utf-8') as file:
+            print(json.dumps(row), file=file)
+
+
+# --- What is done to a kernel --------------------------------------------------------------------
+
+
 def state_of(kernel: RunningKernel) -> dict:
     """Return `state_of_process` of a kernel."""
-    message = kernel.execute_cell_input(LOOK, allow_stdin=False)
-    await_reply(kernel, message, OUTPUT_TIMEOUT_S)
-    text = ''
-    while True:
-        answer = kernel.get_message('iopub', timeout=OUTPUT_TIMEOUT_S)
-        if answer['parent_header'].get('msg_id') != message:
-            continue
-        if answer['msg_type'] == 'stream':
-            text += answer['content']['text']
-        if answer['content'].get('execution_state') == 'idle':
-            return json.loads(text)
+    printed = []
+
+    def keep(message: dict) -> None:
+        printed.append(message['content'].get('text', ''))
+
+    kernel.kc.execute_interactive(
+        LOOK,
+        store_history=False,
+        allow_stdin=False,
+        timeout=OUTPUT_TIMEOUT_S,
+        output_hook=keep,
+    )
+    return json.loads(''.join(printed))
 
 
 def look_at(kernel: RunningKernel) -> None:
@@ -135,19 +148,24 @@ def look_at(kernel: RunningKernel) -> None:
         kernel.soak_before = state_of(kernel)
 
 
-def run_to(file: IPyNbFile, end: int) -> None:
-    """Run the first `end` code cells of a notebook."""
-    cells = [cell for cell in file.nb.cells if cell.cell_type == 'code']
-    for cell in cells[:end]:
-        message = file.kernel.execute_cell_input(cell.source, allow_stdin=False)
-        await_reply(file.kernel, message, file.config.option.nbval_cell_timeout)
+def left_in(kernel: RunningKernel) -> str:
+    """Return sentences for what a kernel has now and had not at its start."""
+    return ' '.join(left_in_process(kernel.soak_before, state_of(kernel)))
 
 
-def restart(file: IPyNbFile) -> None:
-    """Give a notebook a fresh kernel."""
+def fresh_kernel(file: IPyNbFile, cells_to_run: int = 0) -> None:
+    """Give a notebook a fresh kernel that has run its first code cells."""
     file.kernel.stop()
     file.setup()
     look_at(file.kernel)
+    run_first(file, cells_to_run)
+
+
+def run_first(file: IPyNbFile, count: int) -> None:
+    """Run the first code cells of a notebook."""
+    for cell in [cell for cell in file.nb.cells if cell.cell_type == 'code'][:count]:
+        message = file.kernel.execute_cell_input(cell.source, allow_stdin=False)
+        await_reply(file.kernel, message, file.config.option.nbval_cell_timeout)
 
 
 def begin(kernel: RunningKernel, source: str) -> str:
@@ -169,18 +187,12 @@ def await_reply(kernel: RunningKernel, message: str, timeout_s: float) -> dict:
             return answer['content']
 
 
-def held_by_kernel(kernel: RunningKernel) -> list[str]:
-    """Return the shared memory that a kernel and what it has started use."""
-    process = psutil.Process(kernel.km.provisioner.pid)
-    return sorted(held_by([process, *process.children(recursive=True)]))
-
-
 def await_idle(kernel: RunningKernel, message: str) -> None:
     """Wait for the end of an interrupted message. Raises one of KERNEL_LOST."""
     deadline = time.monotonic() + INTERRUPTED_TIMEOUT_S
     while kernel.is_alive():
         with suppress(Empty):
-            kernel.await_idle(message, ALIVE_EVERY_S)
+            kernel.await_idle(message, 1)
             return
         if time.monotonic() > deadline:
             raise Empty(f'the cell had not ended {INTERRUPTED_TIMEOUT_S:g} s later')
@@ -219,13 +231,12 @@ class Interrupted(Again):
         except KERNEL_LOST:
             # ipykernel does so by itself (environment.md). What a lesson does wrong, it does twice.
             self.user_properties.append(('kernel_lost', True))
-            with suppress(psutil.Error):  # it has ended
-                self.user_properties.append(('killed_held', held_by_kernel(self.parent.kernel)))
-            self._fresh_kernel()
+            self.user_properties.append(('killed_held', sorted(shared_memory())))
+            fresh_kernel(self.parent, self.cell_num)
             try:
                 self._interrupt(after_s)
             except KERNEL_LOST as error:
-                self._fresh_kernel()  # for the cells that follow
+                fresh_kernel(self.parent, self.cell_num)  # for the cells that follow
                 self.raise_cell_error(f'Run for {after_s:.3f} s. The kernel is lost: {error!r}')
         started = time.monotonic()
         super().runtest()
@@ -242,14 +253,8 @@ class Interrupted(Again):
             self.user_properties.append(('interrupted_after_s', after_s))
             kernel.interrupt()
             traceback = self._end(message, after_s)
-        kernel = self.parent.kernel
-        left = left_in_process(kernel.soak_before, state_of(kernel))
-        if left:
-            self.raise_cell_error(f'Run for {after_s:.3f} s. {" ".join(left)}', traceback)
-
-    def _fresh_kernel(self) -> None:
-        restart(self.parent)
-        run_to(self.parent, self.cell_num)
+        if left := left_in(self.parent.kernel):
+            self.raise_cell_error(f'Run for {after_s:.3f} s. {left}', traceback)
 
     def _end(self, message: str, after_s: float) -> str | None:
         """Wait for the end of the interrupted cell and return its traceback."""
@@ -268,7 +273,7 @@ class Interrupted(Again):
         if IN_IMPORT.search(traceback):
             # Python cannot repeat a half-done import of NumPy: environment.md says to restart.
             self.user_properties.append(('import_interrupted', True))
-            self._fresh_kernel()
+            fresh_kernel(self.parent, self.cell_num)
         elif reply['ename'] != 'KeyboardInterrupt':
             self.raise_cell_error(
                 f'Interrupted after {after_s:.3f} s, it raised {reply["ename"]}: {reply["evalue"]}',
@@ -302,7 +307,7 @@ class Killed(_OfNotebook):
         """Run the cells up to a random one, kill the kernel in it, and start a fresh kernel."""
         chance, kernel = chance_of(self), self.parent.kernel
         last, after_s = chance.randrange(len(self.cells)), random_time_s(chance)
-        run_to(self.parent, last)
+        run_first(self.parent, last)
         message = begin(kernel, self.cells[last].cell.source)
         with suppress(Empty):  # it is in the middle
             await_reply(kernel, message, after_s)
@@ -311,10 +316,10 @@ class Killed(_OfNotebook):
         self.user_properties += [
             ('killed_in_cell', last + 1),
             ('killed_after_s', after_s),
-            ('killed_held', held_by_kernel(kernel)),
+            ('killed_held', sorted(shared_memory())),
         ]
         process.kill()
-        restart(self.parent)
+        fresh_kernel(self.parent)
 
 
 class NothingLeft(_OfNotebook):
@@ -322,8 +327,5 @@ class NothingLeft(_OfNotebook):
 
     def runtest(self) -> None:
         """Fail with a sentence for each thing that is left."""
-        kernel = self.parent.kernel
-        now = state_of(kernel)
-        self.user_properties.append(('domain_ids', now['domain_ids']))
-        if left := left_in_process(kernel.soak_before, now):
-            raise AssertionError(' '.join(left))
+        if left := left_in(self.parent.kernel):
+            raise AssertionError(left)
