@@ -304,6 +304,11 @@ def _knows_found(source: Source) -> bool:
     return 'ament_cmake_auto' not in found and not any('$' in name for name in found)
 
 
+def _has_ament_cmake(packages: set[str]) -> bool:
+    """Is ament_cmake among these packages, or one that brings it, such as ament_cmake_ros?"""
+    return any(package.startswith('ament_cmake') for package in packages)
+
+
 def _not_listed(source: Source) -> list[str]:
     listed = source.cmake.files
     known = listed and not any('$' in file for file in listed)
@@ -342,7 +347,7 @@ def _not_named(source: Source) -> list[str]:
 
 CMAKE_RULES = [
     Rule(
-        lambda source: _knows_found(source) and 'ament_cmake' not in source.cmake.found,
+        lambda source: _knows_found(source) and not _has_ament_cmake(source.cmake.found),
         'find_package(ament_cmake REQUIRED)',
         'it builds, only because rosidl_default_generators brings ament_cmake with it; without '
         'both: Unknown CMake command "ament_package"',
@@ -407,7 +412,7 @@ MANIFEST_RULES = [
         '"ros2 interface show" says "Unknown package {name!r}"',
     ),
     Rule(
-        lambda source: 'ament_cmake' not in _depends(source.manifest, 'buildtool', 'build'),
+        lambda source: not _has_ament_cmake(_depends(source.manifest, 'buildtool', 'build')),
         '<buildtool_depend>ament_cmake</buildtool_depend>',
         ONLY_WHERE_INSTALLED.format('ament_cmake is', 'ament_cmake'),
     ),

@@ -242,6 +242,12 @@ def test_a_package_that_is_used_and_nowhere_named(package):
     assert findings[1].error.startswith('with DEPENDENCIES alone: "the passed dependency')
 
 
+def test_ament_cmake_ros_brings_ament_cmake(package):
+    files = edited('CMakeLists.txt', 'ament_cmake REQ', 'ament_cmake_ros REQ')
+    files |= edited('package.xml', 'ament_cmake</buildtool', 'ament_cmake_ros</buildtool')
+    assert check_package(package(files)) == ()
+
+
 def test_what_comes_with_others_is_not_asked_for(package):
     # service_msgs brings builtin_interfaces to each service, and sensor_msgs brings std_msgs.
     srv = 'builtin_interfaces/Time at\nstd_msgs/Header header\n---\nsensor_msgs/Image image\n'
