@@ -487,12 +487,12 @@ def exercises_checked(notebook: NotebookNode) -> list[str]:
     for name, cells in exercises(notebook).items():
         check = [cell for cell in cells if 'check' in tags(cell)]
         solution = [cell for cell in cells if 'solution' in tags(cell)]
-        missing = sum(printed(cell, '[missing]') for cell in check)
+        missing = sum(printed(cell, '[not yet]') for cell in check)
         points = missing + sum(printed(cell, '[ok]') for cell in check)
         passed = sum(printed(cell, '[ok]') for cell in solution)
         if not missing:
             found.append(f'{name!r}: its check finds nothing missing in the starter.')
-        if passed != points or any(printed(cell, '[missing]') for cell in solution):
+        if passed != points or any(printed(cell, '[not yet]') for cell in solution):
             found.append(f'{name!r}: its solution does not pass all {points} points of the check.')
     return found
 

@@ -57,8 +57,8 @@ line = axes.plot([random.random() for _ in range(9)])
 describe(axes, 'A line through <nine> "points".')"""
 ANSWERS = ['It keeps the newest.', 'It keeps the oldest.', 'It keeps none.']
 SOLUTION = '# Solution of exercise 1\ndepth = 20\ncheck_depth(depth)'
-PASSED = '[ok] depth is 20\n[ok] none is lost\nSolution: 2 of 2. All done.\n'
-FAILED = '[missing] depth is 20\n[ok] none is lost\nExercise {} of lesson 02: 1 of 2.\n'
+PASSED = '[ok] depth is 20\n[ok] none is lost\nSolution: 2 of 2.\n'
+FAILED = '[not yet] depth is 20\n[ok] none is lost\nExercise {} of lesson 02: 1 of 2.\n'
 ALT = 'One dot for each of 41 messages. Some were lost.'
 
 

@@ -65,15 +65,15 @@ def test_fail_and_then_solve_an_exercise(lab):
     lab.run_all()
     starter = lab.find('exercise', 'depth_for_the_burst')
     check = lab.find('check', 'check_burst')
-    assert '[missing]' in printed(lab.cells()[check])
+    assert '[not yet]' in printed(lab.cells()[check])
     again = lab.run(check)
-    assert '[missing]' in again
+    assert '[not yet]' in again
     assert 'Hint' in again
     lab.screenshot('exercise_missing')
     lab.write(starter, 'depth_for_the_burst = 28')
     lab.run(starter)
     solved = lab.run(check)
-    assert '[missing]' not in solved
+    assert '[not yet]' not in solved
     assert 'All done.' in solved
 
 

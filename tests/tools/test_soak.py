@@ -186,7 +186,7 @@ def test_a_kernel_that_an_interrupt_ends_is_given_a_second_try(lesson, tmp_path,
 
 
 def test_the_hints_of_a_second_try_are_not_compared():
-    first = '[missing] the depth is 10\n    (NameError: it\n[ok] all\nExercise 1: 1 of 2.\n'
+    first = '[not yet] the depth is 10\n    (NameError: it\n[ok] all\nExercise 1: 1 of 2.\n'
     hint = '    Hint: count the messages\n          that wait.\n'
     head, rest = first.split('[ok]')
     assert HINTS.sub('', f'{head}{hint}[ok]{rest}') == first
