@@ -23,4 +23,4 @@ if ! cmp -s tools/hub/package-lock.json "$proxy/package-lock.json"; then
 fi
 
 # The build of lesson 07 would do this, but a student may not write into .venv.
-.venv/bin/python -c 'from helpers.workspace import mend_wheels; mend_wheels()'
+.venv/bin/python -c 'from helpers.workspace.wheels import fix_wheels; fix_wheels()'

@@ -1,0 +1,17 @@
+"""A colcon workspace for a notebook: write its files, build it, read the error, use it, run it.
+
+What builds is the real `colcon build`, and what runs is a real process. This package adds what a
+terminal gives and a running kernel lacks: a clean environment, the effect of
+`source install/setup.bash`, and an end for every process.
+
+    workspace     what lessons import: `Workspace`, and `%%write`
+    folders       where a workspace lies, and that no two kernels share one
+    wheels        CMake files of the ROS 2 wheels, made to fit this machine
+    processes     a process that prints lines, and ends
+    build_output  what a build says, and which of its lines matter
+    sourcing      what `source install/setup.bash` gives, for a kernel that already runs
+"""
+
+from helpers.workspace.workspace import Workspace
+
+__all__ = ['Workspace']

@@ -1,0 +1,286 @@
+"""The workspace of a notebook, and the cell magic that writes its files."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import re
+import shutil
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path, PurePosixPath
+
+from helpers.build_tools import build_environment, build_tools, from_wheels
+from helpers.interrupts import uninterrupted
+from helpers.progress_bar import ProgressBar
+from helpers.session import graph_environment
+from helpers.workspace.build_output import BuildResult, read_result
+from helpers.workspace.folders import claim
+from helpers.workspace.processes import POLL_S, Process
+from helpers.workspace.sourcing import source, use
+from helpers.workspace.wheels import fix_wheels
+
+CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
+
+_open_workspace: Workspace | None = None
+
+
+class Workspace:
+    """A colcon workspace of this notebook, empty when it is made: `Workspace('lesson_06')`.
+
+    It lies in the folder `scratch` of this checkout, which git ignores. Where another kernel has a
+    workspace of this name, another folder is taken, so that the two do not meet. `path` is the
+    folder; all paths that this class takes and prints are relative to it.
+
+    Raises ValueError for a name that is not letters, digits, `_` and `-`.
+    """
+
+    def __init__(self, name: str) -> None:
+        global _open_workspace
+        if not isinstance(name, str) or not re.fullmatch(r'[A-Za-z0-9_-]+', name):
+            raise ValueError(
+                f'A workspace is named with letters, digits, _ and -, for example '
+                f"Workspace('lesson_06'), not {name!r}."
+            )
+        _close()
+        self.path = claim(name)
+        self._processes: dict[tuple[str, ...], Process] = {}
+        self._sourced: dict[str, str] | None = None
+        if self.path.exists():
+            with uninterrupted():  # rmtree makes an OSError of an Interrupt
+                shutil.rmtree(self.path)
+        (self.path / 'src').mkdir(parents=True)
+        _open_workspace = self
+        _register_in_ipython()
+
+    # --- Files ---
+
+    def file(self, relative_path: str | os.PathLike) -> Path:
+        """Return the path of a file in this workspace. Raises ValueError where it is outside."""
+        path = PurePosixPath(relative_path)
+        if path.is_absolute() or '..' in path.parts or not path.parts:
+            raise ValueError(
+                'Give a path inside the workspace, for example src/my_package/package.xml, '
+                f'not {str(relative_path)!r}.'
+            )
+        return self.path / path
+
+    def write(self, relative_path: str | os.PathLike, text: str) -> None:
+        """Write a file of the workspace, and the folders above it."""
+        file = self.file(relative_path)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding='utf-8')
+
+    def print_tree(self, relative_path: str = 'src', hide: Sequence[str] = ()) -> None:
+        """Print the files below a folder of the workspace. `hide` holds patterns such as '*.zsh'.
+
+        A folder with nothing but one folder stands in one line with it. Raises ValueError where
+        there is no such folder.
+        """
+        top = self.file(relative_path)
+        if not top.is_dir():
+            raise ValueError(f'There is no folder {relative_path!r} in this workspace.')
+        print(f'{relative_path}/')
+        _print_below(top, ('__pycache__', *hide), '  ')
+
+    # --- Build ---
+
+    def build(self, *packages: str, cmake_args: Sequence[str] = ()) -> BuildResult:
+        """Run `colcon build` on all packages, or with `--packages-select` on these.
+
+        A build that fails is a result, not an exception: print it. Raises RuntimeError where this
+        machine lacks a tool, with the command that installs it; ValueError for what is not the name
+        of a package.
+        """
+        for package in packages:
+            if not isinstance(package, str) or not re.fullmatch(r'[A-Za-z][\w-]*', package):
+                raise ValueError(
+                    f"A package is given by its name, for example build('my_package'), "
+                    f'not {package!r}.'
+                )
+        with_cmake = any(self.path.glob('src/**/CMakeLists.txt'))
+        for tool in build_tools(with_cmake):
+            if not tool.found:
+                raise RuntimeError(
+                    f'Missing for this build: {tool.name}. Run `{tool.install}`, then run this '
+                    'cell again.'
+                )
+        if with_cmake and from_wheels():
+            fix_wheels()
+        self._sourced = None
+        command = ['colcon', 'build', *(['--packages-select', *packages] if packages else [])]
+        settings = ['--event-handlers', 'console_direct+', 'desktop_notification-', 'status-']
+        # Without it, CMake takes the newest Python on the PATH.
+        settings += ['--cmake-args', f'-DPython3_EXECUTABLE={sys.executable}', *cmake_args]
+        total = len(packages) or len(list(self.path.glob('src/**/package.xml'))) or 1
+        output = self._colcon([*command[1:], *settings], total)
+        return read_result(self.path, ' '.join(command), packages, output)
+
+    def _colcon(self, arguments: list[str], total: int) -> list[str]:
+        """Run colcon in the workspace with a progress bar, and return the lines it printed."""
+        # The entry point, because the script `colcon` may be of another environment.
+        main = 'import sys; from colcon_core.command import main; sys.exit(main())'
+        command = [sys.executable, '-c', main, '--log-base', 'log', *arguments]
+        environment = build_environment()
+        colcon = None
+        try:
+            with uninterrupted():
+                # Killed, it would leave compilers without an owner: rather it builds to its end.
+                colcon = Process('colcon', command, environment, self.path, ends_with_kernel=False)
+            started = time.monotonic()
+            with ProgressBar(lambda: _packages_done(colcon.lines) / total) as bar:
+                while colcon.running:
+                    time.sleep(POLL_S)
+                    bar.update(time.monotonic() - started)
+        finally:
+            if colcon is not None:
+                colcon.stop()
+        return colcon.lines
+
+    # --- Use ---
+
+    def environment(self) -> dict[str, str]:
+        """Return the environment of a terminal that has sourced `install/setup.bash`.
+
+        Raises RuntimeError where nothing has been built.
+        """
+        if self._sourced is None:
+            self._sourced = source(self.path)
+        return dict(self._sourced)
+
+    def use(self) -> None:
+        """Make what was built importable in this kernel, as `source install/setup.bash` would.
+
+        A package of pure Python that was built again replaces the old one at the next import.
+        Raises RuntimeError where a package with libraries (every interface package) was built again
+        and has changed: a process cannot give a loaded library back. Then restart the kernel.
+        """
+        use(self.path / 'install', self.environment())
+
+    # --- Run ---
+
+    def run(self, package: str, executable: str, *arguments: str, sourced: bool = True) -> Process:
+        """Start an executable as `ros2 run` does, and return the running process.
+
+        It has the sourced environment, and the open session's domain id and discovery range (this
+        kernel's, where no session is open). What it prints is collected.
+        It ends with its `with` block, with `stop()`, when the same is run again, when a cell is
+        interrupted, and with the kernel. `sourced=False` leaves `install/setup.bash` out.
+
+        Where the package or the executable is not there, the process has printed what `ros2 run`
+        prints, and has ended with 1.
+        """
+        environment = self.environment() if sourced else build_environment()
+        environment |= graph_environment() | {
+            'ROS_LOG_DIR': str(self.path / 'log' / 'ros'),  # not the home: it may be read-only
+            'PYTHONUNBUFFERED': '1',
+            # Without the time stamp.
+            'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] [{name}]: {message}',
+        }
+        key = (package, executable, *arguments)
+        if key in self._processes:
+            self._processes[key].stop()
+        try:
+            command, found = _command(package, executable, environment), True
+        except LookupError as error:
+            command, found = ['/bin/sh', '-c', 'echo "$0"; exit 1', str(error)], False
+        with uninterrupted():
+            process = Process(executable, [*command, *arguments], environment, self.path)
+            self._processes[key] = process
+        if not found:
+            process.wait()
+        return process
+
+    def close(self) -> None:
+        """End every process of this workspace. Its files stay until it is made again."""
+        for process in self._processes.values():
+            process.stop()
+        self._processes.clear()
+
+
+def _print_below(folder: Path, hide: Sequence[str], indent: str) -> None:
+    def shown(folder: Path) -> list[Path]:
+        found = [item for item in folder.iterdir() if not any(item.match(x) for x in hide)]
+        return sorted(found, key=lambda item: (item.is_dir(), item.name))
+
+    for item in shown(folder):
+        name = item.name
+        while item.is_dir() and len(below := shown(item)) == 1 and below[0].is_dir():
+            item = below[0]
+            name += f'/{item.name}'
+        name = re.sub(r'\bpython3\.\d+\b', 'python3', name)  # the same on every machine
+        print(f'{indent}{name}{"/" if item.is_dir() else ""}')
+        if item.is_dir():
+            _print_below(item, hide, f'{indent}  ')
+
+
+def _packages_done(lines: Sequence[str]) -> float:
+    """Return how many packages colcon has built, with the part of the current one."""
+    done, part = 0, 0.0
+    for line in lines:
+        if line.startswith(('Finished <<<', 'Failed   <<<')):
+            done, part = done + 1, 0.0
+        elif re.match(r'-- Configuring done( \(|$)', line):
+            part = CONFIGURE_SHARE
+        elif made := re.match(r'\[ *(\d+)%\]', line):
+            part = CONFIGURE_SHARE + (1 - CONFIGURE_SHARE) * int(made[1]) / 100
+    return done + part
+
+
+def _command(package: str, executable: str, environment: dict[str, str]) -> list[str]:
+    """Return the command of an executable. Raises LookupError with what `ros2 run` says."""
+    for prefix in environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
+        marker = Path(prefix) / 'share/ament_index/resource_index/packages' / package
+        if not prefix or not marker.is_file():
+            continue
+        file = Path(prefix) / 'lib' / package / executable
+        if not file.is_file() or not os.access(file, os.X_OK):
+            raise LookupError('No executable found')
+        with file.open('rb') as opened:
+            first_line = opened.readline()
+        # The first line of a script cannot name an interpreter whose path has a space.
+        named = first_line.startswith(b'#!') and os.fsencode(sys.executable) in first_line
+        return [sys.executable, str(file)] if named and ' ' in sys.executable else [str(file)]
+    raise LookupError(f"Package '{package}' not found")
+
+
+# --- In a notebook -------------------------------------------------------------------------------
+
+
+def write(line: str, cell: str) -> None:
+    """`%%write PATH`: write the rest of the cell to a file of the open workspace."""
+    from IPython.core.error import UsageError
+
+    if _open_workspace is None:
+        raise UsageError("Open a workspace first: workspace = Workspace('my_lesson').")
+    path = line.strip().strip('\'"')
+    try:
+        _open_workspace.write(path, cell)
+    except (ValueError, OSError) as error:
+        raise UsageError(str(error)) from error
+    print(f'Wrote {path}')
+
+
+def _after_cell(result) -> None:
+    """End the processes when a cell was interrupted."""
+    if isinstance(result.error_in_exec, KeyboardInterrupt):
+        _close()
+
+
+def _register_in_ipython() -> None:
+    try:
+        from IPython import get_ipython
+    except ImportError:
+        return
+    shell = get_ipython()
+    if shell is None or 'write' in shell.magics_manager.magics['cell']:
+        return
+    shell.register_magic_function(write, 'cell')
+    shell.events.register('post_run_cell', _after_cell)
+
+
+@atexit.register
+def _close() -> None:
+    if _open_workspace is not None:
+        _open_workspace.close()

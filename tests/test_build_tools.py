@@ -1,0 +1,63 @@
+"""The tools and the environment of a build."""
+
+import os
+import sys
+
+from support.packages import HOSTILE
+
+from helpers import build_tools as module
+from helpers.build_tools import build_environment, build_tools
+
+
+def set_hostile(monkeypatch) -> None:
+    for name, value in HOSTILE.items():
+        monkeypatch.setenv(name, value)
+
+
+def missing(**options) -> list[str]:
+    return [tool.name for tool in build_tools(**options) if not tool.found]
+
+
+def test_nothing_that_was_set_for_other_work_reaches_a_build(monkeypatch):
+    set_hostile(monkeypatch)
+    monkeypatch.setenv('LD_LIBRARY_PATH', f'{sys.prefix}/lib:/opt/ros/humble/lib:lib')
+    monkeypatch.setenv('HTTPS_PROXY', 'proxy')
+    seen = build_environment()
+    assert not HOSTILE.items() & seen.items()
+    assert HOSTILE.keys() & seen.keys() == {'AMENT_PREFIX_PATH'}
+    assert seen['AMENT_PREFIX_PATH'] == sys.prefix
+    assert seen['LD_LIBRARY_PATH'] == f'{sys.prefix}/lib'
+    assert seen['HTTPS_PROXY'] == 'proxy'
+    assert seen['PATH'].startswith(f'{os.path.dirname(sys.executable)}:')
+    assert seen['VIRTUAL_ENV'] == sys.prefix
+    assert seen['MAKEFLAGS'] == f'-j{len(os.sched_getaffinity(0))} -O'
+
+
+def test_without_the_wheels_the_sourced_ros_is_the_one_to_build_with(monkeypatch):
+    set_hostile(monkeypatch)
+    monkeypatch.setattr(module, 'from_wheels', lambda: False)
+    kept = HOSTILE.items() & build_environment().items()
+    assert {name for name, _ in kept} == {
+        'AMENT_PREFIX_PATH',
+        'CMAKE_PREFIX_PATH',
+        'FASTDDS_BUILTIN_TRANSPORTS',
+        'FASTRTPS_DEFAULT_PROFILES_FILE',
+        'PYTHONPATH',
+        'RMW_IMPLEMENTATION',
+    }
+
+
+def test_the_tools_that_a_machine_lacks(monkeypatch, tmp_path):
+    assert missing() == []
+    assert [tool.name for tool in build_tools(cmake=False)] == ['colcon']
+    # CMake belongs to this Python.
+    monkeypatch.setenv('PATH', str(tmp_path))
+    assert missing() == ['C++ compiler', 'make']
+    (tmp_path / 'cc').symlink_to('/bin/sh')
+    assert missing() == ['C++ compiler', 'make']
+    monkeypatch.setenv('CXX', '/bin/sh')
+    assert missing() == ['make']
+    monkeypatch.setattr(module.sysconfig, 'get_path', lambda kind: '/nowhere')
+    assert missing() == ['make', 'Python headers']
+    python = f'python{sys.version_info.major}.{sys.version_info.minor}'
+    assert build_tools()[-1].install == f'sudo apt install {python}-dev'
