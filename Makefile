@@ -94,10 +94,10 @@ open_lab = settings="$(JUPYTER_CONFIG_DIR)/lab/$(if $(filter true,$(1)),presente
 	$(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
 
 # What you have set for other work stays out: another ROS 2 that is sourced, Python's and Jupyter's
-# variables, the settings in your home folder. JupyterLab's state of this course is in .jupyter.
+# variables, the settings in your home folder. What must not reach a build stands in
+# helpers/build_tools.py. JupyterLab's state of this course is in .jupyter.
 unexport $(filter PYTHON% ROS_% RMW_% RCUTILS_% FASTDDS_% FASTRTPS_% JUPYTER% IPYTHON% \
-	_ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH COLCON_% CMAKE_PREFIX_PATH \
-	VIRTUAL_ENV MPLBACKEND,$(.VARIABLES))
+	_ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH VIRTUAL_ENV MPLBACKEND,$(.VARIABLES))
 ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
 # The libraries of that other ROS 2. The wheels set their own path.
 unexport LD_LIBRARY_PATH
