@@ -28,6 +28,8 @@ def run(lost=(), delay_s=0.01, overlap=False):
 
 
 DRAW = {
+    'sequence_gaps with depth': lambda table: plots.sequence_gaps(table, depth=3),
+    'timeline with depth': lambda table: plots.timeline(table, depth=3),
     'sequence_gaps': plots.sequence_gaps,
     'before_and_after': lambda table: plots.before_and_after(table, table, ('a', 'b')),
     'timeline': plots.timeline,
@@ -88,6 +90,7 @@ def test_the_result_of_a_run_is_said(draw):
 def test_losses_and_overlaps_in_words():
     assert 'None was lost.' in said(plots.sequence_gaps, run())
     assert 'Some were lost: crosses.' in said(plots.sequence_gaps, run(lost=[3]))
+    assert '3 numbers later' in said(plots.sequence_gaps, run(lost=[3]), None, 3)
     assert 'All were lost: crosses.' in said(plots.sequence_gaps, run(lost=range(12)))
     assert 'No two callbacks overlap.' in said(plots.timeline, run())
     assert 'Some callbacks overlap.' in said(plots.timeline, run(overlap=True))

@@ -63,6 +63,10 @@ def points_of(ax):
     return {scatter.get_label(): scatter.get_offsets().data for scatter in scatters}
 
 
+def points_of_all(ax):
+    return [c.get_offsets().data for c in ax.collections if isinstance(c, PathCollection)]
+
+
 def words_of(ax):
     return [text.get_text() for text in ax.texts if text.get_text()]
 
@@ -193,6 +197,20 @@ def test_marks_stand_where_the_table_says(slow, parallel):
     assert plots.sequence_gaps(parallel).get_title(loc='left') == 'Messages: none lost'
 
 
+def test_with_the_depth_a_message_is_lost_where_the_one_that_pushed_it_out_came():
+    nan = np.nan  # depth 2: 3 pushes out 1, 4 pushes out 2; 5 and 6 still wait at the end
+    table = table_of([0.0, nan, nan, 0.2, 0.3, nan, nan])
+    ax = plots.sequence_gaps(table, depth=2)
+    p = PERIOD_S
+    np.testing.assert_allclose(points_of(ax)['lost 4'][:2], [(3 * p, 1), (4 * p, 2)])
+    waits, lost_waits, joined = (lines.get_segments() for lines in ax.collections[:3])
+    assert len(waits) == 3
+    np.testing.assert_allclose(lost_waits[:2], [[(p, 1), (3 * p, 1)], [(2 * p, 2), (4 * p, 2)]])
+    np.testing.assert_allclose(joined[:2], [[(3 * p, 1), (3 * p, 3)], [(4 * p, 2), (4 * p, 4)]])
+    # Those that still wait have nobody who pushed them out. Their cross is where they came.
+    np.testing.assert_allclose(points_of(ax)['lost 4'][2:], [(5 * p, 5), (6 * p, 6)])
+
+
 def test_lost_differ_in_colour_and_in_shape(slow):
     _, published, heard, lost = plots.sequence_gaps(slow).collections
     assert len({to_hex(c.get_edgecolor()[0]) for c in (published, heard, lost)}) == 3
@@ -296,6 +314,24 @@ def test_groups_differ_in_colour_and_in_hatch_and_share_the_lanes_of_threads(slo
     assert all(len(set(each)) == 5 for each in zip(*looks, strict=True))
     assert looks == [(p.get_facecolor(), p.get_hatch()) for p in ax.get_legend().get_patches()]
     assert [bars[0][2] for bars in bars_of(ax).values()] == [0, 0, 1, 1, 2]
+
+
+def test_with_the_depth_a_timeline_shows_which_messages_wait(slow):
+    ax = plots.timeline({'exclusive': slow}, depth=10)
+    assert [label.get_text() for label in ax.get_yticklabels()] == ['worker 1', 'waiting']
+    callbacks, *waits = ax.containers
+    assert callbacks.get_label() == 'exclusive'
+    bars = [(b.get_y(), b.get_x(), b.get_x() + b.get_width()) for (b,) in waits]
+    left_s = slow.started_s.fillna(slow.published_s.shift(-10))
+    np.testing.assert_allclose([bar[1:] for bar in bars], np.array([slow.published_s, left_s]).T)
+    lanes = pd.DataFrame(sorted(bars), columns=['lane', 'entered', 'left'])
+    assert lanes.lane.nunique() == 10
+    for _, lane in lanes.groupby('lane'):  # in each place one after the other
+        assert (lane.entered[1:].to_numpy() >= lane.left[:-1] - 1e-9).all()
+    crosses = np.concatenate([*points_of_all(ax)])
+    np.testing.assert_allclose(sorted(crosses[:, 0]), sorted(left_s[slow.started_s.isna()]))
+    assert min(lanes.lane) > callbacks[0].get_y() + callbacks[0].get_height()
+    assert ax.get_ylim()[0] > max(lanes.lane)
 
 
 def test_span_shows_a_part(slow):

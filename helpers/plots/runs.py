@@ -29,6 +29,7 @@ from helpers.plots.style import (
     GROUP_HATCHES,
     HEARD,
     INK,
+    LOST,
     LOST_TEXT,
     NORMAL,
     PALE,
@@ -51,28 +52,38 @@ TIME_LABEL = 'time since the first publish (s)'
 # The descriptions in words: nbval compares them, so no number that moves may be in them.
 
 
-def sequence_gaps(table: pd.DataFrame, title: str | None = None, ax: Axes | None = None) -> Axes:
+def sequence_gaps(
+    table: pd.DataFrame,
+    title: str | None = None,
+    depth: int | None = None,
+    ax: Axes | None = None,
+) -> Axes:
     """Draw what was published and what was heard: sequence number over time.
 
-    A small dot is a message at the time it was published, a large dot the start of its callback,
-    a cross a message that was lost, at the time it was published. The line from a small dot to its
-    large one is the time that the message waited. Draws into `ax`, or into a new figure.
+    A small dot is a message at the time it was published, a large dot the start of its callback.
+    The line from the small dot to the large one is the time that the message waited.
 
-    Raises TypeError or ValueError for a bad table.
+    A cross is a message that was lost. With `depth`, that of the subscription's KEEP_LAST queue, it
+    stands where the message was pushed out, and a dotted line joins it with the message that did
+    it, the `depth`-th newer one. Without, it stands where the message was published.
+
+    Draws into `ax`, or into a new figure. Raises TypeError or ValueError for a bad table.
     """
     table = check_table(table)
     ax = ax or new_axes()
-    _draw_gaps(ax, table, title or f'Messages: {_loss(table)}')
-    describe(ax, _gaps_in_words(table), title or '')
+    _draw_gaps(ax, table, title or f'Messages: {_loss(table)}', depth)
+    describe(ax, _gaps_in_words(table, depth), title or '')
     _label_gaps(ax, table)
     return ax
 
 
-def before_and_after(before: pd.DataFrame, after: pd.DataFrame, labels: tuple[str, str]) -> Figure:
+def before_and_after(
+    before: pd.DataFrame, after: pd.DataFrame, labels: tuple[str, str], depth: int | None = None
+) -> Figure:
     """Draw the sequence gaps of two runs beside each other, on the same axes.
 
-    Each title has its label, and says how many messages the run lost. Returns the Figure, since it
-    has two Axes.
+    Each title has its label, and says how many messages the run lost. `depth` is that of
+    `sequence_gaps`. Returns the Figure, since it has two Axes.
 
     Raises TypeError or ValueError for a bad table.
     """
@@ -80,27 +91,43 @@ def before_and_after(before: pd.DataFrame, after: pd.DataFrame, labels: tuple[st
     figure = plt.figure(figsize=WIDE, dpi=DPI, layout='constrained')
     panels = figure.subplots(1, 2, sharex=True, sharey=True)
     for ax, table, label in zip(panels, tables, labels, strict=True):
-        _draw_gaps(ax, table, f'{label}: {_loss(table)}', scale=0.5)
-        describe(ax, _gaps_in_words(table), label)
+        _draw_gaps(ax, table, f'{label}: {_loss(table)}', depth, scale=0.5)
+        describe(ax, _gaps_in_words(table, depth), label)
     panels[1].set_ylabel('')
     return figure
 
 
-def _draw_gaps(ax: Axes, table: pd.DataFrame, title: str, scale: float = 1.0) -> None:
+def _draw_gaps(
+    ax: Axes, table: pd.DataFrame, title: str, depth: int | None, scale: float = 1.0
+) -> None:
     """Draw the marks and what surrounds them. `scale` is the area of a mark."""
     heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
     scale *= min(1.0, max(0.2, 60 / len(table)))  # many marks must be smaller to stay apart
     ax.hlines(heard.seq, heard.published_s, heard.started_s, color=PALE, lw=1.2, zorder=1)
     ax.margins(x=0.04, y=0.09)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    lost_at = lost.published_s
+    if depth:
+        lost_at = _pushed_out(table, depth)[lost.index].fillna(lost.published_s)
+        ax.hlines(lost.seq, lost.published_s, lost_at, color=PALE, lw=1.2, zorder=1)
+        dotted = {'color': LOST, 'lw': 0.9, 'ls': ':', 'zorder': 1}
+        ax.vlines(lost_at, lost.seq, table.seq.shift(-depth)[lost.index], **dotted)
     small = {'s': 14 * scale, 'color': PUBLISHED, 'zorder': 2, 'label': f'published {len(table)}'}
     large = {'s': 52 * scale, 'color': HEARD, 'zorder': 3, 'label': f'heard {len(heard)}'}
     handles = [
         ax.scatter(table.published_s, table.seq, **small),
         ax.scatter(heard.started_s, heard.seq, **large),
-        crosses(ax, lost.published_s, lost.seq, f'lost {len(lost)}', scale),
+        crosses(ax, lost_at, lost.seq, f'lost {len(lost)}', scale),
     ]
     label_axes(ax, title, TIME_LABEL, 'sequence number', handles)
+
+
+def _pushed_out(table: pd.DataFrame, depth: int) -> pd.Series:
+    """Return for each message when the `depth`-th newer one came, which would push it out.
+
+    NaN where there is none: such a message still waits at the end.
+    """
+    return table.published_s.shift(-depth)
 
 
 def _label_gaps(ax: Axes, table: pd.DataFrame) -> None:
@@ -152,12 +179,15 @@ def timeline(
     title: str = 'One bar for each callback, with its sequence number',
     ax: Axes | None = None,
     time_label: str = TIME_LABEL,
+    depth: int | None = None,
 ) -> Axes:
     """Draw one lane a thread and one bar a callback, with its sequence number where it fits.
 
     `table` is one table, or one for each callback group: `{'group name': table, ...}`. Then each
     group has a colour and a hatch of its own. `span_s` shows only the time from `span_s[0]` to
-    `span_s[1]`, in seconds. Draws into `ax`, or into a new figure.
+    `span_s[1]`, in seconds. With `depth`, that of the subscription's KEEP_LAST queue, thin grey
+    bars below show the messages while they wait, and a cross ends those that were pushed out.
+    Draws into `ax`, or into a new figure.
 
     Raises TypeError or ValueError for a bad table, no or too many groups, or a bad span.
     """
@@ -185,7 +215,11 @@ def timeline(
         own = bars[bars.group == name]
         ax.barh(own.lane, own.finished_s - own.started_s, left=own.started_s, height=0.72, **look)
     ax.set_yticks(range(len(threads)), threads)
-    ax.set_ylim(max(len(threads), 1) - 0.5, -0.5)  # the first thread on top
+    bottom = max(len(threads), 1) - 0.5
+    waiting = ''
+    if depth:
+        bottom, waiting = _draw_waiting(ax, pd.concat(groups.values()), depth, bottom)
+    ax.set_ylim(bottom, -0.5)  # the first thread on top
     # Axes that share their time show the longest run of all.
     last_s = max(one.dataLim.x1 for one in ax.get_shared_x_axes().get_siblings(ax))
     ax.set_xlim(span_s or (0, 1.02 * last_s if math.isfinite(last_s) else 1))
@@ -195,12 +229,34 @@ def timeline(
     describe(
         ax,
         'One lane for each thread that ran a callback, one bar for each callback, with its '
-        f'sequence number where it fits.{named} {_overlap_in_words(bars)}',
+        f'sequence number where it fits.{named} {_overlap_in_words(bars)}{waiting}',
     )
     if bars.empty:
         say(ax, 'no callback was called')
     _label_bars(ax, bars)
     return ax
+
+
+def _draw_waiting(ax: Axes, table: pd.DataFrame, depth: int, top: float) -> tuple[float, str]:
+    """Draw the messages while they wait, below `top`: one thin lane a place in the queue.
+
+    Returns where the lanes end, and what they show in words.
+    """
+    lost = table.started_s.isna()
+    left_s = table.started_s.where(~lost, _pushed_out(table, depth)).fillna(table.published_s)
+    lanes = top + 0.3 + 0.3 * np.arange(depth)
+    free_s = np.full(depth, -np.inf)  # when the message before has left each place
+    look = {'facecolor': PUBLISHED, 'edgecolor': 'white'}
+    for entered, left, is_lost in zip(table.published_s, left_s, lost, strict=True):
+        place = int(free_s.argmin())
+        free_s[place] = left
+        ax.barh(lanes[place], left - entered, left=entered, height=0.24, **look)
+        if is_lost:
+            crosses(ax, left, lanes[place], '', 0.4)
+    names = [label.get_text() for label in ax.get_yticklabels()]
+    ax.set_yticks([*ax.get_yticks(), lanes.mean()], [*names, 'waiting'])
+    crossed = 'a cross ends those that were pushed out' if lost.any() else 'none is pushed out'
+    return lanes[-1] + 0.3, f' Thin grey bars below: messages while they wait; {crossed}.'
 
 
 def _natural(name: str) -> list:
@@ -235,7 +291,7 @@ def queue_length(table: pd.DataFrame, depth: int, ax: Axes | None = None) -> Axe
     if depth < 1:
         raise ValueError(f'depth must be a whole number of at least 1, not {depth!r}.')
     entered, started = table.published_s.to_numpy(), table.started_s.to_numpy()
-    pushed_out = table.published_s.shift(-depth).to_numpy()
+    pushed_out = _pushed_out(table, depth).to_numpy()
     # A message is taken a little before its callback starts, so a newer one may come in between.
     left = np.fmax(entered, np.fmin(started, pushed_out))
     left = left[~(np.isnan(started) & np.isnan(pushed_out))]  # the others still wait at the end
@@ -318,10 +374,14 @@ def _loss(table: pd.DataFrame) -> str:
     return f'{lost} of {len(table)} lost' if lost else 'none lost'
 
 
-def _gaps_in_words(table: pd.DataFrame) -> str:
+def _gaps_in_words(table: pd.DataFrame, depth: int | None) -> str:
+    marks = 'crosses'
+    if depth:
+        marks = 'a cross is when one was pushed out, and a dotted line leads to the message that '
+        marks += f'did it, {depth} numbers later'
     return (
         f'{len(table)} messages. A small dot is a message when it was published, a large dot the '
-        f'start of its callback. {_loss_in_words(table, "crosses")}'
+        f'start of its callback. {_loss_in_words(table, marks)}'
     )
 
 
