@@ -1,4 +1,4 @@
-"""A progress bar for a cell that waits. It leaves nothing in the saved output."""
+"""What a cell shows while it waits. Nothing of it is left in the saved output."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ class ProgressBar:
     """
 
     def __init__(self, progress: Callable[[], float] | None) -> None:
-        self._progress = progress if _somebody_watches() else None
+        self._watched = _somebody_watches()
+        self._progress = progress if self._watched else None
         self._display = None
+        self._text: str | None = None
         self._next_s = SHOW_AFTER_S
 
     def __enter__(self) -> ProgressBar:
@@ -39,11 +41,20 @@ class ProgressBar:
         else:
             self._display.update(bar)
 
-    def __exit__(self, *exception) -> None:
-        if self._display is not None:
-            from IPython.display import clear_output
+    def say(self, text: str) -> None:
+        """Print a text where somebody watches. It stays where the wait does not end well."""
+        if self._watched:
+            print(text)
+            self._text = text
 
-            clear_output()
+    def __exit__(self, exception_type, *exception) -> None:
+        if self._display is None and self._text is None:
+            return
+        from IPython.display import clear_output
+
+        clear_output()
+        if exception_type is KeyboardInterrupt and self._text is not None:
+            print(self._text)
 
 
 def _somebody_watches() -> bool:

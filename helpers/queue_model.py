@@ -19,12 +19,13 @@ import numpy as np
 import pandas as pd
 
 from helpers.recording import COLUMNS, check_table
-from helpers.values import MOST, shown
+from helpers.values import shown
 
 # A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
 # long as callbacks and timers of the same run were late.
 REST = 0.4
-MOST_MESSAGES = 10**7  # a prediction of more does not fit into the memory of a small machine
+# So long a run fits into 63 bits of nanoseconds, and its table into a small machine.
+MOST_MESSAGES, MOST_S = 10**6, 3600
 
 
 def predict(
@@ -36,8 +37,8 @@ def predict(
     of `threads` workers; the queue is KEEP_LAST(`depth`). A message that arrives at the very
     moment when a worker becomes free arrives first. Times are exact to the nanosecond.
 
-    Raises ValueError or TypeError for a value that is no number, zero or negative (`callback_s`
-    may be zero), and for a run that is too long to compute.
+    Raises TypeError for a value that is no number, ValueError for one that is too small or too
+    large: `callback_s` may be zero, no time is above 3600 s, no count of messages above a million.
     """
     period = _nanoseconds('period_s', period_s)
     callback = _nanoseconds('callback_s', callback_s, zero_allowed=True)
@@ -45,10 +46,6 @@ def predict(
         _count(name, value)
         for name, value in (('depth', depth), ('threads', threads), ('messages', messages))
     )
-    if messages * (period + callback) >= 2**63:
-        raise ValueError(
-            'This run would take more than 292 years: give shorter times, or fewer messages.'
-        )
     if messages > MOST_MESSAGES:
         raise ValueError(f'messages must be at most {MOST_MESSAGES}, not {messages}.')
     taken, started = [], []
@@ -71,6 +68,7 @@ def predict(
     table.loc[taken, 'started_s'] = start / 1e9
     table.loc[taken, 'finished_s'] = (start + callback) / 1e9
     table['thread'] = thread
+    table.attrs = {'period_s': period_s, 'callback_s': callback_s, 'depth': depth}
     return table
 
 
@@ -111,7 +109,7 @@ class Explanation:
         return '\n'.join(lines + self.contradictions)
 
 
-def explain(table: pd.DataFrame, depth: int, threads: int, delay_s: float = 0.0) -> Explanation:
+def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
     """Explain a recorded table with a KEEP_LAST(`depth`) queue and `threads` workers.
 
     `threads` is the number of callbacks that may run at the same time: 1 for a
@@ -124,14 +122,10 @@ def explain(table: pd.DataFrame, depth: int, threads: int, delay_s: float = 0.0)
     when such instants exist for all messages and no worker rested while the queue overflowed.
     Times on a busy machine move, and these rules do not.
 
-    `delay_s` is the longest time that a message needed from its publish call to the queue. In one
-    process it is zero: the message has arrived when `publish()` returns.
-
     Raises ValueError or TypeError for a table or a number that cannot be used.
     """
     table = check_table(table)
     depth, threads = _count('depth', depth), _count('threads', threads)
-    delay_s = _nanoseconds('delay_s', delay_s, zero_allowed=True) / 1e9
     # A queue for more messages than there are never overflows, and more workers find nothing to do.
     named_depth, depth, threads = depth, min(depth, len(table)), min(threads, len(table))
     heard = table[table['started_s'].notna()]
@@ -143,9 +137,9 @@ def explain(table: pd.DataFrame, depth: int, threads: int, delay_s: float = 0.0)
         .groupby('thread', sort=False)['finished_s']
         .shift(fill_value=-math.inf)
     )
-    contradictions += _impossible_takes(table, heard, depth, threads, delay_s)
+    contradictions += _impossible_takes(table, heard, depth, threads)
     contradictions += _too_many_at_once(heard, threads)
-    contradictions += _rests(table, heard, depth, threads, delay_s)
+    contradictions += _rests(table, heard, depth, threads)
     losses = _losses(table, depth)
     for seq in losses.loc[losses['pushed_out_by'].isna(), 'seq']:
         contradictions.append(
@@ -193,7 +187,7 @@ def _impossible_rows(table: pd.DataFrame) -> list[str]:
 
 
 def _impossible_takes(
-    table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int, delay_s: float
+    table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int
 ) -> list[str]:
     """Go through the takes in order, each as early as possible: is it then too late for one?"""
     published = [*table['published_s'], *[math.inf] * (depth + 1)]
@@ -203,11 +197,11 @@ def _impossible_takes(
     columns = heard[['seq', 'started_s', 'finished_s', 'worker_free_s']]
     for index, seq, start, finish, free in columns.itertuples(name=None):
         # `arrived` messages were published when this one was the oldest in the queue. Without a
-        # gap the queue may have been anywhere between one message and full; behind a gap, full.
+        # gap the queue may have been anywhere between one message and full; after a gap, full.
         full = index + depth
         arrived = full if index > expected else index + 1
         earliest = max(previous_take, published[arrived - 1], busy_until[0], free)
-        latest = min(start, published[full + 1] + delay_s)
+        latest = min(start, published[full + 1])
         if earliest > latest:
             found.append(
                 f'Message {seq} cannot have been the oldest in the queue for a free worker '
@@ -232,9 +226,7 @@ def _too_many_at_once(heard: pd.DataFrame, threads: int) -> list[str]:
     ]
 
 
-def _rests(
-    table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int, delay_s: float
-) -> list[str]:
+def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -> list[str]:
     """Where a worker was free for long while messages waited that were then pushed out."""
     published = table['published_s'].to_numpy()
     lost = np.flatnonzero(table['started_s'].isna())
@@ -251,7 +243,7 @@ def _rests(
     waited = np.column_stack([total - (pushed_out - arrived), total]).ravel()
     starts, ends = _pauses(heard, threads, until=published[-1])
     rested = np.interp(ends, edges, waited) - np.interp(starts, edges, waited)
-    allowed = REST * callbacks.median() + np.ptp(callbacks) + np.ptp(periods) + delay_s
+    allowed = REST * callbacks.median() + np.ptp(callbacks) + np.ptp(periods)
     return [
         f'Message {table["seq"].iloc[lost[np.searchsorted(pushed_out, starts[i], "right")]]} was '
         f'pushed out although a worker was free for {ends[i] - starts[i]:.3g} s.'
@@ -290,14 +282,10 @@ def _count(name: str, value: int) -> int:
 
 
 def _nanoseconds(name: str, value: float, zero_allowed: bool = False) -> int:
-    least = 'zero or more' if zero_allowed else 'more than zero'
+    least = '0' if zero_allowed else 'a nanosecond'
+    said = f'{name} must be a number of seconds, from {least} to {MOST_S}, not {shown(value)}.'
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise TypeError(f'{name} must be a number of seconds, {least}, not {shown(value)}.')
-    if not (value > 0 or (value == 0 and zero_allowed)) or value == math.inf:
-        raise ValueError(f'{name} must be a number of seconds, {least}, not {shown(value)}.')
-    if value > MOST:
-        raise ValueError(f'{name} must be at most {MOST:g} seconds, not {shown(value)}.')
-    nanoseconds = round(float(value) * 1e9)
-    if nanoseconds == 0 and value > 0:
-        raise ValueError(f'{name} must be at least one nanosecond, not {shown(value)}.')
-    return nanoseconds
+        raise TypeError(said)
+    if not (1e-9 <= value <= MOST_S or (value == 0 and zero_allowed)):
+        raise ValueError(said)
+    return round(float(value) * 1e9)

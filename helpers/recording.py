@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-import re
 import threading
 import time
 from collections.abc import Callable
@@ -16,66 +15,62 @@ from helpers.values import check_columns, column_of_numbers, column_of_whole_num
 COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']
 
 
-def last_number(message) -> int:
+def number_of(message) -> int:
     """Return the number at the end of `message.data`: 7 for `Hello World: 7`, or 7 itself.
 
     Raises ValueError where there is none.
     """
     data = getattr(message, 'data', None)
-    if isinstance(data, str):
-        # A fifth of the time of a search: the recorder is here between publish() and the callback.
-        word = data.rpartition(' ')[2]
-        if word.isdecimal():
-            return int(word)
-    elif isinstance(data, int | float):
-        return int(data)
-    found = re.search(r'(\d+)\s*$', data) if isinstance(data, str) else None
-    if found is None:
+    if isinstance(data, int):
+        return data
+    word = data.rpartition(' ')[2] if isinstance(data, str) else ''
+    if not word.isdecimal():
         raise ValueError(
-            f'There is no number at the end of {message!r}: give Recording a `sequence` function '
-            'that returns the number of a message.'
+            f'A recording needs messages whose data ends with their number, as in '
+            f"String(data='Hello World: 7'). This one has none: {message!r}."
         )
-    return int(found.group(1))
+    return int(word)
 
 
 class Recording:
     """Records the messages from one publisher to one subscription, from now on.
 
-    The two are plain rclpy objects, and stay what they are. `sequence` reads the sequence number
-    out of a message; the default takes the number at the end of `message.data`.
+    The two are plain rclpy objects, and stay what they are. `parameters`, for example
+    `period_s=0.05`, are what the run was made with: they are in `table().attrs`.
+
+    `Recording.latest` is the one that was made last, also where its cell was interrupted.
     """
 
-    def __init__(
-        self, publisher, subscription, sequence: Callable[[object], int] = last_number
-    ) -> None:
+    latest: Recording | None = None
+
+    def __init__(self, publisher, subscription, **parameters) -> None:
+        self.parameters = parameters
         self._published: list[tuple[int, float]] = []
         # [seq, started, finished, thread id]; finished is NaN while the callback runs
         self._heard: list[list] = []
         self._finished: list[list] = []  # the same rows, in the order in which they finished
-        self._sequence = sequence
         self._watch_publisher(publisher)
         self._watch_subscription(subscription)
+        Recording.latest = self
 
     def _watch_publisher(self, publisher) -> None:
-        publish, sequence, clock = publisher.publish, self._sequence, time.monotonic
-        append = self._published.append
+        publish, clock, append = publisher.publish, time.monotonic, self._published.append
 
         @functools.wraps(publish)
         def recorded_publish(msg):
             published_s = clock()
             publish(msg)
             # Not before, where it would delay the message.
-            append((sequence(msg), published_s))
+            append((number_of(msg), published_s))
 
         publisher.publish = recorded_publish
 
     def _watch_subscription(self, subscription) -> None:
-        callback, sequence, clock = subscription.callback, self._sequence, time.monotonic
-        append, thread_id, nan = self._heard.append, threading.get_ident, float('nan')
-        append_finished = self._finished.append
+        clock, append, append_finished = time.monotonic, self._heard.append, self._finished.append
+        thread_id, nan = threading.get_ident, float('nan')
 
         def start(message, *info) -> list:
-            row = [sequence(message), clock(), nan, thread_id()]
+            row = [number_of(message), clock(), nan, thread_id()]
             append(row)
             return row
 
@@ -83,7 +78,7 @@ class Recording:
             row[2] = clock()
             append_finished(row)
 
-        subscription.callback = _surround(callback, start, finish)
+        subscription.callback = _surround(subscription.callback, start, finish)
 
     @property
     def published(self) -> int:
@@ -126,14 +121,18 @@ class Recording:
                 return 0.0
             return (self._finished[-1][0] - self._published[0][0] + 1) / messages
 
-        current_session().wait_until(complete, timeout_s, progress)
+        def status() -> str:
+            return f'Published {self.published}, heard {self.heard}.'
+
+        current_session().wait_until(complete, timeout_s, progress, status)
 
     def table(self) -> pd.DataFrame:
         """Return one row a message, in the order of their sequence numbers.
 
         Columns: `seq` (int), `published_s`, `started_s`, `finished_s` (seconds since the first
         publish call; NaN where it did not happen), `thread` ('worker 1', 'worker 2', ... in the
-        order of their first callback; None where the message was never heard).
+        order of their first callback; None where the message was never heard). `attrs` holds the
+        parameters of the recording.
 
         Raises ValueError where two messages have the same sequence number.
         """
@@ -155,7 +154,9 @@ class Recording:
         table = table.astype({'seq': int} | dict.fromkeys(times, float))
         table[times] -= table['published_s'].min()
         table['thread'] = table['thread'].astype(object).where(table['thread'].notna(), None)
-        return table[COLUMNS]
+        table = table[COLUMNS]
+        table.attrs = dict(self.parameters)
+        return table
 
 
 class CallbackRecording:

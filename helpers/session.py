@@ -32,7 +32,7 @@ try:
     from rclpy.node import Node
     from rclpy.signals import SignalHandlerOptions
 
-    from helpers import rclpy_private
+    from helpers import connections, rclpy_private
     from helpers.progress_bar import ProgressBar
     from helpers.rosout import Rosout
 except ImportError as error:
@@ -42,8 +42,10 @@ except ImportError as error:
     ) from error
 
 CLOSE_TIMEOUT_S = 5.0
+LOG_NODE = '_session_log'
 POLL_S = 0.01
 QUIET_ROUNDS = 20
+SAY_AFTER_S = 5.0
 
 _open_session: Session | None = None
 
@@ -136,7 +138,7 @@ class Session:
             signal_handler_options=SignalHandlerOptions.NO,
         )
         with one_process_at_a_time():  # the first node makes the participant
-            node = Node('_session_log', enable_rosout=False, start_parameter_services=False)
+            node = Node(LOG_NODE, enable_rosout=False, start_parameter_services=False)
         self._rosout = Rosout(node)
 
     # --- Spinning
@@ -197,17 +199,21 @@ class Session:
         predicate: Callable[[], bool],
         timeout_s: float = 30.0,
         progress: Callable[[], float] | None = None,
+        status: Callable[[], str] | None = None,
     ) -> None:
         """Wait until the predicate holds.
 
         `progress` returns the part that is done, 0 to 1. It is shown as a bar once the wait has
-        taken 2 s; the bar disappears at the end.
+        taken 2 s; the bar disappears at the end. `status` returns a sentence on what has come.
+
+        Where something is not connected, or a callback waits, who watches the cell reads it after
+        5 s. The TimeoutError says it, too.
 
         Raises TimeoutError when `timeout_s` seconds are over, and the exception of a callback as
         soon as one has failed.
         """
         __tracebackhide__ = True  # IPython shows the cell, and the callback that failed
-        started = time.monotonic()
+        started, said = time.monotonic(), False
         # Nobody sets it: an interruptible pause between two looks at the predicate.
         pause = threading.Event()
         with ProgressBar(progress) as bar:
@@ -215,12 +221,22 @@ class Session:
                 self._raise_failure()
                 waited_s = time.monotonic() - started
                 if waited_s > timeout_s:
-                    raise TimeoutError(
-                        f'Waited {timeout_s:g} s in vain: is every executor spinning, and is every '
-                        'node added to one?'
-                    )
+                    raise TimeoutError(self._why(f'Waited {timeout_s:g} s in vain.', status))
                 bar.update(waited_s)
+                if waited_s > SAY_AFTER_S and not said:
+                    said = True
+                    if self._findings():
+                        bar.say(self._why(f'Waited {SAY_AFTER_S:g} s so far.', status))
                 pause.wait(POLL_S)
+
+    def _why(self, first: str, status: Callable[[], str] | None) -> str:
+        none = ['Everything that was made is connected and spins, and no callback waits.']
+        return '\n'.join([first, *([status()] if status else []), *(self._findings() or none)])
+
+    def _findings(self) -> list[str]:
+        nodes = [node for node in find(Node, self._context) if node.get_name() != LOG_NODE]
+        frames = [frame for _, frame in rclpy_private.frames(self._threads())]
+        return connections.findings(nodes, self._spinning, frames)
 
     def wait_until_quiet(self, executor: Executor, timeout_s: float = 30.0) -> bool:
         """Wait until nothing happens in an executor any more, timers and time-outs apart.

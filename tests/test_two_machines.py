@@ -1,11 +1,10 @@
-"""A publisher and a slow subscriber on two machines.
+"""A robot and a session on two machines.
 
-The machines are network namespaces joined by a veth pair, each with its own shared memory. The
-second one also has a clock of its own, 1000 s ahead. They are gone when the processes in them are.
+The machines are network namespaces joined by a veth pair, each with its own shared memory. They are
+gone when the processes in them are.
 """
 
 import contextlib
-import json
 import os
 import select
 import shlex
@@ -16,17 +15,10 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
-from helpers.queue_model import explain
-from helpers.recording import COLUMNS
-
 DOMAIN = 42
-DEPTH = 10
-MESSAGES = 41
 LIMIT_S = 60
-AHEAD_S = 1000
 ADDRESSES = ('192.0.2.1', '192.0.2.2')  # reserved for documentation: nobody's
 # What a firewall must let in: discovery, then two ports for each of the first ten participants.
 PORTS = {7400 + 250 * DOMAIN, *range(7410 + 250 * DOMAIN, 7430 + 250 * DOMAIN)}
@@ -37,8 +29,8 @@ ROBOT = {'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'
 class Machine:
     """A machine that is a few namespaces, held by a process that ends with this one."""
 
-    def __init__(self, stack: contextlib.ExitStack, *, ahead_s: int = 0, inside: str = '') -> None:
-        own = ['--net', '--mount', '--ipc', '--time', '--monotonic', str(ahead_s), '--fork']
+    def __init__(self, stack: contextlib.ExitStack, inside: str = '') -> None:
+        own = ['--net', '--mount', '--ipc', '--fork']
         user = ['--user', '--map-root-user'] if os.getuid() and not inside else []
         # `read` ends when this process does.
         hold = 'mount -t tmpfs shm /dev/shm && ip link set lo up && echo $$ && read line'
@@ -55,10 +47,10 @@ class Machine:
             pytest.skip(f'no namespaces here: {self._process.stderr.read().strip()}')
         target = f'nsenter --target {self.pid}'
         self.user = f'{target} --user --preserve-credentials' if os.getuid() else ''
-        self._enter = f'{self.user or target} --net --mount --ipc --time'.split()
+        self._enter = f'{self.user or target} --net --mount --ipc'.split()
 
     def _end(self) -> None:
-        self._process.communicate('\n')
+        self._process.communicate()  # ends its input, as the kernel does when this one is killed
 
     def run(self, command: str) -> str:
         answer = subprocess.run(
@@ -110,7 +102,7 @@ def machines() -> Iterator[list[Machine]]:
         pytest.skip(f'{" and ".join(missing)} not found: install util-linux and iproute2')
     with contextlib.ExitStack() as stack:
         one = Machine(stack)
-        two = Machine(stack, ahead_s=AHEAD_S, inside=one.user)
+        two = Machine(stack, inside=one.user)
         one.run(f'ip link add eth0 type veth peer name eth0 netns {two.pid}')
         for machine, address in zip((one, two), ADDRESSES, strict=True):
             machine.run(f'ip address add {address}/24 dev eth0')
@@ -232,136 +224,12 @@ def test_a_network_without_multicast(machines):
             assert select.select([lost.stdout], [], [], 4) == ([], [], [])
 
 
-# --- The slow subscriber on another machine ------------------------------------------------------
-
-# Publishes as lesson 02 does, and asks for the other machine's time after each message.
-PUBLISHER = f"""{END}
-import json, time
-import rclpy
-from std_msgs.msg import Float64, String
-
-rclpy.init()
-node = rclpy.create_node('minimal_publisher')
-publisher = node.create_publisher(String, 'topic', {DEPTH})
-question = node.create_publisher(Float64, 'question', 10)
-answers = []
-node.create_subscription(Float64, 'answer', lambda message: answers.append(message.data), 10)
-
-def ask():
-    asked = time.monotonic()
-    question.publish(Float64())
-    while not answers:
-        rclpy.spin_once(node, timeout_sec=0.1)
-    return asked, answers.pop(), time.monotonic()
-
-while not (publisher.get_subscription_count() and question.get_subscription_count()):
-    rclpy.spin_once(node, timeout_sec=0.02)
-print('ready', flush=True)
-sys.stdin.readline()
-threading.Thread(target=end_with_input, daemon=True).start()
-clocks = [ask() for _ in range(20)]
-published = []
-start = time.monotonic()
-for number in range({MESSAGES}):
-    time.sleep(max(0, start + 0.05 * number - time.monotonic()))
-    before = time.monotonic()
-    publisher.publish(String(data=f'Hello World: {{number}}'))
-    published.append((number, before, ask()[1]))
-print(json.dumps([clocks, published]))
-"""
-
-SUBSCRIBER = f"""{END}
-import json, time
-from helpers.session import ros_session
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from std_msgs.msg import Float64, String
-
-class SlowSubscriber(Node):
-    def __init__(self):
-        super().__init__('slow_subscriber')
-        self.heard = []
-        self.create_subscription(String, 'topic', self.listener_callback, {DEPTH})
-
-    def listener_callback(self, message):
-        started = time.monotonic()
-        time.sleep(0.2)
-        number = int(message.data.split()[-1])
-        self.heard.append((number, started, time.monotonic()))
-
-class Clock(Node):
-    def __init__(self):
-        super().__init__('clock')
-        self.publisher = self.create_publisher(Float64, 'answer', 10)
-        self.create_subscription(Float64, 'question', self.answer, 10)
-
-    def answer(self, message):
-        self.publisher.publish(Float64(data=time.monotonic()))
-
-with ros_session(domain_id={DOMAIN}, discovery='SUBNET') as session:
-    subscriber, clock = SlowSubscriber(), Clock()
-    for node in (subscriber, clock):
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        session.spin(executor)
-    session.wait_until(lambda: subscriber.count_publishers('topic'), {LIMIT_S})
-    session.wait_until(lambda: clock.publisher.get_subscription_count(), {LIMIT_S})
-    print('ready', flush=True)
-    sys.stdin.readline()
-    threading.Thread(target=end_with_input, daemon=True).start()
-    session.wait_until(
-        lambda: subscriber.heard and subscriber.heard[-1][0] == {MESSAGES} - 1, {LIMIT_S}
-    )
-print(json.dumps(subscriber.heard))
-"""
-
-
-def record(clocks: list, published: list, heard: list) -> tuple[pd.DataFrame, float]:
-    """Return the table of both machines on the subscriber's clock, and the longest delay in s.
-
-    A question and its answer tell between which limits the other clock is ahead: the answer was
-    written after the question was asked, and before the answer came. The earliest time at which a
-    message can have been published is in the table. The error of the clocks is in the delay, since
-    each message had arrived when the question that was sent behind it was answered.
-    """
-    behind = max(answer - came for _, answer, came in clocks)
-    at_most = min(answer - asked for asked, answer, _ in clocks)
-    assert behind <= AHEAD_S <= at_most
-    sent = pd.DataFrame(published, columns=['seq', 'published_s', 'arrived_s'])
-    sent['published_s'] += behind
-    table = sent.merge(pd.DataFrame(heard, columns=COLUMNS[:1] + COLUMNS[2:4]), 'left', on='seq')
-    table['thread'] = table['started_s'].notna().map({True: 'worker 1', False: None})
-    return table[COLUMNS], (sent['arrived_s'] - sent['published_s']).max()
-
-
-def test_a_slow_subscriber_on_another_machine_is_explained(machines):
-    one, two = machines
-    subscriber = two.start(SUBSCRIBER)
-    publisher = one.start(PUBLISHER, **ROBOT)
-    with ended(publisher, subscriber):
-        assert [p.stdout.readline() for p in (publisher, subscriber)] == ['ready\n'] * 2
-        for process in (subscriber, publisher):
-            process.stdin.write('go\n')
-            process.stdin.flush()
-        clocks, published = json.loads(publisher.stdout.readline())
-        heard = json.loads(subscriber.stdout.readline())
-    table, delay_s = record(clocks, published, heard)
-    assert table['seq'].tolist() == list(range(MESSAGES))
-    explanation = explain(table, DEPTH, threads=1, delay_s=delay_s)
-    print(f'\n{explanation}\nLongest delay, with the error of the clocks: {1e3 * delay_s:.1f} ms')
-    assert explanation.lost > 0
-    assert explanation.complete, f'{explanation}\n{table.to_string()}'
-
-
 def test_nothing_is_left():
     """The namespaces of a process that is killed are gone, and all that ran in them."""
     with contextlib.ExitStack() as stack:
         machine = Machine(stack)
         namespaces = {os.readlink(f'/proc/{machine.pid}/ns/{kind}') for kind in ('net', 'mnt')}
-        machine._process.stdin.close()  # as the kernel does when this process is killed
-        machine._process.wait(LIMIT_S)
-        for links in Path('/proc').glob('[0-9]*/ns'):
-            with contextlib.suppress(OSError):
-                assert not namespaces & {os.readlink(link) for link in links.iterdir()}
-        machine._process.stdin = None
+    for links in Path('/proc').glob('[0-9]*/ns'):
+        with contextlib.suppress(OSError):
+            assert not namespaces & {os.readlink(link) for link in links.iterdir()}
     assert not Path('/proc', machine.pid).exists()

@@ -1,0 +1,147 @@
+"""A cell that waits in vain says why."""
+
+import threading
+
+import pytest
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Int64
+from support.nodes import Answerer, Asker, Listener, Talker, spin
+
+from helpers.recording import Recording
+from helpers.session import ros_session
+
+NOTHING = 'Everything that was made is connected and spins, and no callback waits.'
+
+
+def said_by(wait, *arguments):
+    """Wait a moment in vain, and return the lines of the error."""
+    with pytest.raises(TimeoutError) as failure:
+        wait(*arguments, timeout_s=0.5)
+    first, *lines = str(failure.value).splitlines()
+    assert first == 'Waited 0.5 s in vain.'
+    return lines
+
+
+def test_a_node_without_an_executor():
+    with ros_session() as session:
+        talker, listener = Talker(4), Listener()
+        recording = Recording(talker.publisher, listener.subscription)
+        spin(session, talker)
+        session.wait_until(lambda: recording.published == 4)
+        assert said_by(recording.wait_until_complete, 4) == [
+            'Published 4, heard 0.',
+            'The node minimal_subscriber is in no executor: executor.add_node(...) is missing.',
+        ]
+
+
+def test_a_name_with_a_capital():
+    with ros_session() as session:
+        talker, listener = Talker(4, topic='topic'), Listener(topic='Topic')
+        recording = Recording(talker.publisher, listener.subscription)
+        spin(session, talker, listener)
+        session.wait_until(lambda: recording.published == 4)
+        assert said_by(recording.wait_until_complete, 4) == [
+            'Published 4, heard 0.',
+            'The topic /Topic has a subscription (minimal_subscriber) and no publisher. '
+            'Nearly the same name: /topic.',
+            'The topic /topic has a publisher (minimal_publisher) and no subscription. '
+            'Nearly the same name: /Topic.',
+        ]
+
+
+def test_qos_that_does_not_fit():
+    best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    with ros_session() as session:
+        talker, listener = Node('talker'), Node('listener')
+        talker.create_publisher(Int64, 'count', best_effort)
+        listener.create_subscription(Int64, 'count', lambda message: None, 10)
+        spin(session, listener)
+        assert said_by(session.wait_until, lambda: False) == [
+            'On the topic /count, the QoS of talker and listener do not fit: '
+            'Best effort publisher and reliable subscription.',
+        ]
+
+
+def test_an_executor_that_does_not_spin_and_a_service_that_is_missing():
+    with ros_session() as session:
+        asker, executor = Asker(), SingleThreadedExecutor()
+        executor.add_node(asker)
+        assert said_by(session.wait_until, lambda: False) == [
+            'The executor of the node asker does not spin: session.spin(...) is missing.',
+            'asker calls /look, and nobody serves it.',
+        ]
+
+
+def wait_for_ever(message):
+    threading.Event().wait()
+
+
+LOCK = threading.Lock()
+
+
+def take_the_lock(message):
+    with LOCK:
+        pass
+
+
+@pytest.mark.parametrize(
+    ('callback', 'line'),
+    [(wait_for_ever, 'threading.Event().wait()'), (take_the_lock, 'with LOCK:')],
+)
+def test_callbacks_that_wait(callback, line):
+    def body():
+        with ros_session() as session:
+            listener = Listener(callback)
+            spin(session, Talker(1), listener, threads=2)
+            session.wait_until(lambda: listener.heard)
+            assert said_by(session.wait_until, lambda: False) == [
+                f'The callback listener_callback waits at: {line}'
+            ]
+            LOCK.release()
+            raise KeyboardInterrupt  # ends what waits for an Event
+
+    LOCK.acquire()
+    with pytest.raises(KeyboardInterrupt):
+        body()
+
+
+def test_a_call_that_is_never_answered():
+    with ros_session() as session:
+        asker = Asker()
+        spin(session, asker, Answerer())
+        session.wait_until(lambda: asker.asked)
+        assert said_by(session.wait_until, lambda: False) == [
+            'The callback call waits at: self.answer = self.client.call(self.ask()).message'
+        ]
+
+
+def test_nothing_is_wrong():
+    with ros_session() as session:
+        spin(session, Talker(1), Listener())
+        assert said_by(session.wait_until, lambda: False) == [NOTHING]
+
+
+def test_who_watches_reads_it_while_the_cell_waits(monkeypatch, capsys):
+    """It stays where the cell is interrupted, and goes where the wait ends well."""
+    monkeypatch.setattr('helpers.progress_bar.can_ask', lambda kernel: True)
+    monkeypatch.setattr('helpers.session.SAY_AFTER_S', 0.3)
+    with ros_session() as session:
+        talker = Talker(1)  # never spun
+        said = []
+
+        def interrupted():
+            said.append(capsys.readouterr().out)
+            if any(said):
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            session.wait_until(interrupted)
+        lines = [
+            'Waited 0.3 s so far.',
+            'The node minimal_publisher is in no executor: executor.add_node(...) is missing.',
+            'The topic /topic has a publisher (minimal_publisher) and no subscription.',
+        ]
+        assert ''.join(said).splitlines() == lines
+        assert talker.next_number == 0
