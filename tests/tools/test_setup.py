@@ -6,10 +6,12 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tomllib
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import distribution, distributions
 from pathlib import Path
 
@@ -25,12 +27,6 @@ GROUPS = PYPROJECT['dependency-groups']
 GROUP_LOCKS = {name: (ROOT / f'requirements-{name}.lock').read_text() for name in GROUPS}
 BASE_PYTHON = Path(sys._base_executable)
 HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
-
-
-def direct_dependencies() -> list[str]:
-    extras = PYPROJECT['project']['optional-dependencies']
-    requirements = [*PYPROJECT['project']['dependencies'], *extras['ros'], *extras['dev']]
-    return [name_of(requirement) for requirement in requirements]
 
 
 def name_of(requirement: str) -> str:
@@ -49,41 +45,35 @@ def pins(lock: str) -> dict[str, str]:
     }
 
 
-def test_every_pin_has_a_version_and_a_hash():
+ALL_LOCKS = [LOCK, *GROUP_LOCKS.values()]
+EXTRAS = PYPROJECT['project']['optional-dependencies']
+DIRECT = [*PYPROJECT['project']['dependencies'], *EXTRAS['ros'], *EXTRAS['dev']]
+WANTED = [('', DIRECT), *GROUPS.items()]
+
+
+def test_every_pin_has_a_version_and_a_hash_and_no_index():
     assert len(pins(LOCK)) > 100
-    for lock in (LOCK, *GROUP_LOCKS.values()):
+    for lock in ALL_LOCKS:
+        assert not re.search(r'://|--(extra-)?index|--find-links|file:|@', lock)
         for name, pin in pins(lock).items():
             assert re.match(rf'{re.escape(name)}==\d', pin), pin
             assert '--hash=sha256:' in pin, name
 
 
-def test_the_lock_names_no_index():
-    assert not re.search(
-        r'://|--(extra-)?index|--find-links|file:|@', ''.join([LOCK, *GROUP_LOCKS.values()])
-    )
-
-
 def test_the_lock_names_the_pythons_it_fits():
-    versions = re.findall(r'^# Every wheel exists for Python (.*)$', LOCK, re.MULTILINE)
-    assert len(versions) == 1
-    assert HERE in versions[0].split()
+    (versions,) = re.findall(r'^# Every wheel exists for Python (.*)$', LOCK, re.MULTILINE)
+    assert HERE in versions.split()
 
 
-@pytest.mark.parametrize('name', direct_dependencies())
-def test_a_direct_dependency_is_locked_and_has_its_reason(name):
-    assert name in pins(LOCK)
-    assert_reason(name)
-
-
-@pytest.mark.parametrize('group', GROUPS)
-def test_a_group_is_locked_and_agrees_with_the_rest(group):
-    mine = pins(GROUP_LOCKS[group])
-    for requirement in GROUPS[group]:
+@pytest.mark.parametrize(('group', 'requirements'), WANTED)
+def test_a_direct_dependency_is_locked_and_has_its_reason(group, requirements):
+    mine = pins(GROUP_LOCKS[group] if group else LOCK)
+    for requirement in requirements:
         assert name_of(requirement) in mine
         assert_reason(name_of(requirement))
-    for other in map(pins, [LOCK, *GROUP_LOCKS.values()]):
+    for other in map(pins, ALL_LOCKS):
         for name in mine.keys() & other.keys():
-            assert mine[name].split()[0] == other[name].split()[0]
+            assert mine[name].split()[0] == other[name].split()[0], name
 
 
 @pytest.mark.parametrize('folder', ['hub', 'deck_template'])
@@ -100,7 +90,8 @@ def test_what_npm_brings_is_locked_and_names_no_index(folder):
 
 def assert_reason(name: str) -> None:
     reasons = (ROOT / 'environment.md').read_text()
-    assert re.search(rf'^\| `{re.escape(name)}(\[\w+\])?` \| .{{10,}} \|$', reasons, re.MULTILINE)
+    reason = rf'^\| `{re.escape(name)}(\[\w+\])?` \| .{{10,}} \|$'
+    assert re.search(reason, reasons, re.MULTILINE), f'environment.md gives no reason for {name}.'
 
 
 def wanted_here(lock: str) -> list[Requirement]:
@@ -149,7 +140,8 @@ def put(folder: Path, name: str, script: str) -> None:
 def find_python(path: Path, versions: str = '3.14 3.13 3.12 3.11') -> subprocess.CompletedProcess:
     return subprocess.run(
         ['/bin/sh', ROOT / 'tools/find_python.sh', versions],
-        env={'PATH': str(path)},
+        # The variables of the user change nothing.
+        env={'PATH': str(path), 'PYTHONHOME': '/nowhere', 'PYTHONPATH': '/nowhere'},
         capture_output=True,
         text=True,
     )
@@ -180,17 +172,6 @@ def test_a_python_of_a_virtual_environment_stands_for_the_one_it_was_made_with(p
     assert answer.returncode == 0, answer.stderr
     assert Path(answer.stdout.strip()).samefile(BASE_PYTHON)
     assert not Path(answer.stdout.strip()).is_relative_to(sys.prefix)
-
-
-def test_variables_of_the_user_change_nothing(path):
-    (path / 'python3').symlink_to(BASE_PYTHON)
-    answer = subprocess.run(
-        ['/bin/sh', ROOT / 'tools/find_python.sh', HERE],
-        env={'PATH': str(path), 'PYTHONHOME': '/nowhere', 'PYTHONPATH': '/nowhere'},
-        capture_output=True,
-        text=True,
-    )
-    assert answer.returncode == 0, answer.stderr
 
 
 def test_without_a_python_one_sentence_says_what_to_install(path):
@@ -281,20 +262,28 @@ class Checkout:
         header = f'# Every wheel exists for Python {HERE}\n'
         (self.root / 'requirements.lock').write_text(header + ''.join(pins))
 
-    def set_up(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess:
+    def start(self, *arguments: str, **environment: str) -> subprocess.Popen:
         """Run the script offline. As a user may have it: settings of pip only, none of uv."""
         kept = {k: v for k, v in os.environ.items() if not k.startswith(('PIP_', 'UV_'))}
         kept |= {'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': self.wheels.as_uri()}
         kept |= {'UV_CACHE_DIR': str(self.wheels / 'cache'), 'PIP_CONFIG_FILE': os.devnull}
         kept |= {'PATH': f'{BASE_PYTHON.parent}{os.pathsep}{kept["PATH"]}'}
-        return subprocess.run(
+        return subprocess.Popen(
             [self.root / 'tools/set_up.sh', *arguments],
             env=kept | environment,
             cwd='/',
             stdin=subprocess.DEVNULL,
-            capture_output=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
+            start_new_session=True,
         )
+
+    def set_up(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess:
+        """Run the script to its end."""
+        process = self.start(*arguments, **environment)
+        out, err = process.communicate()
+        return subprocess.CompletedProcess(process.args, process.returncode, out, err)
 
     def installed(self) -> list[str]:
         code = 'from importlib.metadata import distributions as d; print(*(i.name for i in d()))'
@@ -390,15 +379,29 @@ def test_what_a_group_needs_is_kept_once_it_was_asked_for(checkout):
     assert answer.stderr == ''
 
 
-def test_an_environment_in_another_folder(checkout):
+def test_an_environment_in_another_folder_made_by_two_calls_at_once(checkout):
     before = checkout.stamp()
-    answer = checkout.set_up('--in', '.soak/other', HERE)
-    assert answer.returncode == 0, answer.stderr
+    with ThreadPoolExecutor(2) as pool:
+        answers = list(pool.map(checkout.set_up, ['--in'] * 2, ['.soak/other'] * 2, [HERE] * 2))
+    assert [answer.returncode for answer in answers] == [0, 0], answers
+    assert sorted('Making' in answer.stderr for answer in answers) == [False, True]
     assert (checkout.root / '.soak/other/bin/python').exists()
     assert checkout.stamp() == before, 'it touched .venv'
-    assert checkout.set_up('--in', '.soak/other', HERE).stderr == ''
     answer = checkout.set_up('--in', '.soak/older', '3.9')
     assert last_line(answer.stderr) == 'Not every pinned package has a wheel for Python 3.9.'
+
+
+def test_after_an_interruption_the_next_call_repairs(checkout):
+    """Ctrl+C while packages are installed, as a terminal sends it: to all processes."""
+    (checkout.root / '.venv/set_up.stamp').unlink(missing_ok=True)
+    with checkout.start() as process:
+        while not process.stderr.readline().startswith('Installing'):
+            assert process.poll() is None
+        os.killpg(process.pid, signal.SIGINT)
+    assert checkout.stamp() == ''
+    again = checkout.set_up()
+    assert again.returncode == 0, again.stderr
+    assert again.stderr.startswith('Making .venv')
 
 
 def test_a_moved_checkout_is_noticed(checkout, path):
