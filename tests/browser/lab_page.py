@@ -45,6 +45,26 @@ SLIDE_DRAWN = f"""index => {{
         && slide.every(cell => [...cell.node.querySelectorAll('img')].every(img => img.complete))
         && slide.every(cell => cell.node.getAnimations().length === 0);
 }}"""
+# What of a slide is cut off, or needs a scroll bar.
+CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
+    if (!cell.node.classList.contains('jp-deck-mod-onscreen')) return [];
+    const found = [];
+    const box = cell.node.getBoundingClientRect();
+    if (box.top < 0 || box.bottom > innerHeight || box.left < 0 || box.right > innerWidth)
+        found.push(`cell ${{index}} ends at ${{box.right.toFixed()}}, ${{box.bottom.toFixed()}}`);
+    for (const part of cell.node.querySelectorAll(
+        '.cm-scroller, .jp-RenderedMarkdown, .jp-OutputArea-output, pre, table, img')) {{
+        const inner = part.getBoundingClientRect();
+        if (part.scrollWidth > part.clientWidth + 1 || inner.right > innerWidth
+            || (part.clientHeight && part.scrollHeight > part.clientHeight + 1))
+            found.push(`cell ${{index}}: ${{part.tagName}}.${{part.className}} is cut off`);
+        if (part.tagName === 'IMG' && !part.naturalWidth)
+            found.push(`cell ${{index}}: a picture is missing`);
+        if (part.tagName === 'IMG' && !part.alt)
+            found.push(`cell ${{index}}: a picture has no alternative text`);
+    }}
+    return found;
+}})"""
 
 
 class LabPage:

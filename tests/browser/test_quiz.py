@@ -1,9 +1,8 @@
 """The quiz at the end of a lesson: a student opens answers, an instructor shows them."""
 
 import pytest
-from lab_page import PANEL
+from lab_page import CUT_OFF, PANEL
 from lab_server import NOTEBOOKS
-from test_instructor import CUT_OFF
 
 QUIZZES = [path for path in NOTEBOOKS if '## Quiz' in path.read_text(encoding='utf-8')]
 ACTIVATE = f'index => {{ {PANEL}.content.activeCellIndex = index; {PANEL}.content.activate() }}'
