@@ -21,7 +21,7 @@ test-browser: ## the real JupyterLab in Chromium, as students and instructors us
 	@tools/set_up.sh browser
 	@CHROMIUM="$(CHROMIUM)" $(PYTHON) -m pytest -n 2 --dist worksteal --max-worker-restart 0 -o faulthandler_timeout=600 tests/browser $(PYTEST_ARGS)
 
-hub: ## a JupyterHub for a class on this machine; HUB_ARGS=... changes how. See environment.md
+hub: ## a JupyterHub for a class on this machine; HUB_ARGS=... changes how. See teaching.md
 	@tools/hub/set_up.sh
 	@exec .venv/bin/jupyterhub --config tools/hub/jupyterhub_config.py $(HUB_ARGS)
 
@@ -29,14 +29,14 @@ test-hub: ## a class of 12 on a JupyterHub, who run lessons 02 and 03 at the sam
 	@tools/hub/set_up.sh
 	@$(PYTHON) -m pytest -n 0 -rA -o faulthandler_timeout=1200 tests/hub $(PYTEST_ARGS)
 
-notebooks: set_up ## run all notebooks and save their outputs; LESSON=02 for one
-	@$(PYTHON) tools/notebooks.py $(if $(LESSON),--lesson "$(LESSON)")
+notebooks: set_up ## run all notebooks, save their outputs, and write what follows from them; LESSON=02 for one
+	@$(PYTHON) -m tools.lessons.run $(LESSON)
 
-lesson: set_up ## begin a lesson from the template: NAME=10_count_the_losses. See CONTRIBUTING.md
-	@$(PYTHON) -m tools.new_lesson "$(NAME)"
+lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04 puts it there; REMOVE=yes takes it out
+	@$(PYTHON) -m tools.lessons.new "$(NAME)" $(if $(AFTER),--after "$(AFTER)") $(if $(filter yes,$(REMOVE)),--remove)
 
 slides: set_up ## write the lessons as HTML slides into slides/, which need no network; LESSON=02 for one
-	@$(PYTHON) tools/export_slides.py $(if $(LESSON),--lesson "$(LESSON)")
+	@$(PYTHON) -m tools.lessons.export $(LESSON)
 
 soak: set_up ## run the notebooks in hard conditions: N=10 times, CONDITIONS=idle,busy LESSON=02 MINUTES=8 SEED=7; REPORT=yes
 	@$(PYTHON) -m tools.soak $(if $(N),--rounds "$(N)") $(if $(CONDITIONS),--conditions "$(CONDITIONS)") \

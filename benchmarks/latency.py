@@ -13,7 +13,8 @@ from statistics import median
 
 import nbformat.v4
 
-from tools.notebooks import FOLDER, execute
+from tools.lessons.lesson import FOLDER
+from tools.lessons.run import execute
 
 RATES_HZ = (20, 200, 1000)
 RUN_S = 2  # how long each run publishes

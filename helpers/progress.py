@@ -1,32 +1,41 @@
 """The student's own progress: which exercises are solved, kept on this computer only.
 
 `checks.check` records each exercise that passes, and lesson 00 shows the table. The file has one
-line for each exercise. Lines are only ever added, so kernels that write at once lose nothing.
+line for each exercise, such as `lose_messages 1`: the lesson's name and not its number, which
+changes when a lesson is added before it. Lines are only ever added, so kernels that write at once
+lose nothing. Titles and exercises are read from the notebooks, as text: also from one that a
+student has broken.
 """
 
 from __future__ import annotations
 
+import json
 import os
+import re
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from jupyter_core.paths import jupyter_data_dir
 
 from helpers.text import wrap
 
-LESSONS = {  # number: title, exercises
-    '00': ('Start here', 1),
-    '01': ('Publish and subscribe', 1),
-    '02': ('Lose messages', 2),
-    '03': ('Run callbacks in parallel', 2),
-    '04': ('Choose the number of threads', 2),
-    '05': ('Call a service from a callback', 2),
-    '06': ('Make a package', 2),
-    '07': ('Use a message in your own interface', 2),
-    '08': ('Share code in a C++ library', 2),
-    '09': ('Fuse odometry, IMU and GPS', 2),
-}
 FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progress is kept
+TITLE = re.compile(r'Exercise (\d+) of lesson (\d\d)')
+
+
+class Lesson(NamedTuple):
+    """What the table says of a notebook: '02', 'lose_messages', 'Lose messages', 2."""
+
+    number: str
+    name: str
+    title: str
+    exercises: int
+
+    def lines(self) -> list[str]:
+        """Return the lines of the progress file that this lesson may have."""
+        return [f'{self.name} {count}' for count in range(1, self.exercises + 1)]
 
 
 def title_of(lesson: str, exercise: int) -> str:
@@ -34,11 +43,25 @@ def title_of(lesson: str, exercise: int) -> str:
     return f'Exercise {exercise} of lesson {lesson}'
 
 
-TITLES = {
-    title_of(lesson, exercise)
-    for lesson, (_, exercises) in LESSONS.items()
-    for exercise in range(1, exercises + 1)
-}
+def lessons() -> list[Lesson]:
+    """Return the notebooks that have exercises, in teaching order.
+
+    They are those in the folder of the running notebook, or else those of this checkout. What
+    cannot be read of a notebook is taken from its file name.
+    """
+    found = []
+    for path in _notebooks():
+        try:
+            text = path.read_text(encoding='utf-8', errors='replace')
+        except OSError:
+            continue
+        title = re.search(r'^\s*"# \d\d (.*?)(?:\\n)?",?$', text, re.MULTILINE)
+        words = path.stem[3:].replace('_', ' ').capitalize()
+        with suppress(ValueError):
+            words = json.loads(f'"{title[1]}"') if title else words
+        numbers = re.findall(r'^\s*"### Exercise (\d+)', text, re.MULTILINE)
+        found.append(Lesson(path.name[:2], path.stem[3:], words, len(set(numbers))))
+    return [lesson for lesson in found if lesson.exercises]
 
 
 def file() -> Path | None:
@@ -59,30 +82,31 @@ def record(title: str) -> None:
     Where the file cannot be written nothing happens, since no lesson may fail because of it.
     `show` tells the reader.
     """
-    path = file()
-    if path is None or title not in TITLES:
+    path, found = file(), TITLE.fullmatch(title)
+    if path is None or not found:
         return
-    try:
-        text = _read(path)
-        if title not in text.splitlines():
-            # After a line without an end, begin a new one. A short write is one step of the system.
-            line = f'{title}\n' if text.endswith('\n') or not text else f'\n{title}\n'
-            with path.open('ab', buffering=0) as lines:
-                lines.write(line.encode())
-    except OSError:
-        pass
+    with suppress(OSError):
+        for notebook in _notebooks(found[2]):
+            key = f'{notebook.stem[3:]} {found[1]}'
+            text = _read(path)
+            if key not in text.splitlines():
+                # After a line without an end, begin a new one. A short write is one system call.
+                line = f'{key}\n' if text.endswith('\n') or not text else f'\n{key}\n'
+                with path.open('ab', buffering=0) as lines:
+                    lines.write(line.encode())
 
 
 def show() -> None:
     """Print for each lesson which exercises are solved, and where progress cannot be kept, why."""
-    path, lines = file(), []
+    path, lines, known = file(), [], lessons()
     if path is not None:
         try:
             lines = _read(path).splitlines()
         except OSError as error:
             _print(f'Your progress is not kept, because {path} cannot be used: {error.strerror}.')
-    print(_table(set(lines)))
-    unknown = [line for line in lines if line and line not in TITLES]
+    print(table(known, lines))
+    names = {path.stem[3:] for path in _notebooks()}
+    unknown = [line for line in lines if line and line.rpartition(' ')[0] not in names]
     if unknown:
         _print(
             f'Not understood in {path}, and left as it is: {len(unknown)} of {len(lines)} lines.'
@@ -98,23 +122,38 @@ def start_again() -> None:
     print('Your table is empty again.')
 
 
+def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
+    """Return a row for each lesson, and a line with the sum; `solved` holds lines of the file."""
+    rows, done = [], []
+    known = list(known)
+    most = max((lesson.exercises for lesson in known), default=1)
+    heads = '  '.join(f'exercise {count}' for count in range(1, most + 1))
+    width = max((len(lesson.title) for lesson in known), default=0) + 5
+    rows.append(f'{"lesson":<{width}}{"solved":<9}{heads}')
+    for lesson in known:
+        states = [key in solved for key in lesson.lines()]
+        done += states
+        words = ''.join(f'{"solved" if one else "open":<12}' for one in states)
+        count = f'{sum(states)} of {len(states)}'
+        rows.append(f'{f"{lesson.number} {lesson.title}":<{width}}{count:<9}{words}'.rstrip())
+    rows.append(f'{sum(done)} of {len(done)} exercises are solved.')
+    return '\n'.join(rows)
+
+
+def _notebooks(number: str = '[0-9][0-9]') -> list[Path]:
+    """Return the notebooks with this number: a student of a JupyterHub has a copy of their own."""
+    here = Path.cwd()
+    own = any(here.glob('00_*.ipynb'))
+    folder = here if own else Path(__file__).resolve().parent.parent / 'notebooks'
+    return sorted(folder.glob(f'{number}_*.ipynb'))
+
+
 def _read(path: Path) -> str:
     """Return the text of the file, which is made where it does not exist."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open('a+b') as lines:
         lines.seek(0)
         return lines.read().decode(errors='replace')
-
-
-def _table(solved: set[str]) -> str:
-    rows = [f'{"lesson":<40}{"solved":<9}exercise 1  exercise 2']
-    for lesson, (name, exercises) in LESSONS.items():
-        done = [title_of(lesson, exercise) in solved for exercise in range(1, exercises + 1)]
-        states = ''.join(f'{"solved" if one else "open":<12}' for one in done)
-        count = f'{sum(done)} of {exercises}'
-        rows.append(f'{lesson} {name:<37}{count:<9}{states}'.rstrip())
-    rows.append(f'{len(solved & TITLES)} of {len(TITLES)} exercises are solved.')
-    return '\n'.join(rows)
 
 
 def _print(text: str) -> None:

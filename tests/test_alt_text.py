@@ -1,4 +1,4 @@
-"""What is said about a figure. test_notebook_rules.py shows figures in a real kernel."""
+"""What is said about a figure. tools/test_run.py shows figures in a real kernel."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,55 +1,53 @@
-"""Every lesson keeps the rules of notebook_rules.py. nbval runs the lessons."""
+"""Every lesson keeps the rules, and what is said of it elsewhere is right. nbval runs it."""
 
-import nbformat
-import notebook_rules as rules
 import pytest
 
 from helpers import progress
-from tools.notebooks import FOLDER, PICTURES, pictures
+from tools.lessons import rules, run, tables
+from tools.lessons.lesson import FOLDER, lessons
 
-PATHS = sorted(FOLDER.glob('*.ipynb'))
-NAMES = [path.name for path in PATHS]
-
-
-def test_lessons_are_in_teaching_order():
-    assert rules.teaching_order(NAMES) == []
+LESSONS = lessons()
+TEXTS = tables.texts_of()
 
 
-@pytest.mark.parametrize('group', rules.GROUPS)
-@pytest.mark.parametrize('path', PATHS, ids=NAMES)
-def test_lesson(path, group):
-    assert rules.problems(nbformat.read(path, as_version=4), group) == []
+@pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
+def test_lesson(lesson):
+    assert rules.problems(lesson) == []
 
 
-@pytest.mark.parametrize('path', PATHS, ids=NAMES)
-def test_lesson_in_its_folder(path):
-    text = path.read_text(encoding='utf-8')
-    notebook = nbformat.reads(text, as_version=4)
-    assert rules.saved_as_jupyter_does(text, notebook) == []
-    assert rules.title_matches(path.name, notebook) == []
-    assert rules.links_lead_somewhere(notebook, FOLDER) == []
-    assert rules.maps_every_lesson(notebook, NAMES) == []
+def test_lessons_together():
+    assert rules.problems_of_all(LESSONS) == []
 
 
-def test_progress_knows_every_exercise():
-    found = {}
-    for path in PATHS:
-        notebook = nbformat.read(path, as_version=4)
-        if exercises := rules.exercises(notebook):
-            title = notebook.cells[0].source.splitlines()[0].removeprefix('# ')
-            found[title[:2]] = title[3:], len(exercises)
-    assert found == progress.LESSONS, f'LESSONS in helpers/progress.py should be {found}'
+@pytest.fixture(scope='module')
+def made():
+    return tables.made(TEXTS)
 
 
-def test_the_readme_leads_to_every_notebook():
-    readme = (FOLDER.parent / 'README.md').read_text(encoding='utf-8')
-    assert [name for name in NAMES if f'(notebooks/{name})' not in readme] == []
+@pytest.mark.parametrize('path', TEXTS)
+def test_what_follows_from_the_notebooks(path, made):
+    assert path not in made, (
+        f'{path} differs from what follows from the notebooks: run `{tables.COMMAND}`.'
+    )
+
+
+def test_lesson_00_shows_the_exercises_that_there_are():
+    assert not tables.needs_run(LESSONS), (
+        f'The table in notebook 00 is of other lessons: run `{tables.COMMAND}`.'
+    )
+
+
+def test_a_kernel_reads_the_same_exercises_as_the_rules():
+    found = [
+        progress.Lesson(one.number, one.name, one.title, len(rules.exercises(one)))
+        for one in LESSONS
+        if rules.exercises(one)
+    ]
+    assert progress.lessons() == found
 
 
 def test_pictures_are_those_of_the_notebooks():
-    found = {}
-    for path in PATHS:
-        found |= pictures(nbformat.read(path, as_version=4))
-    assert sorted(found) == sorted(PICTURES.values())
+    found = {name: png for one in LESSONS for name, png in run.pictures(one.notebook).items()}
+    assert sorted(found) == sorted(run.PICTURES.values())
     for name, picture in found.items():
         assert (FOLDER / name).read_bytes() == picture, f'run `make notebooks` for {name}'

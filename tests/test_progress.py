@@ -1,3 +1,6 @@
+"""The student's progress, with the notebooks of a folder made for it."""
+
+import re
 import subprocess
 import sys
 
@@ -5,9 +8,27 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook
 
 from helpers import checks, progress
-from tools import notebooks
+from tools.lessons import run
 
-TITLE, OTHER = 'Exercise 1 of lesson 02', 'Exercise 2 of lesson 02'
+TITLE, OTHER = 'Exercise 1 of lesson 92', 'Exercise 2 of lesson 92'
+NOTEBOOKS = {
+    '00_start_here': ['# 00 Start here', '### Exercise 1: Two robots'],
+    '01_publish': ['# 01 Publish'],
+    '92_lose_them': ['# 92 Lose them\\n', '### Exercise 1: A\\n', '### Exercise 2: B\\n'],
+    '93_share_cpp': ['# 93 Share \\"C++\\"', '### Exercise 1: A', '"### Exercise 1: A'],
+}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """The folder of the notebooks, in which a kernel works."""
+    folder = tmp_path / 'notebooks'
+    folder.mkdir()
+    for name, lines in NOTEBOOKS.items():
+        source = ''.join(f'    "{line}",\n' for line in lines)
+        (folder / f'{name}.ipynb').write_text(source, encoding='utf-8')
+    monkeypatch.chdir(folder)
+    return folder
 
 
 @pytest.fixture
@@ -24,30 +45,58 @@ def shown(capsys):
 
 
 def test_a_new_student(kept, capsys):
-    text = shown(capsys)
-    assert text.count('open') == len(progress.TITLES) == 18
-    assert text.endswith('\n0 of 18 exercises are solved.\n')
-    assert max(map(len, text.splitlines())) <= 94
+    assert shown(capsys) == (
+        'lesson          solved   exercise 1  exercise 2\n'
+        '00 Start here   0 of 1   open\n'
+        '92 Lose them    0 of 2   open        open\n'
+        '93 Share "C++"  0 of 1   open\n'
+        '0 of 4 exercises are solved.\n'
+    )
 
 
 def test_a_solved_exercise_is_in_the_table(kept, capsys):
     progress.record(OTHER)
     progress.record('Exercise 1 of lesson 00')
     text = shown(capsys)
-    assert '02 Lose messages                        1 of 2   open        solved\n' in text
-    assert '00 Start here                           1 of 1   solved\n' in text
-    assert text.endswith('\n2 of 18 exercises are solved.\n')
+    assert '92 Lose them    1 of 2   open        solved\n' in text
+    assert '00 Start here   1 of 1   solved\n' in text
+    assert text.endswith('\n2 of 4 exercises are solved.\n')
+
+
+def test_what_is_solved_stays_so_when_the_lesson_gets_another_number(kept, capsys, folder):
+    progress.record(OTHER)
+    (folder / '92_lose_them.ipynb').rename(folder / '94_lose_them.ipynb')
+    (folder / '92_count.ipynb').write_text('"# 92 Count",\n"### Exercise 1: A",\n')
+    text = shown(capsys)
+    assert '\n92 Count        0 of 1   open\n' in text
+    assert '1 of 2   open        solved\n' in text
+
+
+@pytest.mark.parametrize('broken', [b'', b'\xff\xfe{', b'"# 92 \\x",\n"### Exercise 1: A",\n'])
+def test_a_broken_notebook_breaks_nothing(kept, capsys, folder, broken):
+    (folder / '92_lose_them.ipynb').write_bytes(broken)
+    (folder / '94_no_file.ipynb').mkdir()
+    progress.record(TITLE)
+    text = shown(capsys)
+    assert re.search(r'^00 Start here +0 of 1 +open$', text, re.MULTILINE)
+    assert 'Not understood' not in text
+    assert kept.read_text() == 'lose_them 1\n'
+
+
+def test_elsewhere_the_notebooks_are_those_of_the_checkout(folder, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert 'lose_messages' in {lesson.name for lesson in progress.lessons()}
 
 
 def test_solved_again_is_one_line(kept):
     for title in (TITLE, OTHER, TITLE, OTHER):
         progress.record(title)
-    assert kept.read_text() == f'{TITLE}\n{OTHER}\n'
+    assert kept.read_text() == 'lose_them 1\nlose_them 2\n'
 
 
 @pytest.mark.parametrize(
     'title',
-    ['Solution of exercise 1', 'Exercise 1', 'Exercise 3 of lesson 02', 'Exercise 1 of lesson 10'],
+    ['Solution of exercise 1', 'Exercise 1', 'Exercise 1 of lesson 10'],
 )
 def test_other_titles_are_not_kept(kept, title):
     progress.record(title)
@@ -60,12 +109,13 @@ def test_a_check_that_passes_is_kept_and_no_other(kept, capsys):
     assert not kept.exists()
     checks.check(TITLE, ('it is right', True, ''))
     checks.check(TITLE, ('it is right', False, 'It was right before.'))
-    assert kept.read_text() == f'{TITLE}\n'
+    assert kept.read_text() == 'lose_them 1\n'
 
 
 def test_kernels_that_write_at_once_lose_nothing(kept, capsys):
     write = (
-        'import random, sys; from helpers import progress; titles = sorted(progress.TITLES)\n'
+        'import random, sys; from helpers import progress; '
+        'titles = [f"Exercise {n} of lesson {m}" for n in (1, 2, 3) for m in ("00", "92")]\n'
         'random.shuffle(titles); print(flush=True); sys.stdin.read(1)\n'
         'for title in titles: progress.record(title)'
     )
@@ -78,8 +128,10 @@ def test_kernels_that_write_at_once_lose_nothing(kept, capsys):
     for writer in writers:
         assert writer.wait(60) == 0
         writer.stdout.close()
-    assert set(kept.read_text().splitlines()) == progress.TITLES
-    assert shown(capsys).endswith('\n18 of 18 exercises are solved.\n')
+    names = ('start_here', 'lose_them')
+    lines = {f'{name} {count}' for name in names for count in (1, 2, 3)}
+    assert set(kept.read_text().splitlines()) == lines
+    assert '\n3 of 4 exercises are solved.\n' in shown(capsys)
 
 
 def test_a_place_that_cannot_be_written_fails_no_lesson(tmp_path, monkeypatch, capsys):
@@ -91,17 +143,17 @@ def test_a_place_that_cannot_be_written_fails_no_lesson(tmp_path, monkeypatch, c
     text = ' '.join(shown(capsys).split())
     assert text.startswith('Your progress is not kept, because ')
     assert f'{path} cannot be used: ' in text
-    assert text.endswith('0 of 18 exercises are solved.')
+    assert text.endswith('0 of 4 exercises are solved.')
 
 
 def test_a_corrupt_file_is_told_and_left_as_it_is(kept, capsys):
     kept.parent.mkdir()
-    damaged = f'{TITLE}\n'.encode() + b'\xff\x00?\n\nExercise 2 of les'
+    damaged = b'lose_them 1\n\xff\x00?\n\nlose_mess'
     kept.write_bytes(damaged)
     progress.record(OTHER)
-    assert kept.read_bytes() == damaged + f'\n{OTHER}\n'.encode()
+    assert kept.read_bytes() == damaged + b'\nlose_them 2\n'
     text = ' '.join(shown(capsys).split())
-    assert '02 Lose messages 2 of 2 solved solved' in text
+    assert '92 Lose them 2 of 2 solved solved' in text
     assert text.endswith(f'Not understood in {kept}, and left as it is: 2 of 5 lines.')
 
 
@@ -111,8 +163,8 @@ def test_start_again(kept, capsys):
     progress.record(TITLE)
     progress.start_again()
     capsys.readouterr()
-    assert '0 of 18' in shown(capsys)
-    assert kept.with_suffix('.old').read_text() == f'{TITLE}\n'
+    assert '0 of 4' in shown(capsys)
+    assert kept.with_suffix('.old').read_text() == 'lose_them 1\n'
 
 
 def test_where_it_is_kept(tmp_path, monkeypatch):
@@ -128,10 +180,10 @@ def test_tests_and_make_notebooks_keep_nothing(tmp_path, monkeypatch, capsys):
     assert progress.file() is None  # conftest.py
     monkeypatch.setenv('JUPYTER_DATA_DIR', str(tmp_path))
     progress.record(TITLE)
-    assert '0 of 18' in shown(capsys)
+    assert '0 of 4' in shown(capsys)
     progress.start_again()
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ['notebooks']
     monkeypatch.delenv(progress.FILE_VARIABLE)
     cell = new_code_cell('from helpers import progress\nprogress.file()')
-    executed = notebooks.execute(new_notebook(cells=[cell]), tmp_path)
+    executed = run.execute(new_notebook(cells=[cell]), tmp_path)
     assert executed.cells[0].outputs == []

@@ -7,7 +7,7 @@ import pytest
 from lab_server import NOTEBOOKS
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
 
-from tools import export_slides
+from tools.lessons import export
 
 FORMULA = r'A law: $x_{k+1} = F x_k$, and $$\int_0^1 x^2 \, dx = \frac{1}{3}.$$'
 NOTE = 'For the instructor: 5 minutes\n\nAsk first.'
@@ -46,8 +46,8 @@ def folder(tmp_path_factory):
         new_code_cell('secret = 1', metadata={'tags': ['solution']}),
     ]
     nbformat.write(new_notebook(cells=cells), source / '99_try_formulas.ipynb')
-    assert export_slides.main([], output=output) == 0
-    assert export_slides.main([], source, output) == 0
+    assert export.main([], output=output) == 0
+    assert export.main([], source, output) == 0
     return output
 
 
@@ -76,7 +76,7 @@ def open_deck(chromium, folder):
 @pytest.mark.parametrize('path', NOTEBOOKS, ids=[path.name for path in NOTEBOOKS])
 def test_every_slide_is_reached_and_nothing_is_cut_off(open_deck, artefacts, path):
     page = open_deck(path.with_suffix('.html').name)
-    notebook = export_slides.for_reveal(nbformat.read(path, as_version=4))
+    notebook = export.for_reveal(nbformat.read(path, as_version=4))
     types = [cell.metadata.slideshow['slide_type'] for cell in notebook.cells]
     slides, cut_off = 0, []
     while True:

@@ -5,7 +5,7 @@ import pytest
 from lab_page import CUT_OFF, PANEL, complaints, printed
 from lab_server import NOTEBOOKS
 
-from tools.slides import slide_types
+from tools.lessons.slides import slide_types
 
 
 @pytest.mark.parametrize('path', NOTEBOOKS, ids=[path.name for path in NOTEBOOKS])

@@ -31,7 +31,7 @@ from pathlib import Path
 import pandas as pd
 import psutil
 
-from tools.notebooks import FOLDER, lessons
+from tools.lessons.lesson import chosen
 from tools.soak.conditions import CACHE, CONDITIONS, ROOT, CannotRunError, Condition, sandbox
 from tools.soak.leftovers import adopt_orphans, files_of
 
@@ -267,10 +267,10 @@ def main(arguments: list[str] | None = None) -> int:
     if unknown := set(wanted) - set(names):
         parser.error(f'There is no condition {min(unknown)!r}: take of {", ".join(names)}.')
     try:
-        chosen = lessons(options.lesson.replace(',', ' ').split(), FOLDER)
+        paths = chosen(options.lesson.replace(',', ' '))
     except ValueError as error:
         parser.error(str(error))
-    notebooks = [path for path in chosen if '"cell_type": "code"' in path.read_text('utf-8')]
+    notebooks = [path for path in paths if '"cell_type": "code"' in path.read_text('utf-8')]
     if not options.report:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         seed = options.seed if options.seed is not None else random.randrange(10**6)

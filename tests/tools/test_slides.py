@@ -11,7 +11,7 @@ from nbformat.v4 import (
     new_raw_cell,
 )
 
-from tools.slides import SLIDE, height, slide_types
+from tools.lessons.slides import SLIDE, height, slide_types
 
 TITLE = new_markdown_cell('# 02 Lose messages\n\n**You need** lesson 01.')
 STEP = new_markdown_cell('## 1. Build\n\nA node.')

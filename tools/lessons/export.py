@@ -1,14 +1,13 @@
 """Export the lessons as slides: HTML files that work without a network.
 
-    python tools/export_slides.py                  all lessons, into slides/
-    python tools/export_slides.py --lesson 02 03   some of them
+    python -m tools.lessons.export             all lessons, into slides/
+    python -m tools.lessons.export 02 03       some of them
 
 reveal.js and MathJax come from npm once, into .venv, and are copied beside the decks. The outputs
 are the saved ones. Solutions are left out. The cells with the tag `notes` are the speaker notes: S
 opens them in a window of its own.
 """
 
-import argparse
 import re
 import shutil
 import subprocess
@@ -20,13 +19,13 @@ import nbformat
 from nbconvert.exporters import SlidesExporter
 from nbformat import NotebookNode
 
-from tools.notebooks import FOLDER, lessons
-from tools.slides import CODE, slide_types
+from tools.lessons.lesson import FOLDER, GLOSSARY, ROOT, chosen
+from tools.lessons.slides import CODE, slide_types
 
-HERE = Path(__file__).resolve().parent
+HERE = Path(__file__).resolve().parents[1]
 TEMPLATE = HERE / 'deck_template'
-OUTPUT = HERE.parent / 'slides'
-PACKAGES = HERE.parent / '.venv' / 'deck'
+OUTPUT = ROOT / 'slides'
+PACKAGES = ROOT / '.venv' / 'deck'
 LIBRARY = (
     'reveal.js/dist/reveal.css',
     'reveal.js/dist/reveal.js',
@@ -109,14 +108,11 @@ def export(path: Path, output: Path) -> Path:
     return file
 
 
-def main(arguments: list[str] | None = None, folder: Path = FOLDER, output: Path = OUTPUT) -> int:
-    """Run the tool; return its exit status."""
-    parser = argparse.ArgumentParser(description='Export the lessons as slides.')
-    parser.add_argument('--lesson', nargs='+', default=[], metavar='NN', help='for example 02')
-    numbers = ' '.join(parser.parse_args(arguments).lesson).split()
+def main(arguments: list[str], folder: Path = FOLDER, output: Path = OUTPUT) -> int:
+    """Run the tool with the numbers of lessons; return its exit status."""
     try:
         # Every deck has a link to the glossary.
-        paths = sorted({*lessons(numbers, folder), *folder.glob('99_*.ipynb')})
+        paths = sorted({*chosen(' '.join(arguments), folder), *folder.glob(f'{GLOSSARY}_*.ipynb')})
         packages = fetch_packages()
     except ValueError as error:
         print(error, file=sys.stderr)
@@ -136,4 +132,4 @@ def main(arguments: list[str] | None = None, folder: Path = FOLDER, output: Path
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -12,7 +12,7 @@ from nbformat.v4 import (
     new_raw_cell,
 )
 
-from tools import export_slides
+from tools.lessons import export
 
 NOTE = 'For the instructor: 5 minutes\n\nAsk first.'
 
@@ -36,7 +36,7 @@ def lesson():
 
 
 def test_notes_are_for_the_speaker_and_solutions_for_nobody(lesson):
-    cells = export_slides.for_reveal(lesson).cells
+    cells = export.for_reveal(lesson).cells
     types = [cell.metadata.slideshow['slide_type'] for cell in cells]
     assert types == ['slide', 'notes', 'fragment', 'skip', 'fragment', 'fragment']
     assert cells[1].cell_type == 'markdown'
@@ -56,7 +56,7 @@ def test_a_note_stays_as_long_as_its_step():
         new_code_cell(code),
         new_markdown_cell('## 2. Look'),
     ]
-    cells = export_slides.for_reveal(new_notebook(cells=cells)).cells
+    cells = export.for_reveal(new_notebook(cells=cells)).cells
     steps = [cell.source for cell in cells if cell.metadata.slideshow['slide_type'] != 'fragment']
     assert steps == ['## 1. Run', NOTE, 'Again.', NOTE, '## 2. Look']
     assert len({cell.id for cell in cells}) == len(cells)
@@ -66,19 +66,19 @@ def test_the_reason_of_an_answer_is_folded_with_it(tmp_path):
     answer = '<details><summary>A. Yes.</summary>\n\nA reason.\n\n</details>'
     path = tmp_path / '02_lose_messages.ipynb'
     nbformat.write(new_notebook(cells=[new_markdown_cell(f'# 02 Lose messages\n\n{answer}')]), path)
-    html = export_slides.export(path, tmp_path).read_text(encoding='utf-8')
+    html = export.export(path, tmp_path).read_text(encoding='utf-8')
     folded = r'<details><summary>A\. Yes\.</summary>\s*<p>A reason\.</p>\s*</details>'
     assert re.search(folded, html)
 
 
 def test_without_npm_one_sentence_says_what_to_install(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv('PATH', str(tmp_path))
-    monkeypatch.setattr(export_slides.fetch_packages, '__defaults__', (tmp_path / 'deck',))
-    assert export_slides.main([], output=tmp_path / 'slides') == 1
-    assert capsys.readouterr().err == export_slides.NEEDS_NPM + '\n'
+    monkeypatch.setattr(export.fetch_packages, '__defaults__', (tmp_path / 'deck',))
+    assert export.main([], output=tmp_path / 'slides') == 1
+    assert capsys.readouterr().err == export.NEEDS_NPM + '\n'
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_lesson_is_reported(tmp_path, capsys):
-    assert export_slides.main(['--lesson', '77'], output=tmp_path) == 1
+    assert export.main(['77'], output=tmp_path) == 1
     assert capsys.readouterr().err.startswith("There is no single lesson '77'.")

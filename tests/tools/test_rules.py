@@ -1,0 +1,272 @@
+"""The template keeps all rules; broken in one place, it breaks the one that it should."""
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_output, new_raw_cell
+
+from tools.lessons import rules
+from tools.lessons.clean import clean
+from tools.lessons.lesson import FOLDER, Lesson, lessons
+from tools.lessons.new import TEMPLATE
+
+TEXT = TEMPLATE.read_text(encoding='utf-8')
+FILE = '90_write_a_lesson.ipynb'
+GLOSSARY = lessons()[-1]
+FRENCH = '<details lang="fr">\n<summary>Français</summary>\nUn nœud (node) écoute.\n</details>'
+URDU = (
+    '<details lang="ur" dir="rtl">\n<summary>اردو</summary>\n'
+    'قطار میں پیغام ہے <bdi dir="ltr">C++</bdi>۔\n</details>'
+)
+VIETNAMESE = '<details lang="vi">\n<summary>Tiếng Việt</summary>\nMột nút (node) ở đây.\n</details>'
+ALT = 'alt="One dot for each of five messages."'
+
+
+def lesson(text=TEXT, *cells, file=FILE):
+    """Return the template, or what its text has become, with some cells before its exercises."""
+    notebook = nbformat.reads(text, as_version=4)
+    at = next(i for i, cell in enumerate(notebook.cells) if cell.source.startswith('## Exercises'))
+    notebook.cells[at:at] = cells
+    return Lesson(file, notebook)
+
+
+def code(source='run()', *tags, outputs=()):
+    cell = new_code_cell(source, metadata={'tags': list(tags)}, outputs=list(outputs))
+    cell.execution_count = 9
+    if 'solution' in tags:
+        cell.metadata.jupyter = {'source_hidden': True}
+    return cell
+
+
+def printed(text, name='stdout'):
+    return code(outputs=[new_output('stream', name=name, text=text)])
+
+
+def shown(**data):
+    bundle = {kind.replace('_', '/'): text for kind, text in data.items()}
+    return code(outputs=[new_output('execute_result', data=bundle)])
+
+
+def note(text, *tags):
+    metadata = {'tags': ['notes'], 'jupyter': {'source_hidden': True}}
+    return new_raw_cell(text, metadata=metadata)
+
+
+def translated(text):
+    """Return the template with its summary in all languages; `text` holds the other ones."""
+    built = lesson()
+    english, glossary = built.notebook.cells[1].source.split('\n\n')
+    built.notebook.cells[1].source = '\n\n'.join([english, text, glossary])
+    return built
+
+
+def complaints(built):
+    """Return the names of the rules that `built` breaks; each says what, in a sentence."""
+    names = set()
+    for rule in rules.EVERY + rules.LESSON:
+        for sentence in rule(built):
+            assert sentence.endswith('.')
+            names.add(rule.__name__)
+    return names
+
+
+def test_the_template_keeps_all_rules():
+    built = lesson()
+    assert rules.problems(built) == []
+    nbformat.validate(built.notebook)
+    assert clean(built.notebook) == built.notebook
+    assert rules.problems(translated('\n\n'.join([FRENCH, URDU, VIETNAMESE]))) == []
+
+
+# A rule, a text in the file of the template, and what it becomes.
+CHANGED = [
+    ('opens', '# 90 Write a', '# 90 Read a'),
+    ('opens', '# 90 Write a', '# 91 Write a'),
+    ('opens', '# 90 Write a lesson', 'Write a lesson'),
+    ('opens', '**You need**', 'You need'),
+    ('opens', '**At the end you can**', '**You could**'),
+    ('steps', '## 1. Build', '## Build'),
+    ('steps', '## 2. Predict', '## 3. Predict'),
+    ('steps', '## Recap', '## Summary'),
+    ('steps', '## In practice', '## The end'),
+    ('headings_in_order', '## 3. Run', '## 3. Run\\n\\n#### Why'),
+    ('headings_in_order', '## 3. Run', '# 3. Run'),
+    ('recap_answers_opening', '- **Count what arrives**: the same', '- **Count**: the same'),
+    ('recap_answers_opening', '- **Count what arrives**: the same', '- Count: the same'),
+    ('recap_answers_opening', '- **Count what arrives**: what', 'Count what arrives: what'),
+    ('says_where_it_belongs', '**Time** 10 minutes', '**Time** 11 minutes'),
+    ('says_where_it_belongs', '**Time** 10 minutes', '**Time** ten minutes'),
+    ('says_where_it_belongs', 'For the instructor: 2 minutes', 'For the instructor: ask'),
+    ('says_where_it_belongs', 'Part: nodes', 'Part: node'),
+    ('says_where_it_belongs', 'Part: nodes', 'Timetables: half a day (step 9)\\nPart: nodes'),
+    ('has_what_a_lesson_has', '"predict"', '"deck-break"'),
+    ('has_what_a_lesson_has', '### Exercise 1', '### Practice 1'),
+    ('has_what_a_lesson_has', '## In practice', '### Question 4\\n\\n## In practice'),
+    ('guesses_are_compared', 'my_guess = 5', 'print(5)'),
+    ('guesses_are_compared', "heard?', my_guess,", "heard?', 5,"),
+    ('guesses_are_compared', 'compare_prediction(', 'print('),
+    ('exercises_are_checked', '### Exercise 1', '### Exercise 2'),
+    ('exercises_are_checked', '"exercise"', '"deck-break"'),
+    ('exercises_are_checked', '"check"', '"exercise"'),
+    ('exercises_are_checked', '"solution"', '"check"'),
+    ('exercises_are_checked', '[not yet] The', '[ok] The'),
+    ('exercises_are_checked', '[ok] The', 'The'),
+    ('exercises_are_checked', 'Exercise 1 of lesson 90: 0', 'Exercise 1: 0'),
+    ('exercises_are_checked', 'Solution of exercise 1: 1', 'Exercise 1 of lesson 90: 1'),
+    ('tagged', '"check"', '"chek"'),
+    ('tagged', '# Solution of exercise 1', '# A solution'),
+    ('tagged', '    "jupyter": {\n     "source_hidden": true\n    },\n', ''),
+    ('answers_have_reasons', '### Question 3', '### Question 4'),
+    ('answers_have_reasons', '<summary>B. The same', '<summary>C. The same'),
+    ('answers_have_reasons', '**No.** On a busy machine it is not.', '**No.**'),
+    ('answers_have_reasons', '**No.** On a', 'No: on a'),
+    ('answers_have_reasons', '**No.** On a', '**Right.** On a'),
+    ('answers_have_reasons', '**Right.** This', '**No.** This'),
+    ('answers_have_reasons', '### Question 2', '<details>\\n\\n### Question 2'),
+    ('summary_in_languages', '**In short**', 'In short'),
+    ('summary_in_languages', 'A node publishes five', 'One. Two. Three. A node publishes five'),
+    ('links_lead_somewhere', '99_look_up_a_term.ipynb', '98_look_up_a_term.ipynb'),
+    ('executed_in_order', '"execution_count": 3', '"execution_count": null'),
+    ('executed_in_order', '"execution_count": 3', '"execution_count": 7'),
+]
+
+# A rule, and a cell that breaks it.
+ADDED = [
+    ('prints_what_stays', code(outputs=[new_output('error', ename='E', evalue='', traceback=[])])),
+    ('prints_what_stays', printed('warning\n', 'stderr')),
+    ('prints_what_stays', printed('saved in /home/ada/plot.csv\n')),
+    ('prints_what_stays', printed('file:///tmp/x\n')),
+    ('prints_what_stays', printed('lib/python3.11/site-packages/rclpy\n')),
+    ('prints_what_stays', printed(r'C:\Users\ada' + '\n')),
+    ('prints_what_stays', printed(f'in {FOLDER.parent}\n')),
+    ('prints_what_stays', shown(text_html='<a href="/root/x">x</a>')),
+    ('prints_what_stays', printed('<Node object at 0x7f12ab34cd56>\n')),
+    ('prints_what_stays', printed('heard by Thread-3 (spin)\n')),
+    ('prints_what_stays', printed('heard by ThreadPoolExecutor-0_1\n')),
+    ('prints_what_stays', shown(text_plain='<Axes: >')),
+    ('prints_what_stays', shown(text_plain='[<Line2D>]')),
+    ('prints_what_stays', shown(text_plain="Text(0, 1, 'a')")),
+    ('compared', code('x = 1\na.plot(x);  # draws')),
+    ('compared', code('%matplotlib inline\na.plot(x);')),
+    ('compared', code('clear_output(wait=True)')),
+    ('compared', code('bar = display(0, display_id=True)')),
+    ('compared', code('%%capture\nrun()')),
+    ('compared', code('# NBVAL_IGNORE_OUTPUT\nrun()')),
+    ('compared', code('# NBVAL_IGNORE_OUTPUT\n# Not compared:\nrun()')),
+    ('compared', code('run()', 'nbval-ignore-output')),
+    ('compared', code('# Not compared: slow.\n# NBVAL_SKIP\nrun()')),
+    ('compared', code('run()  \n  # NBVAL_RAISES_EXCEPTION')),
+    ('compared', code('# NBVAL_CHECK_OUTPUT\nrun()')),
+    ('compared', code('# PYTEST_VALIDATE_IGNORE_OUTPUT\nrun()')),
+    ('pictures_described', shown(text_html='<img alt="A figure.">')),
+    ('pictures_described', shown(text_html=f'<img {ALT}> <img {ALT}>')),
+    ('pictures_described', shown(text_html='<img src="b">')),
+    ('pictures_described', shown(image_png='iVBO')),
+    ('pictures_described', new_markdown_cell('![](images/b.png)')),
+    ('pictures_described', new_markdown_cell('<img src="images/b.png">')),
+    ('exercises_are_checked', code('run()', 'check')),
+    ('tagged', note('Ask first.')),
+    ('tagged', new_markdown_cell('For the instructor: ask', metadata=note('').metadata)),
+    ('fits_a_slide', code('\n'.join(['run()'] * (rules.MAX_CODE_LINES + 1)))),
+    ('fits_a_slide', code('%%write a\n' + 'run()\n' * rules.MAX_FILE_LINES)),
+    ('fits_a_slide', new_markdown_cell('word ' * (rules.MAX_WORDS + 1))),
+    ('fits_a_slide', printed('line\n' * 40)),
+    ('links_lead_somewhere', new_markdown_cell('[there](nowhere.ipynb)')),
+]
+
+
+@pytest.mark.parametrize(('rule', 'old', 'new'), CHANGED)
+def test_a_template_that_is_changed_breaks_a_rule(rule, old, new):
+    assert old in TEXT
+    assert rule in complaints(lesson(TEXT.replace(old, new, 1)))
+
+
+@pytest.mark.parametrize(('rule', 'cell'), ADDED)
+def test_a_cell_that_is_added_breaks_a_rule(rule, cell):
+    assert rule in complaints(lesson(TEXT, cell))
+
+
+def test_every_rule_is_broken_once():
+    names = {rule.__name__ for rule in rules.EVERY + rules.LESSON}
+    assert names == {name for name, *_ in CHANGED + ADDED}
+
+
+@pytest.mark.parametrize(
+    'cell',
+    [
+        code('# NBVAL_IGNORE_OUTPUT\n# Not compared: times.\nrun()'),
+        code('a = draw();'),
+        code('f(";")'),
+        code('%magic'),
+        code('%%write a\n' + 'run()\n' * rules.MAX_CODE_LINES),
+        printed('/dev/shm is empty; the topic /worker, 1/tmp, and/or\n'),
+        printed('    python3/site-packages/my_pkg/\n'),
+        printed('worker 1 and 0x1F\n'),
+        shown(text_plain='<t>', text_html='t'),
+        shown(text_html=f'<img {ALT} src="data:image/png;base64,iVBO+0xabcdef/tmp/AA">'),
+        new_markdown_cell('| word <b>|</b>' * rules.MAX_WORDS),
+        new_markdown_cell('```python\n# a comment, no heading\n```'),
+        note('For the instructor: ask first'),
+    ],
+)
+def test_what_is_allowed_breaks_no_rule(cell):
+    assert complaints(lesson(TEXT, cell)) <= {'executed_in_order'}
+
+
+@pytest.mark.parametrize('right', ['AAA', 'BBB'])
+def test_who_always_gives_one_answer_is_not_always_right(right):
+    text = TEXT.replace('**Right.**', '**No.**')
+    pieces = text.split('**No.**')
+    order = ''.join('ABC'.replace(letter, 'r') for letter in right)
+    text = pieces[0] + ''.join(
+        ('**Right.**' if kind == 'r' else '**No.**') + piece
+        for kind, piece in zip(order, pieces[1:], strict=True)
+    )
+    assert complaints(lesson(text)) == {'answers_have_reasons'}
+
+
+@pytest.mark.parametrize(
+    ('old', 'new'),
+    [
+        ('lang="vi"', 'lang="de"'),
+        (' dir="rtl"', ''),
+        ('<details lang="fr">', '<details lang="fr" dir="rtl">'),
+        ('Un nœud (node) écoute', 'A node'),
+        ('écoute.', 'écoute. Une. Deux. Trois.'),
+        ('<bdi dir="ltr">C++</bdi>', 'C++'),
+    ],
+)
+def test_a_broken_translation_is_reported(old, new):
+    text = '\n\n'.join([FRENCH, URDU, VIETNAMESE])
+    assert text.count(old) == 1
+    assert complaints(translated(text.replace(old, new))) == {'summary_in_languages'}
+
+
+def test_the_numbers_of_the_notebooks():
+    def built(*files):
+        return rules.problems_of_all([lesson(file=file) for file in files])
+
+    assert built('00_start_here.ipynb', '01_lose.ipynb') != []
+    for files in (['00_a', '02_b'], ['01_a', '02_b'], ['00_a', '00_b'], ['00_a', '01-b']):
+        assert built(*(f'{file}.ipynb' for file in files))
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'what'),
+    [
+        ('nœud', '', 'is not term'),
+        ('lang="vi"', 'lang="fr"', 'is not term'),
+        ('dir="rtl" ', '', 'is not term'),
+        ('| **node** |', '| **deadlock** |', 'never says deadlock'),
+        ('| **topic** |', '| **node** |', 'stands twice'),
+        ('نوڈ', 'node', 'ur: write <bdi'),
+        ('nút (node)', 'bên (node)', 'stands after another word'),
+    ],
+)
+def test_a_broken_glossary_is_reported(old, new, what):
+    notebook = nbformat.reads(nbformat.writes(GLOSSARY.notebook), as_version=4)
+    for cell in notebook.cells:
+        cell.source = cell.source.replace(old, new)
+    others = lessons()[:-1]
+    assert list(rules.glossary_fits(GLOSSARY, others)) == []
+    found = list(rules.glossary_fits(Lesson(GLOSSARY.file, notebook), others))
+    assert any(what in sentence for sentence in found)

@@ -1,0 +1,181 @@
+"""What `make notebooks` saves, and that nbval compares it."""
+
+import os
+import re
+import subprocess
+import sys
+from html import unescape
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from nbval.plugin import get_sanitize_patterns
+
+from tools.lessons import rules, run
+from tools.lessons.clean import WIDGET, clean, text_of
+
+SANITIZE = Path(__file__).parents[1] / 'nbval_sanitize.cfg'
+RANDOM_LOG = """\
+import random
+for number in random.sample(range(1000), k=random.randint(5, 15)):
+    print(f'[INFO] [slow_subscriber]: I heard: "Hello World: {number}"')"""
+RANDOM_FIGURE = """\
+import random
+import matplotlib.pyplot as plt
+from helpers.alt_text import describe
+_, axes = plt.subplots()
+line = axes.plot([random.random() for _ in range(9)])
+describe(axes, 'A line through <nine> "points".')"""
+
+
+def saved(root, *sources):
+    path = root / 'notebooks' / '00_try_it.ipynb'
+    path.parent.mkdir(exist_ok=True)
+    cells = [new_code_cell(source) for source in sources]
+    path.write_text(text_of(new_notebook(cells=cells)), encoding='utf-8')
+    return path
+
+
+def stream(text):
+    return new_output('stream', name='stdout', text=text)
+
+
+def test_what_is_cleaned():
+    view = new_output('display_data', data={WIDGET: {'model_id': '1'}, 'text/plain': 'Slider()'})
+    dirty = new_notebook(
+        cells=[
+            new_code_cell('1', id='same', outputs=[stream('1\n'), stream('2\n')]),
+            new_code_cell('2', id='same', outputs=[stream('1 of 2\r2 of 2\n'), view]),
+            new_markdown_cell('<details>Why</details>', id='why'),
+        ]
+    )
+    dirty.metadata = nbformat.from_dict({'widgets': {}, 'kernelspec': {'name': 'mine'}})
+    dirty.cells[0].metadata = nbformat.from_dict(
+        {'tags': ['solution'], 'jupyter': {'source_hidden': True, 'outputs_hidden': True}}
+    )
+    dirty.cells[1].metadata = nbformat.from_dict({'collapsed': True, 'tags': [], 'editable': False})
+    before = nbformat.writes(dirty)
+    once = clean(dirty)
+    assert nbformat.writes(dirty) == before
+    assert clean(once) == once
+    first, second, why = once.cells
+    assert [output.text for output in first.outputs] == ['1\n2\n']
+    assert second.outputs[0].text == '2 of 2\n'
+    assert second.outputs[1].data == {'text/plain': 'Slider()'}
+    assert first.id == 'same' != second.id
+    assert first.metadata == {
+        'tags': ['solution'],
+        'jupyter': {'source_hidden': True},
+        'slideshow': {'slide_type': 'slide'},
+    }
+    assert set(second.metadata) == {'slideshow'}
+    assert why.metadata.editable is False
+    assert set(once.metadata) == {'kernelspec', 'language_info'}
+
+
+@pytest.mark.parametrize(
+    ('sources', 'limit', 'why'),
+    [
+        (['print("new")', '1 / 0', '2'], 100, '2 failed: ZeroDivisionError: division by zero'),
+        (['import os', 'os._exit(1)'], 100, '2 failed: the kernel ended'),
+        (['import time\ntime.sleep(30)'], 1, '1 failed: it took longer than 1 s'),
+    ],
+)
+def test_a_failing_cell_leaves_the_file_as_it_was(
+    tmp_path, monkeypatch, capsys, sources, limit, why
+):
+    monkeypatch.setattr(run, 'CELL_TIMEOUT_S', limit)
+    path = saved(tmp_path, *sources)
+    assert run.main([], tmp_path) == 1
+    assert capsys.readouterr().err == f'00_try_it.ipynb: code cell {why} (the file is as it was)\n'
+    after = nbformat.read(path, as_version=4)
+    assert [cell.source for cell in after.cells] == sources
+    assert not any(cell.outputs for cell in after.cells)
+    assert os.listdir(path.parent) == [path.name]
+
+
+def test_an_unknown_lesson_is_reported(tmp_path, capsys):
+    assert run.main([], tmp_path) == 1
+    saved(tmp_path, '1')
+    assert run.main(['07'], tmp_path) == 1
+    assert capsys.readouterr().err.endswith("There is no single lesson '07'. Give one of 00.\n")
+
+
+def test_a_file_that_is_no_notebook_is_reported(tmp_path, capsys):
+    saved(tmp_path, '1').write_text('<<<<<<< HEAD\n')
+    assert run.main([], tmp_path) == 1
+    assert capsys.readouterr().err.startswith('00_try_it.ipynb is no notebook: ')
+
+
+def test_nbval_agrees_with_what_the_tool_saves(tmp_path, monkeypatch):
+    path = saved(
+        tmp_path,
+        'import sys\nfrom pathlib import Path\nPath.cwd().name, sys.executable',
+        'import os\nprint("seen")\n_ = os.write(1, b"at C level")',
+        'import ipywidgets\nout = ipywidgets.Output()\nwith out:\n    print("in")\nout',
+        RANDOM_FIGURE,
+        'for i in range(3):\n    print(f"\\r{i} of 3", end="", flush=True)\nprint("\\rdone")',
+        RANDOM_LOG,
+        'print("first")',
+        f'%matplotlib inline\n{RANDOM_FIGURE}\nplt.show()',
+    )
+    ids = [cell.id for cell in nbformat.read(path, as_version=4).cells]
+    spec = tmp_path / 'jupyter' / 'kernels' / 'python3' / 'kernel.json'
+    spec.parent.mkdir(parents=True)
+    spec.write_text('{"argv": ["false"], "display_name": "another Python", "language": "python"}')
+    with monkeypatch.context() as environment:  # as the tool may find it on a user's machine
+        environment.setenv('JUPYTER_PATH', str(tmp_path / 'jupyter'))
+        environment.delenv('PYTEST_CURRENT_TEST')
+        assert run.main(['00'], tmp_path) == 0
+    notebook = nbformat.read(path, as_version=4)
+    assert path.read_text(encoding='utf-8') == text_of(clean(notebook))
+    assert [cell.execution_count for cell in notebook.cells] == list(range(1, 9))
+    assert [cell.id for cell in notebook.cells] == ids
+    assert notebook.cells[0].outputs[0].data['text/plain'] == f'{("notebooks", sys.executable)}'
+    assert [output.text for output in notebook.cells[1].outputs] == ['seen\n']
+    assert [output.text for output in notebook.cells[4].outputs] == ['done\n']
+    for figure in (notebook.cells[3], notebook.cells[7]):
+        [alt] = rules.alternative_texts(figure)
+        assert unescape(alt) == 'A line through <nine> "points".'
+    notebook.cells[6].outputs[0].text = 'second\n'
+    data = notebook.cells[7].outputs[0].data
+    data['text/html'] = data['text/html'].replace('A line', 'A curve')
+    nbformat.write(notebook, path)
+    report = nbval(path)
+    assert '2 failed, 6 passed' in report
+    assert 'Cell 6 - ' in report
+    assert 'Cell 7 - ' in report
+
+
+def nbval(path):
+    """Run nbval as `make test` does; return what it printed."""
+    options = ['--nbval', '--nbval-current-env', f'--nbval-sanitize-with={SANITIZE}']
+    command = [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', *options, str(path)]
+    return subprocess.run(command, cwd=path.parent, capture_output=True, text=True).stdout
+
+
+def sanitized(text):
+    for regex, replacement in get_sanitize_patterns(SANITIZE.read_text(encoding='utf-8')):
+        text = re.sub(regex, replacement, text)
+    return text
+
+
+def test_the_sanitize_file_replaces_of_a_figure_only_the_pixels():
+    html = '<img alt="One dot." src="data:image/png;base64,{}"> <a href="x">y</a>'
+    assert sanitized(html.format('iVBO+/8=')) == sanitized(html.format('iVBOAAAA'))
+    assert sanitized(html) != sanitized(html.replace('One', 'No'))
+    assert sanitized(html).endswith('> <a href="x">y</a>')
+
+
+def test_the_sanitize_file_replaces_of_the_logs_only_what_the_slow_subscriber_heard():
+    line = '[INFO] [slow_subscriber]: I heard: "Hello World: {}"\n'
+    log = ''.join(line.format(count) for count in range(5))
+    assert sanitized(f'before\n{log}after\n') == 'before\n<what slow_subscriber heard>\nafter\n'
+    assert sanitized(log + line.format(17)) == sanitized(log)
+    for compared in (
+        log.replace('slow_subscriber', 'minimal_subscriber'),
+        log.replace('INFO', 'WARN'),
+        log.replace('I heard', 'I lost'),
+    ):
+        assert sanitized(compared) == compared

@@ -1,0 +1,77 @@
+"""Clean a notebook, so that a diff shows only what changed. Every cell gets its slide type."""
+
+import hashlib
+import re
+from collections.abc import Iterator
+from copy import deepcopy
+
+import nbformat
+from nbformat import NotebookNode
+
+from tools.lessons.slides import slide_types
+
+NOTEBOOK_METADATA = {
+    'kernelspec': {
+        'display_name': 'Python 3 (ipykernel)',
+        'language': 'python',
+        'name': 'python3',
+    },
+    'language_info': {'name': 'python'},
+}
+WIDGET = 'application/vnd.jupyter.widget-view+json'
+OVERWRITTEN = re.compile(r'^.*\r(?=[^\n])', re.MULTILINE)
+
+
+def clean(notebook: NotebookNode) -> NotebookNode:
+    """Return a copy of a notebook without what changes by itself from run to run.
+
+    Kept are sources, tags, hidden sources, cell ids, execution counts and outputs. The slide types
+    are made anew, and so is which cells JupyterLab does not let edit: answers that unfold.
+    Neighbouring pieces of one stream become one, because where a stream is cut is chance. The
+    model of a widget lives only as long as its kernel: of its view, the text is kept.
+    """
+    notebook = deepcopy(notebook)
+    notebook.nbformat, notebook.nbformat_minor = 4, 5
+    notebook.metadata = nbformat.from_dict(NOTEBOOK_METADATA)
+    ids: set[str] = set()
+    for number, cell in enumerate(notebook.cells):
+        if cell.get('id') is None or cell.id in ids:
+            cell.id = hashlib.sha256(f'{number} {cell.source}'.encode()).hexdigest()[:8]
+        ids.add(cell.id)
+        cell.metadata = nbformat.from_dict(dict(_kept_metadata(cell.metadata)))
+        if cell.cell_type == 'markdown' and '<details' in cell.source:
+            cell.metadata.editable = False  # a double click on an answer must not show the source
+        if cell.cell_type == 'code':
+            cell.outputs = _clean_outputs(cell)
+    for cell, slide_type in zip(notebook.cells, slide_types(notebook), strict=True):
+        cell.metadata.slideshow = nbformat.from_dict({'slide_type': slide_type})
+    return notebook
+
+
+def _kept_metadata(metadata: NotebookNode) -> Iterator[tuple[str, object]]:
+    if metadata.get('tags'):
+        yield 'tags', metadata['tags']
+    if metadata.get('jupyter', {}).get('source_hidden'):
+        yield 'jupyter', {'source_hidden': True}
+
+
+def _clean_outputs(cell: NotebookNode) -> list[NotebookNode]:
+    outputs: list[NotebookNode] = []
+    for output in cell.outputs:
+        last = outputs[-1] if outputs else {}
+        if output.output_type == 'stream' and output.name == last.get('name'):
+            last['text'] += output.text
+            continue
+        if output.output_type == 'execute_result':
+            output.execution_count = cell.execution_count
+        output.get('data', {}).pop(WIDGET, None)
+        outputs.append(output)
+    for output in outputs:
+        if output.output_type == 'stream':
+            output.text = OVERWRITTEN.sub('', output.text)
+    return outputs
+
+
+def text_of(notebook: NotebookNode) -> str:
+    """Return the text of a notebook's file, as Jupyter writes it."""
+    return nbformat.writes(notebook) + '\n'

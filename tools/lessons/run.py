@@ -1,0 +1,169 @@
+"""Run lessons and save their outputs, and write what follows from the notebooks.
+
+    python -m tools.lessons.run             all lessons
+    python -m tools.lessons.run 02 03       some of them
+
+Each notebook gets a fresh kernel of the interpreter that runs this tool, started as nbval starts
+it. What is saved is what this one run gave, pictures included. A picture kept from an earlier run
+would make smaller diffs, but it would also hide a change in `helpers`, and it could contradict
+the text beside it. To keep a diff small, run only the lessons that you changed.
+
+Before that, the tables and links of tools/lessons/tables.py are written, and all notebooks cleaned.
+Notebook 00, which shows the table of exercises, is run as well where that has changed.
+"""
+
+import logging
+import os
+import subprocess
+import sys
+import time
+from copy import deepcopy
+from pathlib import Path
+
+import nbformat
+from ipykernel.kernelspec import RESOURCES, get_kernel_dict
+from jupyter_client.kernelspec import KernelSpec, KernelSpecManager
+from jupyter_client.manager import AsyncKernelManager
+from nbclient import NotebookClient
+from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
+from nbformat import NotebookNode
+from traitlets import default
+
+from helpers.progress import FILE_VARIABLE
+from tools.lessons import tables
+from tools.lessons.clean import clean, text_of
+from tools.lessons.lesson import ROOT, START, chosen
+from tools.lessons.slides import png_of
+
+CELL_TIMEOUT_S = 100
+# The README and lesson 00 show these: the id of a cell, and the file for its picture.
+PICTURES = {'lost-before-none-after': 'images/lost_before_none_after.png'}
+
+
+class _ThisInterpreter(KernelSpecManager):
+    """Knows one kernel, this interpreter, whatever kernels the user has installed."""
+
+    def get_kernel_spec(self, kernel_name: str) -> KernelSpec:
+        return self.kernel_spec_class(resource_dir=RESOURCES, **get_kernel_dict())
+
+
+class _KernelManager(AsyncKernelManager):
+    @default('kernel_spec_manager')
+    def _this_interpreter(self) -> KernelSpecManager:
+        return _ThisInterpreter()
+
+
+def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
+    """Return a copy of a notebook, executed in `folder` by a fresh kernel, and cleaned.
+
+    Raises RuntimeError with one sentence where a cell fails, takes longer than CELL_TIMEOUT_S,
+    or ends the kernel.
+    """
+    notebook = deepcopy(notebook)
+    for cell in notebook.cells:
+        if cell.cell_type == 'code':
+            cell.outputs, cell.execution_count = [], None
+    running = 0
+
+    def count(**_: object) -> None:
+        nonlocal running
+        running += 1
+
+    log = logging.getLogger('nbclient')
+    log.setLevel(logging.CRITICAL)  # a failure is told once, by the RuntimeError
+    client = NotebookClient(
+        notebook,
+        kernel_name='python3',
+        kernel_manager_class=_KernelManager,
+        resources={'metadata': {'path': str(folder)}},
+        timeout=CELL_TIMEOUT_S,
+        force_raise_errors=True,
+        skip_cells_with_tag='',
+        record_timing=False,
+        on_cell_execute=count,
+        log=log,
+    )
+    # nbval knows no widgets: what is printed into an Output widget is output of the cell.
+    client.widget_registry = {}
+    environment = os.environ | {
+        # Under nbval ipykernel sees this variable, and leaves output written at C level alone.
+        'PYTEST_CURRENT_TEST': 'tools/lessons/run.py',
+        FILE_VARIABLE: '',  # what is saved is the table of a reader who has solved nothing
+    }
+    try:
+        client.execute(env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    except CellExecutionError as error:
+        what = f'{error.ename}: {error.evalue}'.splitlines()[0]
+    except CellTimeoutError:
+        what = f'it took longer than {CELL_TIMEOUT_S} s'
+    except (DeadKernelError, AssertionError):  # after Ctrl+C nbclient fails its own assertion
+        what = 'the kernel ended'
+    else:
+        return clean(notebook)
+    raise RuntimeError(f'code cell {running} failed: {what}')
+
+
+def pictures(notebook: NotebookNode) -> dict[str, bytes]:
+    """Return the PNG files of `PICTURES` that come from this notebook, by their name."""
+    return {
+        PICTURES[cell.id]: png
+        for cell in notebook.cells
+        if cell.get('id') in PICTURES
+        for output in cell.outputs
+        if (png := png_of(output))
+    }
+
+
+def update(path: Path) -> bool:
+    """Execute and clean a notebook's file in place; return True where that changed the file.
+
+    Raises RuntimeError as `execute` does; the file is then as it was before.
+    """
+    before = path.read_text(encoding='utf-8')
+    notebook = execute(nbformat.reads(before, as_version=4), path.parent)
+    for name, picture in pictures(notebook).items():
+        (path.parent / name).parent.mkdir(exist_ok=True)
+        (path.parent / name).write_bytes(picture)
+    return write(path, text_of(notebook), before)
+
+
+def write(path: Path, after: str, before: str = '') -> bool:
+    """Write a file, at once or not at all; return True where that changed it."""
+    if after == before:
+        return False
+    unfinished = path.with_suffix('.tmp')
+    unfinished.write_text(after, encoding='utf-8')
+    unfinished.replace(path)
+    return True
+
+
+def main(arguments: list[str], root: Path = ROOT) -> int:
+    """Run the tool with the numbers of lessons; return its exit status."""
+    try:
+        paths = chosen(' '.join(arguments), root / 'notebooks')
+        texts = tables.texts_of(root)
+        changed = tables.made(texts)
+        for name, text in changed.items():
+            write(root / name, text)
+            print(f'{name}: written from the notebooks')
+        lessons = tables.lessons_of(texts | changed)
+        if tables.needs_run(lessons):
+            paths = sorted({*paths, *chosen(START, root / 'notebooks')})
+        for path in paths:
+            start = time.monotonic()
+            try:
+                changed = update(path)
+            except RuntimeError as error:
+                raise ValueError(f'{path.name}: {error} (the file is as it was)') from None
+            seconds = time.monotonic() - start
+            print(f'{path.name}: {seconds:.0f} s, {"changed" if changed else "unchanged"}')
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 1
+    for sentence in tables.missing_translations(lessons):
+        print(sentence)
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))
