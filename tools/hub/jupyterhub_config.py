@@ -1,4 +1,4 @@
-"""JupyterHub for a class on one machine, started by `make hub`. environment.md says how to use it.
+"""JupyterHub for a class on one machine, started by `make hub`. teaching.md says how to use it.
 
 Everybody who has an account on this machine may log in, with its password.
 """
