@@ -77,7 +77,7 @@ def for_reveal(notebook: NotebookNode) -> NotebookNode:
             lines = len(cell.source.splitlines())
             tags += [f'more-than-{most}-lines' for most in CODE if lines > most]
             cell.outputs = [output for output in cell.outputs if not _is_widget(output)]
-        if re.match('##? ', cell.source):  # a step begins, and its note is behind the heading
+        if re.match('##? ', cell.source):  # a step begins, and its note is after the heading
             note = None
         cells.append(cell)
         if note and slide_type in ('slide', 'subslide'):  # the step goes on: so does its note

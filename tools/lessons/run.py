@@ -14,6 +14,7 @@ Notebook 00, which shows the table of exercises, is run as well where that has c
 
 import logging
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -133,6 +134,8 @@ def write(path: Path, after: str, before: str = '') -> bool:
         return False
     unfinished = path.with_suffix('.tmp')
     unfinished.write_text(after, encoding='utf-8')
+    if path.exists():
+        shutil.copymode(path, unfinished)
     unfinished.replace(path)
     return True
 
