@@ -19,6 +19,7 @@ from helpers.fusion import (
     covariances,
     errors,
     fuse,
+    fuse_with_innovations,
     innovations,
     motion,
     nees,
@@ -291,6 +292,14 @@ def test_variances_and_gates_by_sensor():
     assert (refused['nis'] >= 9).all()
     assert (rows.loc[rows['accepted'] & (rows['sensor'] == 'gps'), 'nis'] < 9).all()
     assert 5 <= refused['t'].nunique() <= 7
+
+
+def test_one_run_gives_both_tables():
+    for sensors in (ODOM_IMU, SENSORS):
+        options = {'process_noise': {'x': 0.01}, 'gate': {'imu': 1.0}}
+        estimate, rows = fuse_with_innovations(table(101), sensors, **options)
+        same(estimate, fuse(table(101), sensors, **options))
+        same(rows, innovations(table(101), sensors, **options))
 
 
 # --- Evaluation ----------------------------------------------------------------------------------

@@ -8,7 +8,13 @@ compares an estimate with the truth, and with what the filter says of its own er
 from helpers.fusion.drives import Drive, simulate
 from helpers.fusion.evaluation import chi_square_bounds, covariances, errors, nees, rmse
 from helpers.fusion.filter import PROCESS_NOISE, STATE, ExtendedKalmanFilter, Innovation, motion
-from helpers.fusion.tables import SENSORS, VARIANCES, fuse, innovations
+from helpers.fusion.tables import (
+    SENSORS,
+    VARIANCES,
+    fuse,
+    fuse_with_innovations,
+    innovations,
+)
 
 __all__ = [
     'PROCESS_NOISE',
@@ -22,6 +28,7 @@ __all__ = [
     'covariances',
     'errors',
     'fuse',
+    'fuse_with_innovations',
     'innovations',
     'motion',
     'nees',

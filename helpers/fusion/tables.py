@@ -37,6 +37,7 @@ MESSAGES = {
 }
 SENSORS = tuple(MESSAGES)
 POSE = STATE[:3]
+COLUMNS = ('t', 'sensor', 'variable', 'innovation', 'sigma', 'nis', 'dof', 'accepted')
 
 
 def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options) -> pd.DataFrame:
@@ -63,17 +64,10 @@ def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
     Raises ValueError or TypeError, with a sentence that says what to change, for a table or an
     option that cannot be used.
     """
-    times, states, matrices = [], [], []
+    estimate = _Estimate()
     for ekf, t, _ in _run(measurements, sensors, options):
-        known = np.nan if ekf.t is None else 1.0
-        times.append(t)
-        states.append(known * ekf.state[:6])
-        matrices.append(known * ekf.covariance[:3, :3])
-    columns = {'t': times} | dict(zip(STATE[:6], np.array(states).T, strict=True))
-    matrices = np.array(matrices)
-    for a, b in combinations_with_replacement(POSE, 2):
-        columns[covariance_column(a, b)] = matrices[:, POSE.index(a), POSE.index(b)]
-    return pd.DataFrame(columns)
+        estimate.add(ekf, t)
+    return estimate.table()
 
 
 def innovations(
@@ -85,14 +79,21 @@ def innovations(
     (measured minus expected), `sigma` (the standard deviation that the filter expects of it), and
     of the whole message `nis`, `dof` (how many numbers it measured) and `accepted`.
     """
-    rows = [
-        (t, sensor, *number, message.nis, len(names), message.accepted)
-        for _, t, heard in _run(measurements, sensors, options)
-        for sensor, names, message in heard
-        for number in zip(names, message.value, np.sqrt(message.covariance.diagonal()), strict=True)
-    ]
-    columns = ['t', 'sensor', 'variable', 'innovation', 'sigma', 'nis', 'dof', 'accepted']
-    return pd.DataFrame(rows, columns=columns)
+    rows = []
+    for _, t, heard in _run(measurements, sensors, options):
+        rows += _rows(t, heard)
+    return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def fuse_with_innovations(
+    measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return what `fuse` and what `innovations` return, from one run of the filter."""
+    estimate, rows = _Estimate(), []
+    for ekf, t, heard in _run(measurements, sensors, options):
+        estimate.add(ekf, t)
+        rows += _rows(t, heard)
+    return estimate.table(), pd.DataFrame(rows, columns=COLUMNS)
 
 
 def covariance_column(a: str, b: str) -> str:
@@ -109,6 +110,36 @@ def columns_of(table: pd.DataFrame, names: Iterable[str]) -> dict[str, np.ndarra
 
 
 Heard = list[tuple[str, Sequence[str], Innovation]]
+
+
+class _Estimate:
+    """The rows of the table that `fuse` returns."""
+
+    def __init__(self):
+        self.times, self.states, self.matrices = [], [], []
+
+    def add(self, ekf: ExtendedKalmanFilter, t: float) -> None:
+        known = np.nan if ekf.t is None else 1.0
+        self.times.append(t)
+        self.states.append(known * ekf.state[:6])
+        self.matrices.append(known * ekf.covariance[:3, :3])
+
+    def table(self) -> pd.DataFrame:
+        states = np.array(self.states).T
+        columns = {'t': self.times} | dict(zip(STATE[:6], states, strict=True))
+        matrices = np.array(self.matrices)
+        for a, b in combinations_with_replacement(POSE, 2):
+            columns[covariance_column(a, b)] = matrices[:, POSE.index(a), POSE.index(b)]
+        return pd.DataFrame(columns)
+
+
+def _rows(t: float, heard: Heard) -> list[tuple]:
+    """Return the rows of the table that `innovations` returns, for one time."""
+    return [
+        (t, sensor, *number, message.nis, len(names), message.accepted)
+        for sensor, names, message in heard
+        for number in zip(names, message.value, np.sqrt(message.covariance.diagonal()), strict=True)
+    ]
 
 
 def _run(
