@@ -38,6 +38,9 @@ lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04 puts it there;
 slides: set_up ## write the lessons as HTML slides into slides/, which need no network; LESSON=02 for one
 	@$(PYTHON) -m tools.lessons.export $(LESSON)
 
+sources: set_up ## print all external links of the lessons, each with the words that it backs
+	@$(PYTHON) -m tools.lessons.sources
+
 soak: set_up ## run the notebooks in hard conditions: N=10 times, CONDITIONS=idle,busy LESSON=02 MINUTES=8 SEED=7; REPORT=yes
 	@$(PYTHON) -m tools.soak $(if $(N),--rounds "$(N)") $(if $(CONDITIONS),--conditions "$(CONDITIONS)") \
 		$(if $(LESSON),--lesson "$(LESSON)") $(if $(MINUTES),--minutes "$(MINUTES)") \
@@ -64,8 +67,8 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-tools test-browser hub test-hub notebooks lesson slides soak bench lint lock \
-	licences clean set_up
+.PHONY: help lab present test test-tools test-browser hub test-hub notebooks lesson slides sources soak bench lint \
+	lock licences clean set_up
 
 PYTHON := .venv/bin/python
 
