@@ -37,7 +37,7 @@ from tools.lessons.lesson import ROOT, START, chosen
 from tools.lessons.slides import png_of
 
 CELL_TIMEOUT_S = 100
-# The README and lesson 00 show these: the id of a cell, and the file for its picture.
+# README.md shows these: the id of a cell, and the file for its picture.
 PICTURES = {'lost-before-none-after': 'images/lost_before_none_after.png'}
 
 
