@@ -8,6 +8,7 @@ the same kernel, its hints appear.
 from __future__ import annotations
 
 import re
+import traceback
 from collections.abc import Callable, Set
 from numbers import Integral, Real
 
@@ -151,6 +152,17 @@ def _run(test: object) -> tuple[bool, str]:
         result = test() if callable(test) else test
         return (False, result) if isinstance(result, str) else (bool(result), '')
     except Exception as error:  # whatever a reader's code raises is an answer that is not right
-        first_line = (str(error).splitlines() or [''])[0]
-        found = re.sub(r' at 0x[0-9a-fA-F]+', '', f'{type(error).__name__}: {first_line}')
-        return False, found.removesuffix(': ')
+        return False, _found(error)
+
+
+def _found(error: Exception) -> str:
+    """Say in one sentence or two what an error says."""
+    lines = str(error).splitlines()
+    if not lines:
+        return f'{type(error).__name__} in {traceback.extract_tb(error.__traceback__)[-1].name}()'
+    # The second line of a time-out says what was waited for.
+    text = ' '.join(lines[: 2 if isinstance(error, TimeoutError) else 1])
+    found = re.sub(r' at 0x[0-9a-fA-F]+', '', f'{type(error).__name__}: {text}')
+    if re.match(r'[A-Z]\w*\.\w+\(\) missing 1 required positional argument', text):
+        found += '. Does a class stand there without ()?'
+    return found

@@ -125,11 +125,21 @@ def test_a_second_run_in_the_same_kernel_prints_the_same(capsys, title):
     assert runs[0] == runs[1] == runs[2]
 
 
+class Group:
+    def add(self, timer): ...
+
+
 def test_what_the_code_did_is_said(capsys, title):
     heard = [1, 1, 2, 2]
 
     def broken():
         raise RuntimeError(f'no {object()!r}\nmore')
+
+    def empty():
+        next(iter([]))
+
+    def late():
+        raise TimeoutError('Waited 30 s in vain.\nNo publisher: /scans.\nmore')
 
     check(
         title,
@@ -137,7 +147,9 @@ def test_what_the_code_did_is_said(capsys, title):
         ('1, 1, 2, 2', lambda: heard == [1, 1, 2, 2] or f'your node published {heard}', ''),
         ('it is built', 'the build failed', ''),
         ('the node exists', broken, ''),
-        ('it ends', lambda: next(iter([])), ''),
+        ('it ends', empty, ''),
+        ('it is heard', late, ''),
+        ('it is in a group', lambda: Group.add('a timer'), ''),
         ('some', [], ''),
         ('equal', np.bool_(True), ''),
     )
@@ -151,10 +163,15 @@ def test_what_the_code_did_is_said(capsys, title):
         '[not yet] the node exists',
         '    Found: RuntimeError: no <object object>',
         '[not yet] it ends',
-        '    Found: StopIteration',
+        '    Found: StopIteration in empty()',
+        '[not yet] it is heard',
+        '    Found: TimeoutError: Waited 30 s in vain. No publisher: /scans.',
+        '[not yet] it is in a group',
+        "    Found: TypeError: Group.add() missing 1 required positional argument: 'timer'. Does a",
+        '          class stand there without ()?',
         '[not yet] some',
         '[ok] equal',
-        f'{title}: 2 of 7.',
+        f'{title}: 2 of 9.',
     ]
 
 
