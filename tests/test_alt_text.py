@@ -91,7 +91,7 @@ def test_losses_and_overlaps_in_words():
     assert 'None was lost.' in said(plots.sequence_gaps, run())
     assert 'Some were lost: crosses.' in said(plots.sequence_gaps, run(lost=[3]))
     assert '3 numbers later' in said(plots.sequence_gaps, run(lost=[3]), None, 3)
-    assert 'All were lost: crosses.' in said(plots.sequence_gaps, run(lost=range(12)))
+    assert 'None was heard: crosses.' in said(plots.sequence_gaps, run(lost=range(12)))
     assert 'No two callbacks overlap.' in said(plots.timeline, run())
     assert 'Some callbacks overlap.' in said(plots.timeline, run(overlap=True))
     assert 'No two callbacks overlap.' in said(plots.timeline, run(lost=range(12)))

@@ -117,7 +117,7 @@ def _draw_gaps(
     handles = [
         ax.scatter(table.published_s, table.seq, **small),
         ax.scatter(heard.started_s, heard.seq, **large),
-        crosses(ax, lost_at, lost.seq, f'lost {len(lost)}', scale),
+        crosses(ax, lost_at, lost.seq, f'{_unheard(table)} {len(lost)}', scale),
     ]
     label_axes(ax, title, TIME_LABEL, 'sequence number', handles)
 
@@ -345,7 +345,8 @@ def latency(
     highest = max(delay_ms.max(), 1.0) if len(heard) else 1.0
     if len(lost):
         below = np.full(len(lost), -0.05 * highest)
-        handles.append(crosses(ax, lost.published_s, below, f'lost {len(lost)}'))
+        label = f'{_unheard(table)} {len(lost)}'
+        handles.append(crosses(ax, lost.published_s, below, label))
     ax.set_ylim(-0.09 * highest, 1.1 * highest)
     label_axes(
         ax, title, 'time of publishing, since the first publish (s)', 'latency (ms)', handles
@@ -389,7 +390,12 @@ def _loss_in_words(table: pd.DataFrame, marks: str) -> str:
     lost = table.started_s.isna()
     if not lost.any():
         return 'None was lost.'
-    return f'{"All" if lost.all() else "Some"} were lost: {marks}.'
+    return f'{"None was heard" if lost.all() else "Some were lost"}: {marks}.'
+
+
+def _unheard(table: pd.DataFrame) -> str:
+    """Name the messages without a callback. Where none was heard, they may wait, or never come."""
+    return 'lost' if table.started_s.notna().any() else 'not heard'
 
 
 def _overlap_in_words(bars: pd.DataFrame) -> str:
