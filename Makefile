@@ -41,10 +41,9 @@ slides: set_up ## write the lessons as HTML slides into slides/, which need no n
 sources: set_up ## print all external links of the lessons, each with the words that it backs
 	@$(PYTHON) -m tools.lessons.sources
 
-soak: set_up ## run the notebooks in hard conditions: N=10 times, CONDITIONS=idle,busy LESSON=02 MINUTES=8 SEED=7; REPORT=yes
+soak: set_up ## run the notebooks in hard conditions, as root: N=10 times, CONDITIONS=idle,busy LESSON=02
 	@$(PYTHON) -m tools.soak $(if $(N),--rounds "$(N)") $(if $(CONDITIONS),--conditions "$(CONDITIONS)") \
-		$(if $(LESSON),--lesson "$(LESSON)") $(if $(MINUTES),--minutes "$(MINUTES)") \
-		$(if $(SEED),--seed "$(SEED)") $(if $(filter yes,$(REPORT)),--report)
+		$(if $(LESSON),--lesson "$(LESSON)")
 
 bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="latency model" for some
 	@$(PYTHON) -m benchmarks $(ONLY)
