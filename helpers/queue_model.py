@@ -62,9 +62,9 @@ def predict(
     table['published_s'] = table['seq'] * period / 1e9
     table[['started_s', 'finished_s']] = np.nan
     start = np.array(started)
-    workers = np.array([f'worker {i}' for i in range(1, min(threads, len(taken)) + 1)], object)
+    names = np.array([f'thread {i}' for i in range(1, min(threads, len(taken)) + 1)], object)
     thread = np.full(messages, None, object)
-    thread[taken] = workers[np.arange(len(taken)) % len(workers)]
+    thread[taken] = names[np.arange(len(taken)) % len(names)]
     table.loc[taken, 'started_s'] = start / 1e9
     table.loc[taken, 'finished_s'] = (start + callback) / 1e9
     table['thread'] = thread

@@ -130,7 +130,7 @@ class Recording:
         """Return one row a message, in the order of their sequence numbers.
 
         Columns: `seq` (int), `published_s`, `started_s`, `finished_s` (seconds since the first
-        publish call; NaN where it did not happen), `thread` ('worker 1', 'worker 2', ... in the
+        publish call; NaN where it did not happen), `thread` ('thread 1', 'thread 2', ... in the
         order of their first callback; None where the message was never heard). `attrs` holds the
         parameters of the recording.
 
@@ -147,8 +147,8 @@ class Recording:
                     f'The number {twice.iloc[0]} was {name} twice: give every message its own '
                     'sequence number.'
                 )
-        workers = {ident: f'worker {i}' for i, ident in enumerate(heard['thread'].unique(), 1)}
-        heard['thread'] = heard['thread'].map(workers)
+        names = {ident: f'thread {i}' for i, ident in enumerate(heard['thread'].unique(), 1)}
+        heard['thread'] = heard['thread'].map(names)
         table = published.merge(heard, on='seq', how='outer')  # sorted by seq
         times = ['published_s', 'started_s', 'finished_s']
         table = table.astype({'seq': int} | dict.fromkeys(times, float))
@@ -202,13 +202,13 @@ class CallbackRecording:
         `published_s` equal to `started_s`. The threads have the same names in all tables.
         """
         every = sorted((row for runs in self.runs.values() for row in runs), key=lambda row: row[0])
-        workers = dict.fromkeys(row[2] for row in every)
-        workers = {ident: f'worker {i}' for i, ident in enumerate(workers, 1)}
+        names = dict.fromkeys(row[2] for row in every)
+        names = {ident: f'thread {i}' for i, ident in enumerate(names, 1)}
         zero = every[0][0] if every else 0.0
         return {
             name: pd.DataFrame(
                 [
-                    [seq, started - zero, started - zero, finished - zero, workers[ident]]
+                    [seq, started - zero, started - zero, finished - zero, names[ident]]
                     for seq, (started, finished, ident) in enumerate(runs)
                 ],
                 columns=COLUMNS,

@@ -23,7 +23,7 @@ def run(lost=(), delay_s=0.01, overlap=False):
     return table.assign(
         started_s=started.mask(table.seq.isin(lost)),
         finished_s=(started + (0.15 if overlap else 0.05)).mask(table.seq.isin(lost)),
-        thread=[None if n in lost else f'worker {n % 2 + 1}' for n in range(12)],
+        thread=[None if n in lost else f'thread {n % 2 + 1}' for n in range(12)],
     )
 
 

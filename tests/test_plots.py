@@ -34,7 +34,7 @@ def table_of(started, published=None, callback_s=CALLBACK_S, threads=1):
     if published is None:
         published = np.arange(len(started)) * PERIOD_S
     turn = np.cumsum(~np.isnan(started)) - 1
-    thread = np.where(np.isnan(started), None, [f'worker {t % threads + 1}' for t in turn])
+    thread = np.where(np.isnan(started), None, [f'thread {t % threads + 1}' for t in turn])
     columns = {'published_s': published, 'started_s': started, 'finished_s': started + callback_s}
     return pd.DataFrame({'seq': range(len(started)), **columns, 'thread': thread})
 
@@ -285,7 +285,7 @@ def test_bars_of_a_timeline_are_the_callbacks(parallel):
 def test_lanes_are_in_natural_order_from_the_top():
     ax = plots.timeline(table_of(np.arange(24) * PERIOD_S, threads=12))
     names = [label.get_text() for label in ax.get_yticklabels()]
-    assert names == [f'worker {n}' for n in range(1, 13)]
+    assert names == [f'thread {n}' for n in range(1, 13)]
     bottom, top = ax.get_ylim()
     bars = [bar for container in ax.containers for bar in container]
     assert top < min(bar.get_y() for bar in bars)
@@ -305,7 +305,7 @@ def test_every_number_fits_its_bar(slow):
 
 
 def test_groups_differ_in_colour_and_in_hatch_and_share_the_lanes_of_threads(slow):
-    groups = {f'group {n}': slow.assign(thread=f'worker {n // 2}') for n in range(5)}
+    groups = {f'group {n}': slow.assign(thread=f'thread {n // 2}') for n in range(5)}
     ax = plots.timeline(groups, time_label='time since the first callback (s)')
     assert ax.get_xlabel() == 'time since the first callback (s)'
     assert legend_of(ax) == list(groups)
@@ -318,7 +318,7 @@ def test_groups_differ_in_colour_and_in_hatch_and_share_the_lanes_of_threads(slo
 
 def test_with_the_depth_a_timeline_shows_which_messages_wait(slow):
     ax = plots.timeline({'exclusive': slow}, depth=10)
-    assert [label.get_text() for label in ax.get_yticklabels()] == ['worker 1', 'waiting']
+    assert [label.get_text() for label in ax.get_yticklabels()] == ['thread 1', 'waiting']
     callbacks, *waits = ax.containers
     assert callbacks.get_label() == 'exclusive'
     bars = [(b.get_y(), b.get_x(), b.get_x() + b.get_width()) for (b,) in waits]

@@ -47,7 +47,7 @@ def test_the_tutorial(period_s, callback_s):
     assert (table['finished_s'] - table['started_s']).dropna().tolist() == pytest.approx(
         [callback_s] * len(TUTORIAL)
     )
-    assert set(table['thread'].dropna()) == {'worker 1'}
+    assert set(table['thread'].dropna()) == {'thread 1'}
     assert table['thread'].isna().tolist() == table['started_s'].isna().tolist()
 
 
@@ -183,7 +183,7 @@ def happenings(draw):
             start = now + draw(few)
             free_at[worker] = start + draw(DURATION)
             name = draw(names) if names is not None else worker + 1
-            rows[queue.pop(0)] = start, free_at[worker], f'worker {name}'
+            rows[queue.pop(0)] = start, free_at[worker], f'thread {name}'
     return made_table(published, rows), depth, threads
 
 
@@ -251,7 +251,7 @@ def hear(draw, table):
     """A message that was lost counts as heard; or a callback ran at another time."""
     seq = draw(st.sampled_from(table['seq'].tolist()))
     start = table['published_s'][seq] + draw(st.integers(0, 20))
-    worker = f'worker {draw(st.integers(1, 3))}'
+    worker = f'thread {draw(st.integers(1, 3))}'
     table.loc[seq, CALLBACK] = start, start + draw(DURATION), worker
 
 
@@ -278,7 +278,7 @@ def test_explain_finds_what_cannot_have_happened(happening, changes, data):
 
 
 def test_a_worker_that_is_busy_takes_nothing():
-    heard_late = {0: (0, 10, 'worker 1'), 1: (10, 12, 'worker 2'), 3: (12, 14, 'worker 1')}
+    heard_late = {0: (0, 10, 'thread 1'), 1: (10, 12, 'thread 2'), 3: (12, 14, 'thread 1')}
     table = made_table([0, 1, 2, 3], heard_late)
     assert not can_have_happened(table, 1, 1)
     assert contradictions(table, 1, 1) != []
@@ -286,7 +286,7 @@ def test_a_worker_that_is_busy_takes_nothing():
     assert can_have_happened(table, 1, 2)
     assert contradictions(table, 1, 2) == []
     # Not by the thread that had another callback then.
-    table = made_table([0, 1, 2, 3], heard_late | {1: (10, 12, 'worker 1')})
+    table = made_table([0, 1, 2, 3], heard_late | {1: (10, 12, 'thread 1')})
     assert not can_have_happened(table, 1, 2)
     assert contradictions(table, 1, 2) != []
 
@@ -311,7 +311,7 @@ def regular_runs(draw, most_late):
         else:
             now, worker = take_at, awake_at.index(min(awake_at))
             finish = now + 20 + draw(more)
-            rows[queue.pop(0)] = now, finish, f'worker {worker + 1}'
+            rows[queue.pop(0)] = now, finish, f'thread {worker + 1}'
             awake_at[worker] = finish + draw(late)
     return made_table(np.arange(messages) * period, rows), depth, threads
 
@@ -362,7 +362,7 @@ def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, data):
     # A worker may never work, or stop for good.
     threads += data.draw(st.sampled_from([0, 0, 1]))
     end = data.draw(st.sampled_from([math.inf, 20, 60]))
-    gone = (table['thread'] == 'worker 1') & (table['started_s'] > end)
+    gone = (table['thread'] == 'thread 1') & (table['started_s'] > end)
     table.loc[gone, CALLBACK] = NOT_HEARD
     assume(heard(table))
     found = explain(table, depth, threads).contradictions
@@ -427,7 +427,7 @@ def test_every_heard_message_removed(threads):
         ({'finished_s': lambda t: t['finished_s'].where(t['seq'] != 3, 0.3)}, 'before it started'),
         ({'finished_s': lambda t: t['finished_s'].where(t['seq'] != 4, 0.3)}, 'never started'),
         ({'started_s': lambda t: t['started_s'].where(t['seq'] != 3, 0.5)}, 'thread of message 3'),
-        ({'thread': lambda t: t['thread'].where(t['seq'] != 3, 'worker 2')}, None),
+        ({'thread': lambda t: t['thread'].where(t['seq'] != 3, 'thread 2')}, None),
     ],
 )
 def test_impossible_rows(change, said):
@@ -449,7 +449,7 @@ def test_a_worker_may_be_as_late_as_its_callbacks():
     table[['started_s', 'finished_s']] = np.nan
     table['thread'] = None
     for seq, (start, finish) in LATE_HEARD.items():
-        table.loc[seq, CALLBACK] = [start / 1e3, finish / 1e3, 'worker 1']
+        table.loc[seq, CALLBACK] = [start / 1e3, finish / 1e3, 'thread 1']
     rested = 'Message 2 was pushed out although a worker was free for 0.087 s.'
     assert rested not in explain(table, 10, 1).contradictions
     # The same pause on a machine on which all else was in time.
@@ -478,7 +478,7 @@ def test_two_workers_that_are_both_a_little_late():
     table = predict(4, 20, 1, 2, 10)
     table[['started_s', 'finished_s', 'thread']] = np.nan, np.nan, None
     for seq, start, worker in ((0, 0, 1), (1, 4, 2), (6, 24, 1), (9, 36, 2)):
-        table.loc[seq, CALLBACK] = start, start + 20, f'worker {worker}'
+        table.loc[seq, CALLBACK] = start, start + 20, f'thread {worker}'
     assert explain(table, 1, 2).complete
 
 

@@ -39,7 +39,7 @@ def test_table():
     assert table['published_s'][5] > 0.01  # seconds: the timer's period is 5 ms
     assert (table['published_s'] <= table['started_s']).all()
     assert (table['started_s'] <= table['finished_s']).all()
-    assert set(table['thread']) == {'worker 1'}
+    assert set(table['thread']) == {'thread 1'}
     assert (recording.published, recording.heard, recording.in_flight) == (6, 6, 0)
 
 
@@ -105,7 +105,7 @@ def test_threads():
             session.wait_until(lambda expected=i + 1: gate.inside == expected, LIMIT_S)
         gate.open()
         recording.wait_until_complete(3, LIMIT_S)
-    assert recording.table()['thread'].tolist() == ['worker 1', 'worker 2', 'worker 3']
+    assert recording.table()['thread'].tolist() == ['thread 1', 'thread 2', 'thread 3']
 
 
 def test_wait_for_callbacks_that_still_run():
@@ -267,7 +267,7 @@ def test_cost_of_a_record(message):
 
 GOOD = pd.DataFrame(
     {'seq': [0, 1], 'published_s': [0.0, 1.0], 'started_s': [0.1, np.nan]}
-    | {'finished_s': [0.2, np.nan], 'thread': ['worker 1', None]}
+    | {'finished_s': [0.2, np.nan], 'thread': ['thread 1', None]}
 )
 
 
@@ -322,8 +322,8 @@ def test_runs_of_callbacks(style, threads, together):
         assert (table.finished_s > table.started_s).all()
     assert tables['ask'].started_s[0] == 0
     assert tables['look'].started_s[0] > 0
-    assert tables['ask'].thread[0] == 'worker 1'
-    assert tables['look'].thread[0] == f'worker {threads}'
+    assert tables['ask'].thread[0] == 'thread 1'
+    assert tables['look'].thread[0] == f'thread {threads}'
 
 
 def test_run_that_goes_on():

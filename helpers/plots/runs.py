@@ -260,7 +260,7 @@ def _draw_waiting(ax: Axes, table: pd.DataFrame, depth: int, top: float) -> tupl
 
 
 def _natural(name: str) -> list:
-    """Sort key that puts 'worker 2' before 'worker 10'."""
+    """Sort key that puts 'thread 2' before 'thread 10'."""
     return [int(part) if part.isdecimal() else part for part in re.split(r'(\d+)', name)]
 
 
