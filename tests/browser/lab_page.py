@@ -150,12 +150,6 @@ class LabPage:
         )
         return cell.as_element()
 
-    def write(self, index: int, source: str) -> None:
-        """Click into a cell and replace its source."""
-        self.show(index).query_selector('.cm-content').click()
-        self.page.keyboard.press('Control+A')
-        self.page.keyboard.insert_text(source)
-
     def start(self, index: int) -> None:
         """Select a cell with a click, and press Ctrl+Enter. It has no number until it has run."""
         self.page.evaluate(

@@ -58,20 +58,6 @@ def test_a_student_runs_solves_looks_at_a_solution_and_goes_on(lab):
     run_to(lab, 4)
 
 
-def test_a_student_opens_and_closes_the_answers_of_a_quiz(lab):
-    lab.open('01_publish_and_subscribe.ipynb')
-    question = quiz(lab)
-    while lab.active() < question:
-        lab.leave_with('ArrowDown')
-    assert len(answers(lab)) == 3
-    for answer in answers(lab):
-        tab_to(lab, answer)
-        lab.page.keyboard.press('Enter')
-        assert lab.page.evaluate(OPEN)
-        lab.page.keyboard.press('Space')
-        assert not lab.page.evaluate(OPEN)
-
-
 def test_an_instructor_walks_runs_and_ends_a_deck(own_deck):
     own_deck.present('01_publish_and_subscribe.ipynb')
     own_deck.command('notebook:clear-all-cell-outputs')
