@@ -101,6 +101,9 @@ CHANGED = [
     ('has_what_a_lesson_has', '"predict"', '"deck-break"'),
     ('has_what_a_lesson_has', '### Exercise 1', '### Practice 1'),
     ('has_what_a_lesson_has', '## In practice', '### Question 4\\n\\n## In practice'),
+    ('practice_is_backed', 'such as step 4', 'such as a step'),
+    ('practice_is_backed', 'such as step 4', 'such as step 9'),
+    ('practice_is_backed', 'such as step 4.', 'such as step 4.\\n- It is [so](images/b.png).'),
     ('guesses_are_compared', 'my_guess = 5', 'print(5)'),
     ('guesses_are_compared', "heard?', my_guess,", "heard?', 5,"),
     ('guesses_are_compared', 'compare_prediction(', 'print('),
@@ -197,6 +200,19 @@ def test_every_rule_is_broken_once():
 )
 def test_what_is_allowed_breaks_no_rule(cell):
     assert complaints(lesson(TEXT, cell)) <= {'executed_in_order'}
+
+
+@pytest.mark.parametrize(
+    'backed',
+    [
+        'steps 3 and 4',
+        '[QoS](https://docs.ros.org/en/jazzy/)',
+        '[99 Look up a term](99_look_up_a_term.ipynb)',
+        'this:\\n  what [docs](https://docs.python.org/3.12/) say',
+    ],
+)
+def test_what_backs_a_bullet_of_in_practice(backed):
+    assert rules.problems(lesson(TEXT.replace('step 4.', f'{backed}.', 1))) == []
 
 
 @pytest.mark.parametrize('right', ['AAA', 'BBB'])

@@ -301,6 +301,16 @@ def recap_answers_opening(lesson: Lesson) -> Iterator[str]:
         yield f'The recap answers {answered}, but the opening promised {promised}.'
 
 
+def practice_is_backed(lesson: Lesson) -> Iterator[str]:
+    """A bullet of "In practice" names the step that shows it, or has a link to what says so."""
+    known = {text.partition('.')[0] for _, level, text in headings(lesson) if level == 2}
+    text = '\n'.join(sections(lesson).get('In practice', []))
+    for bullet in re.findall(r'^[-*] .*(?:\n +\S.*)*', text, re.MULTILINE):
+        shown = known & set(re.findall(r'\b[Ss]teps? (\d+)', bullet))
+        if not shown and not re.search(r'\]\((https?://|\d\d_\w+\.ipynb)', bullet):
+            yield f'"In practice" gives no source, link or step of this lesson for: {bullet[:60]}.'
+
+
 def has_what_a_lesson_has(lesson: Lesson) -> Iterator[str]:
     if not any('predict' in tags(cell) for _, cell in code_cells(lesson)):
         yield 'There is no cell with the tag "predict".'
@@ -462,6 +472,7 @@ LESSON: list[Rule] = [
     says_where_it_belongs,
     recap_answers_opening,
     has_what_a_lesson_has,
+    practice_is_backed,
     answers_have_reasons,
 ]
 
