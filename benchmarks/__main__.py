@@ -135,7 +135,8 @@ def _build_s(count: int) -> float:
     texts |= {f'src/custom_interfaces/{copy}': texts[service] for copy in copies}
     cmake = 'src/custom_interfaces/CMakeLists.txt'
     listed = ' '.join(f'"{name}"' for name in [short, *copies])
-    texts[cmake] = texts[cmake].replace(f'"{short}"', listed)
+    # The lesson leaves out one line, which the reader adds.
+    texts[cmake] = texts[cmake].replace(f'"{short}"', f'{listed} DEPENDENCIES sensor_msgs')
     workspace = Workspace('benchmark')
     for name, text in texts.items():
         workspace.write(name, text)
