@@ -35,7 +35,7 @@ from tornado.websocket import websocket_connect
 ROOT = Path(__file__).resolve().parent.parent.parent
 CLAIMS = {  # of the lessons that the students run, by the lesson's name
     'lose_messages': 'All is as a KEEP_LAST queue must do it: True',
-    'run_callbacks_in_parallel': 'D explained with eight workers: True',
+    'run_callbacks_in_parallel': 'D explained with 8 threads at work: True',
 }
 LESSONS = [next((ROOT / 'notebooks').glob(f'??_{name}.ipynb')) for name in CLAIMS]
 STUDENTS = [f'student{number:02}' for number in range(1, 13)]
@@ -334,7 +334,7 @@ async def run_lessons(student: Student, paths: list[Path]) -> list[Lesson]:
 
 # After lesson 02: each message that its recordings hold was published here, and is heard once.
 STRANGERS = """
-for _table in (table, short_table, best_effort_table):
+for _table in (table, short_table, Recording.latest.table()):
     assert _table['seq'].is_unique
     for _seq in _table.loc[_table['published_s'].isna(), 'seq']:
         print(_seq)
