@@ -23,8 +23,6 @@ from pathlib import Path
 import pandas as pd
 from rosidl_adapter import parser
 
-from helpers.values import shown
-
 SEPARATOR = parser.SERVICE_REQUEST_RESPONSE_SEPARATOR  # an action uses the same one
 KINDS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
 INDEX = 'share/ament_index/resource_index'
@@ -35,10 +33,9 @@ def show(name: str) -> None:
 
     Of the nested messages the command hides the comments, and leaves remains of some: a `#` after
     a field, a comment line that is indented or empty. So does this function. Version 0.32.11 of
-    the command (July 2026) hides the comment lines among them. An interface that exists only as
-    .idl is printed as it is.
+    the command (July 2026) hides the comment lines among them.
 
-    Raises TypeError if `name` is no text, and ValueError if there is no such interface.
+    Raises ValueError if there is no such interface.
     """
     print(''.join(_listing(name)), end='')
 
@@ -48,11 +45,7 @@ def list_interfaces(containing: str = '') -> None:
 
     With `containing`, print only the lines that contain this text, as
     `ros2 interface list | grep containing` does.
-
-    Raises TypeError if `containing` is no text.
     """
-    if not isinstance(containing, str):
-        raise TypeError(f'containing must be a text, not {shown(containing)}.')
     names = installed_names()
     for kind, heading in KINDS.items():
         own = [f'    {name}' for name in names if name.split('/')[1] == kind]
@@ -70,8 +63,7 @@ def dependencies(name: str) -> pd.DataFrame:
     brackets: '[]', '[9]', '[<=5]'). The fields of a row follow it, one deeper. The parts of a
     service (request, response) and of an action (goal, result, feedback) are rows too.
 
-    Raises TypeError if `name` is no text, and ValueError if there is no such interface or if it
-    exists only as .idl.
+    Raises ValueError if there is no such interface.
     """
     _find(name)
     package, kind, short = name.split('/')
@@ -130,25 +122,18 @@ def installed_names() -> list[str]:
             stem, _, suffix = line.rpartition('.')
             kind = stem.partition('/')[0]
             # A name with an underscore is a part of a service or an action.
-            if kind in KINDS and suffix in (kind, 'idl') and '_' not in stem:
+            if kind in KINDS and suffix == kind and '_' not in stem:
                 names.add(f'{package}/{stem}')
     return sorted(names, key=lambda name: name.split('/', 1))
 
 
 def _find(name: str) -> Path:
-    """The file of an interface: .msg, .srv or .action, or else .idl."""
-    if not isinstance(name, str):
-        raise TypeError(
-            f'An interface has a name such as "sensor_msgs/msg/Image", not {shown(name)}.'
-        )
-    match = re.fullmatch(r'(\w+)/(msg|srv|action)/(\w+)', name)
-    share = match and share_folder(match[1])
-    if share:
-        for suffix in (match[2], 'idl'):
-            file = share / match[2] / f'{match[3]}.{suffix}'
-            if os.path.isfile(file):
-                return file
-    near = nearest(name, installed_names())
+    """The .msg, .srv or .action file of an interface."""
+    if match := re.fullmatch(r'(\w+)/(msg|srv|action)/(\w+)', str(name)):
+        file = (share_folder(match[1]) or Path()) / match[2] / f'{match[3]}.{match[2]}'
+        if file.is_file():
+            return file
+    near = nearest(str(name), installed_names())
     hint = f'The nearest: {", ".join(near)}.' if near else 'list_interfaces() prints all names.'
     raise ValueError(f'There is no interface {name!r}. {hint}')
 
@@ -171,9 +156,6 @@ def _listing(name: str, depth: int = 0) -> Iterator[str]:
     file = _find(name)
     package = name.split('/')[0]
     with file.open(encoding='utf-8') as lines:
-        if file.suffix == '.idl':
-            yield from lines
-            return
         for text in map(str.rstrip, lines):
             bare, nested = _read_line(package, text)
             if depth == 0:
@@ -219,10 +201,7 @@ def _full_name(type_: parser.BaseType) -> str:
 
 def _parts(name: str) -> dict[str, list[parser.Field]]:
     """The fields of each part of an interface. A message has one part without a name."""
-    file = _find(name)
-    if file.suffix == '.idl':
-        raise ValueError(f'{name} exists only as .idl. Give a message, a service or an action.')
-    return read_fields(name.split('/')[0], file)
+    return read_fields(name.split('/')[0], _find(name))
 
 
 def read_fields(package: str, file: Path) -> dict[str, list[parser.Field]]:
