@@ -15,7 +15,6 @@ import signal
 import subprocess
 import sys
 import time
-import uuid
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +27,16 @@ SHARED_MEMORY = Path('/dev/shm')
 ENOUGH_SHARED_MEMORY_BYTES = 32 * 2**20  # a notebook's nodes take about 1 MiB
 MESSAGE_TIMEOUT_S = 10.0
 COMMAND_TIMEOUT_S = 20.0
+ANOTHER_ENVIRONMENT = (
+    'start JupyterLab and its kernel from the same environment, with `make lab`, in a terminal '
+    'where no other ROS 2 is sourced'
+)
+# What a failed import of rclpy says, and what to do.
+FAILED_IMPORTS = {
+    r"No module named '\S+'": 'start JupyterLab with `make lab`, or source your ROS 2 installation',
+    r"RMW implementation identifier of '\S+'": ('run `unset RMW_IMPLEMENTATION`, and start again'),
+    r'\S+: cannot open shared object file|undefined symbol: \S+': ANOTHER_ENVIRONMENT,
+}
 
 
 @dataclass(frozen=True)
@@ -90,34 +99,22 @@ def _why_import_failed(trial: subprocess.CompletedProcess[str]) -> tuple[str, st
     if trial.returncode == -signal.SIGBUS:
         # LTTng, which rclpy is linked with, maps a page of shared memory when it is loaded.
         return 'ended with a bus error', f'{SHARED_MEMORY} is full: {_more_shared_memory()}'
-    told = re.search(
-        r"No module named '\S+'|\S+: cannot open shared object file|undefined symbol: \S+"
-        r"|RMW implementation identifier of '\S+'",
-        trial.stderr,
-    )
-    found = told[0] if told else _last_line(trial.stderr) or f'ended with {trial.returncode}'
-    if 'RMW implementation' in found:
-        return f'no {found}', 'run `unset RMW_IMPLEMENTATION`, and start again'
-    if 'No module named' in found:
-        return found, 'start JupyterLab with `make lab`, or source your ROS 2 installation'
-    return found, (
-        'start JupyterLab and its kernel from the same environment, with `make lab`, in a terminal '
-        'where no other ROS 2 is sourced'
-    )
+    for pattern, to_do in FAILED_IMPORTS.items():
+        if said := re.search(pattern, trial.stderr):
+            return said[0], to_do
+    return _last_line(trial.stderr) or f'ended with {trial.returncode}', ANOTHER_ENVIRONMENT
 
 
 def check_domain() -> Check:
-    """Reserve this process's domain id and keep discovery on this machine."""
-    from helpers.domain import configure_discovery, reserve_domain_id
+    """Reserve this process's domain id."""
+    from helpers.session import graph_environment
 
     name = 'domain and discovery'
-    configure_discovery()
-    reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
     try:
-        domain_id = reserve_domain_id()
+        domain_id, discovery = graph_environment().values()
     except RuntimeError as error:
-        return Check(name, f'no free domain id, discovery {reach}', str(error))
-    return Check(name, f'domain id {domain_id}, discovery {reach}')
+        return Check(name, 'no free domain id', str(error))
+    return Check(name, f'domain id {domain_id}, discovery {discovery}')
 
 
 def check_message() -> Check:
@@ -128,53 +125,35 @@ def check_message() -> Check:
     try:
         rmw = rclpy.get_rmw_implementation_identifier()
         took_s = _seconds_to_hear()
+    except TimeoutError as error:
+        to_do = 'allow UDP on the loopback interface, and see "Trouble" in environment.md'
+        return Check(name, f'{rmw}: {str(error).splitlines()[0]}', to_do)
     except Exception as error:  # whatever the RMW raises is what was found
         return Check(name, _last_line(str(error)), 'see "Trouble" in environment.md')
-    if took_s is None:
-        return Check(
-            name,
-            f'{rmw}: not heard within {MESSAGE_TIMEOUT_S:g} s',
-            'allow UDP on the loopback interface, and see "Trouble" in environment.md',
-        )
     return Check(name, f'{rmw}: heard after {took_s * 1000:.1f} ms')
 
 
-def _seconds_to_hear() -> float | None:
-    """Publish one message, and return after how many seconds it was heard, None if it was not."""
-    import rclpy
+def _seconds_to_hear() -> float:
+    """Publish one message in a session of its own, and return when it was heard, in seconds."""
     from rclpy.executors import SingleThreadedExecutor
+    from rclpy.node import Node
     from rclpy.qos import DurabilityPolicy, QoSProfile
-    from rclpy.task import Future
     from std_msgs.msg import String
 
-    from helpers.domain import one_process_at_a_time, reserve_domain_id
-    from helpers.session import destroy_nodes
+    from helpers.session import ros_session
 
-    # A context of its own: the kernel's default one may be open and stays as it is.
-    context = rclpy.Context()
-    context.init(domain_id=reserve_domain_id(), initialize_logging=False)
-    try:
-        executor = SingleThreadedExecutor(context=context)
-        with one_process_at_a_time():
-            node = rclpy.create_node(
-                'doctor', context=context, enable_rosout=False, start_parameter_services=False
-            )
+    # Transient local: the message arrives also where discovery ends after publish().
+    qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    heard_s = []
+    with ros_session() as session:
+        node, executor = Node('doctor'), SingleThreadedExecutor()
+        node.create_subscription(String, 'doctor', lambda _: heard_s.append(time.monotonic()), qos)
         executor.add_node(node)
-        # Transient local: the message arrives also where discovery ends after publish().
-        qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        heard = Future(executor=executor)
-        node.create_subscription(String, '_doctor', heard.set_result, qos)
-        message = String(data=uuid.uuid4().hex)
-        started = time.monotonic()
-        node.create_publisher(String, '_doctor', qos).publish(message)
-        executor.spin_until_future_complete(heard, timeout_sec=MESSAGE_TIMEOUT_S)
-        took_s = time.monotonic() - started
-        executor.shutdown()
-    finally:  # also when the cell is interrupted, here or before
-        with uninterrupted():
-            destroy_nodes(context)
-            context.try_shutdown()
-    return took_s if heard.done() and heard.result() == message else None
+        session.spin(executor)
+        started_s = time.monotonic()
+        node.create_publisher(String, 'doctor', qos).publish(String())
+        session.wait_until(lambda: heard_s, MESSAGE_TIMEOUT_S)
+    return heard_s[0] - started_s
 
 
 def check_shared_memory() -> Check:

@@ -37,7 +37,7 @@ def reserve_domain_id() -> int:
 
 
 @contextlib.contextmanager
-def share_domain_id(domain_id: int) -> Iterator[int]:
+def share_domain_id(domain_id: int) -> Iterator[None]:
     """Keep `reserve_domain_id` of all processes away from this id, which several may share.
 
     Raises ValueError where a process has reserved it for itself.
@@ -55,17 +55,13 @@ def share_domain_id(domain_id: int) -> Iterator[int]:
                 f'Domain {domain_id} is reserved on this machine: agree on another one. '
                 'No kernel reserves 0 and 101.'
             ) from None
-        yield domain_id
+        yield
 
 
 def check_domain(domain_id: int | None, discovery: str) -> None:
-    """Raise TypeError or ValueError where a session cannot use this domain and this range."""
-    if domain_id is not None:
-        said = f'domain_id must be a whole number from 0 to 101, not {domain_id!r}.'
-        if isinstance(domain_id, bool) or not isinstance(domain_id, int):
-            raise TypeError(said)
-        if not 0 <= domain_id <= 101:
-            raise ValueError(said)
+    """Raise ValueError where a session cannot use this domain and this range."""
+    if domain_id is not None and domain_id not in range(102):
+        raise ValueError(f'domain_id must be a whole number from 0 to 101, not {domain_id!r}.')
     if discovery not in ('LOCALHOST', 'SUBNET'):
         raise ValueError(f"discovery must be 'LOCALHOST' or 'SUBNET', not {discovery!r}.")
     if discovery == 'SUBNET' and domain_id is None:

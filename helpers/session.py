@@ -61,7 +61,7 @@ def ros_session(domain_id: int | None = None, discovery: str = 'LOCALHOST') -> S
     the programs of this machine that use it, `ros_session(domain_id=42, discovery='SUBNET')` also
     those of other machines. The other side sets ROS_DOMAIN_ID and ROS_AUTOMATIC_DISCOVERY_RANGE.
 
-    Raises TypeError or ValueError for anything else.
+    Raises ValueError for anything else.
     """
     check_domain(domain_id, discovery)
     return Session(domain_id, discovery)

@@ -2,22 +2,17 @@
 
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import threading
 import venv
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-import rclpy
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
 from support.processes import traces
 
 from helpers import doctor
-from helpers.session import destroy_nodes, ros_session
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -83,18 +78,16 @@ def test_without_rclpy_it_says_what_to_run(tmp_path):
 
 
 def test_only_a_required_check_decides(tmp_path):
-    answer = run_doctor(PATH=str(tmp_path))
-    assert answer.returncode == 0
+    """A middleware that is not there does not end the doctor."""
+    answer = run_doctor(RMW_IMPLEMENTATION='rmw_nowhere_cpp', PATH=str(tmp_path))
+    assert answer.returncode == 1
+    assert 'run `unset RMW_IMPLEMENTATION`, and' in row_of(answer.stdout, 'rclpy')
     assert row_of(answer.stdout, 'C++ compiler') == (
         'C++ compiler optional none that works: for the lessons on packages run '
         '`sudo apt install g++`'
     )
-
-
-def test_a_middleware_that_is_not_there_does_not_end_the_doctor():
-    answer = run_doctor(RMW_IMPLEMENTATION='rmw_nowhere_cpp')
-    assert answer.returncode == 1
-    assert 'run `unset RMW_IMPLEMENTATION`, and' in row_of(answer.stdout, 'rclpy')
+    summary = answer.stdout[answer.stdout.index('This machine is not ready: 2 of 5') :]
+    assert 'C++' not in summary
 
 
 @pytest.mark.parametrize(
@@ -126,49 +119,14 @@ def test_another_ros_is_not_jazzy(monkeypatch):
     assert doctor.check_rclpy().to_do.startswith('use ROS 2 Jazzy (rclpy 7.1.x)')
 
 
-def test_the_message_leaves_an_open_session_as_it_is():
-    with ros_session():
-        observer = Node('observer')
-        context = rclpy.get_default_context()
-        before = set(threading.enumerate())
-        assert doctor.check_message().to_do == ''
-        assert context.ok()
-        assert rclpy.get_default_context() is context
-        assert set(threading.enumerate()) == before
-        assert 'doctor' not in observer.get_node_names()
-    assert doctor.check_message().to_do == ''
-    assert not rclpy.ok()
-
-
-def interrupted_waiting(*arguments, **options):
-    raise KeyboardInterrupt
-
-
-def interrupted_cleaning_up(context):
-    signal.raise_signal(signal.SIGINT)
-    destroy_nodes(context)
-
-
-@pytest.mark.parametrize(
-    ('name', 'interrupted'),
-    [
-        (
-            'rclpy.executors.SingleThreadedExecutor.spin_until_future_complete',
-            interrupted_waiting,
-        ),
-        ('helpers.session.destroy_nodes', interrupted_cleaning_up),
-    ],
-)
-def test_an_interrupted_message_leaves_nothing(monkeypatch, name, interrupted):
-    monkeypatch.setattr(name, interrupted)
+def test_the_message_leaves_nothing():
     before = traces()
-    with pytest.raises(KeyboardInterrupt):
-        doctor.check_message()
+    assert doctor.check_message().to_do == ''
     assert traces() <= before
 
 
 def test_what_the_middleware_raises_is_reported(monkeypatch):
-    monkeypatch.setattr('helpers.domain.reserve_domain_id', lambda: -5)
+    monkeypatch.setattr('helpers.session.reserve_domain_id', lambda: -5)
     row = doctor.check_message()
     assert row.required
     assert row.found
@@ -179,7 +137,7 @@ def test_a_message_that_does_not_arrive_is_reported(monkeypatch):
     monkeypatch.setattr(doctor, 'MESSAGE_TIMEOUT_S', 0.2)
     monkeypatch.setattr(SingleThreadedExecutor, 'add_node', lambda executor, node: None)
     row = doctor.check_message()
-    assert row.found.endswith(': not heard within 0.2 s')
+    assert row.found == 'rmw_fastrtps_cpp: Waited 0.2 s in vain.'
     assert row.to_do.startswith('allow UDP on the loopback interface')
 
 
@@ -187,7 +145,7 @@ def test_no_free_domain_id_is_reported(monkeypatch):
     def none_left() -> int:
         raise RuntimeError('All of them are in use: close some.')
 
-    monkeypatch.setattr('helpers.domain.reserve_domain_id', none_left)
+    monkeypatch.setattr('helpers.session.reserve_domain_id', none_left)
     row = doctor.check_domain()
     assert row.required
     assert row.to_do == 'All of them are in use: close some.'

@@ -24,13 +24,6 @@ def test_an_interrupt_is_not_lost_where_the_block_fails():
     assert isinstance(interrupt.value.__context__, ZeroDivisionError)
 
 
-def test_nothing_happens_without_an_interrupt():
-    with uninterrupted():
-        pass
-    with pytest.raises(ZeroDivisionError), uninterrupted():
-        raise ZeroDivisionError
-
-
 def test_other_threads_are_never_interrupted():
     def block():
         with uninterrupted():

@@ -81,11 +81,6 @@ def test_a_session_opens_once():
         pass
 
 
-def test_current_session():
-    with ros_session() as session:
-        assert current_session() is session
-
-
 def test_bare_init_of_the_notebook_is_replaced():
     configure_discovery()
     rclpy.init(domain_id=reserve_domain_id())
@@ -109,26 +104,15 @@ def test_no_rclpy():
 # Spinning
 
 
-@EXECUTORS
-def test_spin(threads):
-    with ros_session() as session:
-        talker, listener = Talker(5), Listener()
-        spin(session, talker, listener, threads=threads)
-        session.wait_until(lambda: len(listener.heard) == 5, LIMIT_S)
-    assert listener.heard == [f'Hello World: {i}' for i in range(5)]
-
-
-@pytest.mark.parametrize('wrong', ['x', None, SingleThreadedExecutor])
-def test_spin_no_executor(wrong):
-    with ros_session() as session, pytest.raises(TypeError, match='session.spin needs an executor'):
-        session.spin(wrong)
-
-
 def test_spin_in_the_wrong_place():
     with ros_session() as session:
         executor = spin(session)
         with pytest.raises(ValueError, match='This executor spins already'):
             session.spin(executor)
+        with pytest.raises(TypeError, match='session.spin needs an executor, for example'):
+            session.spin(SingleThreadedExecutor)
+        with pytest.raises(ValueError, match='This executor does not spin'):
+            session.wait_until_quiet(SingleThreadedExecutor())
     with pytest.raises(RuntimeError, match='This session is not open'):
         session.spin(executor)
     unopened = ros_session()
@@ -137,14 +121,6 @@ def test_spin_in_the_wrong_place():
             session.spin(executor)
         with pytest.raises(RuntimeError, match='This session is not open'):
             unopened.spin(SingleThreadedExecutor())
-
-
-def test_wait_until_gives_up():
-    with ros_session() as session:
-        started = time.monotonic()
-        with pytest.raises(TimeoutError, match=r'Waited 0\.2 s in vain'):
-            session.wait_until(lambda: False, timeout_s=0.2)
-        assert time.monotonic() - started >= 0.2
 
 
 # Leaving
@@ -184,10 +160,10 @@ def test_session_that_was_never_closed(threads):
     forgotten.__exit__(None, None, None)  # has nothing to do
 
 
-@EXECUTORS
-def test_session_that_is_open_when_python_ends(threads):
-    """Also where a callback never ends."""
-    said = run_python(f"""
+def test_session_that_is_open_when_python_ends():
+    """Also where a callback never ends. Only what the cell prints is printed; no home is needed."""
+    said = run_python(
+        """
         import threading
         from support.nodes import Listener, Talker, spin
         from helpers import session as module
@@ -195,13 +171,21 @@ def test_session_that_is_open_when_python_ends(threads):
         session = module.ros_session().__enter__()
         talker = Talker(10**6, period_s=0.001)
         held = Listener(lambda message: threading.Event().wait())
-        spin(session, talker, threads={threads})
+        spin(session, talker, threads=3)
         spin(session, held)
         session.wait_until(lambda: held.heard)
+        talker.get_logger().info('printed by the cell')
+        session.print_log()
         talker.get_logger().warning('printed by nobody')
-        print('end')
-    """)
-    assert said == 'end\n'
+        """,
+        HOME='/proc/nobody',
+        ROS_HOME=None,
+        ROS_LOG_DIR=None,
+        RCUTILS_LOGGING_USE_STDOUT=None,
+        RCUTILS_COLORIZED_OUTPUT=None,
+        RCUTILS_CONSOLE_OUTPUT_FORMAT=None,
+    )
+    assert said == '[INFO] [minimal_publisher]: printed by the cell\n'
 
 
 def test_saturated_reentrant_group():
@@ -251,8 +235,7 @@ def test_callback_that_does_not_end(threads, monkeypatch):
     gate.open()
 
 
-@EXECUTORS
-@pytest.mark.parametrize('timeout_s', [None, LIMIT_S])
+@pytest.mark.parametrize(('threads', 'timeout_s'), [(1, LIMIT_S), (3, None)])
 def test_callback_that_waits_for_an_interrupted_cell(threads, timeout_s):
     gate, waiting, ended = threading.Event(), [], []
 
@@ -319,10 +302,9 @@ def test_deadlock_ends_with_the_session(threads, style, groups, found):
     assert answers == [found]
 
 
-@pytest.mark.parametrize('style', ['call', 'call_back'])
-def test_nobody_answers(style, capsys):
+def test_nobody_answers(capsys):
     with ros_session() as session:
-        asker = Asker(style)
+        asker = Asker('call_back')
         executor = spin(session, asker)
         session.wait_until(lambda: asker.asked, LIMIT_S)
         session.wait_until_quiet(executor)
@@ -351,11 +333,6 @@ def test_work_without_end_is_never_quiet():
         with pytest.raises(TimeoutError):
             session.wait_until_quiet(executor, timeout_s=0.6)
         gate.set()
-
-
-def test_quiet_executor_must_spin():
-    with ros_session() as session, pytest.raises(ValueError, match='does not spin'):
-        session.wait_until_quiet(SingleThreadedExecutor())
 
 
 # Failures
@@ -420,10 +397,9 @@ def test_waiting_ends_with_a_callback_failure(threads, wait):
     assert not hasattr(failure.value, '__notes__')
 
 
-@pytest.mark.parametrize('style', ['call', 'wait'])
-def test_failure_in_a_service(style):
+def test_failure_in_a_service():
     with pytest.raises(ZeroDivisionError) as failure, ros_session() as session:
-        asker = Asker(style, groups=2)
+        asker = Asker('call', groups=2)
         spin(session, asker, Answerer(failing_callback), threads=2)
         session.wait_until(lambda: asker.answer, LIMIT_S)
     assert 'failing_callback' in frames(failure.value)
@@ -497,9 +473,8 @@ def test_node_that_cannot_be_destroyed():
 # Interrupts
 
 
-@pytest.mark.parametrize('wait', ['session.wait_until(lambda: False)', 'threading.Event().wait()'])
-def test_interrupt(wait):
-    with running(f"""
+def test_interrupt():
+    with running("""
         import threading
         import rclpy
         from support.nodes import Listener, Talker, spin
@@ -513,7 +488,9 @@ def test_interrupt(wait):
                     session.wait_until(lambda: listener.heard)
                     print(turn, 'ready', flush=True)
                     try:
-                        {wait}
+                        if turn == 'first':
+                            session.wait_until(lambda: False)
+                        threading.Event().wait()
                     except KeyboardInterrupt:
                         # Nothing but the cell was interrupted: the nodes go on.
                         heard = len(listener.heard)
@@ -530,11 +507,10 @@ def test_interrupt(wait):
     assert (process.returncode, out, err) == (0, '', '')
 
 
-@EXECUTORS
-def test_interrupt_of_a_deadlock(threads):
+def test_interrupt_of_a_deadlock():
     with pytest.raises(KeyboardInterrupt), ros_session() as session:
         asker = Asker()
-        executor = spin(session, asker, Answerer(), threads=threads)
+        executor = spin(session, asker, Answerer())
         session.wait_until(lambda: asker.asked, LIMIT_S)
         session.wait_until_quiet(executor)
         session.wait_until(lambda: signal.raise_signal(signal.SIGINT), LIMIT_S)
@@ -644,8 +620,7 @@ def test_interrupt_of_open(name, monkeypatch):
 def test_log(capsys):
     with ros_session() as session:
         talker, listener = Node('minimal_publisher'), Node('minimal_subscriber')
-        for i in range(3):
-            talker.get_logger().info(f'Publishing: "{i}"')
+        talker.get_logger().info('Publishing: "0"')
         listener.get_logger().info('I heard: "Hello World: 7"')
         session.print_log('minimal_subscriber')
         talker.get_logger().error('late')
@@ -658,8 +633,6 @@ def test_log(capsys):
     printed = (
         '[INFO] [minimal_subscriber]: I heard: "Hello World: 7"\n'
         '[INFO] [minimal_publisher]: Publishing: "0"\n'
-        '[INFO] [minimal_publisher]: Publishing: "1"\n'
-        '[INFO] [minimal_publisher]: Publishing: "2"\n'
         '[ERROR] [minimal_publisher]: late\n'
     )
     assert capsys.readouterr() == (3 * printed, '')
@@ -689,30 +662,7 @@ def test_log_keeps_a_long_run(capsys):
     # More than the 1000 records that a publisher of /rosout keeps.
     with ros_session() as session:
         node = Node('node')
-        for i in range(3000):
+        for i in range(1500):
             node.get_logger().info(str(i))
     session.print_log('node')
-    assert capsys.readouterr().out == ''.join(f'[INFO] [node]: {i}\n' for i in range(3000))
-
-
-def test_log_of_a_process():
-    """Nothing but what the cell prints arrives at the pipes, and no home is needed."""
-    said = run_python(
-        """
-        from support.nodes import Listener, Talker, spin
-        from helpers.session import ros_session
-        with ros_session() as session:
-            talker = Talker(3)
-            listener = Listener(lambda message: talker.get_logger().info(message.data))
-            spin(session, talker, listener)
-            session.wait_until(lambda: len(listener.heard) == 3)
-        session.print_log()
-        """,
-        HOME='/proc/nobody',
-        ROS_HOME=None,
-        ROS_LOG_DIR=None,
-        RCUTILS_LOGGING_USE_STDOUT=None,
-        RCUTILS_COLORIZED_OUTPUT=None,
-        RCUTILS_CONSOLE_OUTPUT_FORMAT=None,
-    )
-    assert said.splitlines() == [f'[INFO] [minimal_publisher]: Hello World: {i}' for i in range(3)]
+    assert capsys.readouterr().out == ''.join(f'[INFO] [node]: {i}\n' for i in range(1500))

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 from support.packages import (
-    CMAKE_LISTS,
     HOSTILE,
     SETUP_PY,
     TALKER,
@@ -80,33 +79,35 @@ def test_a_build_says_what_was_built_and_nothing_that_changes(built):
     assert (built.path / built.result.log).is_file()
 
 
-def test_a_forgotten_dependency_is_the_key_error(other):
-    write_interfaces(other, cmake=CMAKE_LISTS.replace('  DEPENDENCIES sensor_msgs\n', ''))
-    depends = '<depend>custom_interfaces</depend>'
+def test_of_a_build_that_fails_the_lines_that_matter_are_shown(other):
+    cmake = 'cmake_minimum_required(VERSION 3.8)\nproject(before LANGUAGES NONE)\n'
+    other.write('src/before/package.xml', package_xml('before', 'ament_cmake'))
+    other.write(
+        'src/before/CMakeLists.txt', f'{cmake}message(STATUS one)\nmessage(FATAL_ERROR two)'
+    )
+    depends = '<depend>before</depend>'
     other.write('src/after/package.xml', package_xml('after', 'ament_cmake', depends))
-    result = other.build('custom_interfaces', 'after')
+    result = other.build('before', 'after')
     assert not result.ok
-    assert result.failed == 'custom_interfaces'
-    assert result.packages == {'custom_interfaces': 'failed', 'after': 'aborted'}
-    assert re.fullmatch(
-        r"""colcon build --packages-select custom_interfaces after
---- stderr: custom_interfaces
-Traceback \(most recent call last\):
-  \.\.\.
-  File "rosidl_generator_type_description/__init__.py", line \d+, in generate_type_hash
-    pkg_dir = include_map\[pkg\]
-KeyError: 'sensor_msgs'
+    assert result.failed == 'before'
+    assert result.packages == {'before': 'failed', 'after': 'aborted'}
+    assert (
+        str(result)
+        == """\
+colcon build --packages-select before after
+--- stderr: before
+CMake Error at CMakeLists.txt:4 (message):
+  two
 ---
-Failed   <<< custom_interfaces
+Failed   <<< before
 Aborted  <<< after
 
 Summary: 0 packages finished
-  1 package failed: custom_interfaces
+  1 package failed: before
   1 package aborted: after
-Every line: log/latest_build/custom_interfaces/stdout_stderr.log""",
-        str(result),
+Every line: log/latest_build/before/stdout_stderr.log"""
     )
-    assert '***' in (other.path / result.log).read_text()  # make's own lines are in the log only
+    assert '-- one' in (other.path / result.log).read_text()
 
 
 def test_mistakes_of_a_python_package(other):
@@ -135,12 +136,6 @@ def test_mistakes_of_a_python_package(other):
         '',
         'Summary: 0 packages finished',
     ]
-
-
-@pytest.mark.parametrize('name', [['talker_pkg'], '--symlink-install', ''])
-def test_arguments_that_are_no_packages(built, name):
-    with pytest.raises(ValueError, match='^A package is given by its name, for example build'):
-        built.build(name)
 
 
 def test_without_a_compiler_one_sentence_says_what_to_install(other, monkeypatch, tmp_path):
@@ -485,17 +480,8 @@ def test_a_killed_kernel_takes_its_nodes_with_it(built):
         assert wait_until(lambda: processes_of(path) == [])
 
 
-@pytest.mark.parametrize(
-    ('first', 'start'),
-    [
-        (Workspace.environment, lambda workspace: workspace.run('talker_pkg', 'talker')),
-        (Workspace.environment, lambda workspace: workspace.build('talker_pkg')),
-        (lambda workspace: workspace.build('talker_pkg'), Workspace.environment),
-    ],
-    ids=['run', 'build', 'environment'],
-)
-def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch, first, start):
-    first(built)  # the shell of `environment` starts once after each build
+def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch):
+    built.environment()
     started = []
 
     class Interrupted(subprocess.Popen):
@@ -504,13 +490,16 @@ def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch, fir
             started.append(self)
             signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(subprocess, 'Popen', Interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        start(built)
-    monkeypatch.undo()
-    built.close()  # as after each cell that was interrupted
-    (process,) = started
-    assert process.poll() is not None
+    for start in (
+        lambda: built.run('talker_pkg', 'talker'),
+        lambda: built.build('talker_pkg'),
+        built.environment,  # its shell starts once after each build
+    ):
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            patch.setattr(subprocess, 'Popen', Interrupted)
+            start()
+        built.close()  # as after each cell that was interrupted
+    assert [process.poll() is None for process in started] == [False] * 3
 
 
 # --- The folder ----------------------------------------------------------------------------------
@@ -572,13 +561,13 @@ def test_a_checkout_with_spaces_and_accents(other, monkeypatch, tmp_path):
     assert list(checkout.iterdir()) == []
 
 
-@pytest.mark.parametrize('name', ['', 'two words', '../up', 'a/b', 3])
+@pytest.mark.parametrize('name', ['', 'two words', '../up'])
 def test_names_of_workspaces(name):
-    with pytest.raises(ValueError, match='A workspace is named with letters'):
+    with pytest.raises(ValueError, match='Name a workspace with letters'):
         Workspace(name)
 
 
-@pytest.mark.parametrize('path', ['/etc/passwd', '../up', 'src/../../up', ''])
+@pytest.mark.parametrize('path', ['/etc/passwd', 'src/../../up', ''])
 def test_a_file_stays_in_its_workspace(other, path):
     with pytest.raises(ValueError, match='Give a path inside the workspace'):
         other.write(path, 'text')

@@ -196,7 +196,7 @@ MESSAGES = (
     # An exception's text may have more lines. It ends where a message of another program begins.
     _Message(
         r'Traceback \(most recent call last\)',
-        r'(?!CMake |Traceback |g?make(\[\d+\])?: |ninja: |FAILED: |error: )\s*\S',
+        r'(?!CMake |Traceback |g?make(\[\d+\])?: |error: )\s*\S',
         _traceback,
     ),
     # A compiler shows the line of code below its error.

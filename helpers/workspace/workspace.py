@@ -38,10 +38,9 @@ class Workspace:
 
     def __init__(self, name: str) -> None:
         global _open_workspace
-        if not isinstance(name, str) or not re.fullmatch(r'[A-Za-z0-9_-]+', name):
+        if not re.fullmatch(r'[A-Za-z0-9_-]+', name):
             raise ValueError(
-                f'A workspace is named with letters, digits, _ and -, for example '
-                f"Workspace('lesson_06'), not {name!r}."
+                f'Name a workspace with letters, digits, _ and -, such as lesson_06, not {name!r}.'
             )
         _close()
         self.path = claim(name)
@@ -90,15 +89,8 @@ class Workspace:
         """Run `colcon build` on all packages, or with `--packages-select` on these.
 
         A build that fails is a result, not an exception: print it. Raises RuntimeError where this
-        machine lacks a tool, with the command that installs it; ValueError for what is not the name
-        of a package.
+        machine lacks a tool, with the command that installs it.
         """
-        for package in packages:
-            if not isinstance(package, str) or not re.fullmatch(r'[A-Za-z][\w-]*', package):
-                raise ValueError(
-                    f"A package is given by its name, for example build('my_package'), "
-                    f'not {package!r}.'
-                )
         with_cmake = any(self.path.glob('src/**/CMakeLists.txt'))
         for tool in build_tools(with_cmake):
             if not tool.found:
@@ -163,12 +155,10 @@ class Workspace:
     def run(self, package: str, executable: str, *arguments: str, sourced: bool = True) -> Process:
         """Start an executable as `ros2 run` does, and return the running process.
 
-        It has the sourced environment, and the open session's domain id and discovery range (this
-        kernel's, where no session is open). What it prints is collected.
-        It ends with its `with` block, with `stop()`, when the same is run again, when a cell is
-        interrupted, and with the kernel. `sourced=False` leaves `install/setup.bash` out.
-
-        Where the package or the executable is not there, the process has printed what `ros2 run`
+        It has the sourced environment (`sourced=False` leaves that out), and the domain id and
+        discovery range of the open session, or of this kernel's next one. It ends with its `with`
+        block, with `stop()`, when the same is run again, when a cell is interrupted, and with the
+        kernel. Where the package or the executable is not there, it has printed what `ros2 run`
         prints, and has ended with 1.
         """
         environment = self.environment() if sourced else build_environment()
