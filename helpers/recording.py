@@ -6,6 +6,7 @@ import functools
 import inspect
 import threading
 import time
+from array import array
 from collections.abc import Callable
 
 import pandas as pd
@@ -18,9 +19,11 @@ COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']
 def number_of(message) -> int:
     """Return the number at the end of `message.data`: 7 for `Hello World: 7`, or 7 itself.
 
-    Raises ValueError where there is none.
+    Of a picture with one pixel it is the pixel. Raises ValueError where there is no number.
     """
     data = getattr(message, 'data', None)
+    if isinstance(data, array) and len(data) == 1:
+        data = data[0]
     if isinstance(data, int):
         return data
     word = data.rpartition(' ')[2] if isinstance(data, str) else ''

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from rclpy.callback_groups import ReentrantCallbackGroup
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Image, Imu
 from std_msgs.msg import Int64, String
 from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 
@@ -224,7 +224,19 @@ def test_takes_that_overtake_are_sorted():
     assert table['started_s'].notna().tolist() == [False, True, True]
 
 
-@pytest.mark.parametrize('message', [String(data='Hello World'), String(), Imu()])
+def test_a_picture_of_one_pixel_is_its_number():
+    recording = Recording(publisher := Publisher(), subscription := Subscription())
+    for number in (0, 255):
+        publisher.publish(Image(data=[number]))
+    subscription.callback(Image(data=[255]))
+    table = recording.table()
+    assert table['seq'].tolist() == [0, 255]
+    assert table['started_s'].notna().tolist() == [False, True]
+
+
+@pytest.mark.parametrize(
+    'message', [String(data='Hello World'), String(), Imu(), Image(), Image(data=[1, 2])]
+)
 def test_message_without_a_number(message):
     recording = Recording(publisher := Publisher(), Subscription())
     with pytest.raises(ValueError, match='A recording needs messages whose data ends with their'):
