@@ -7,13 +7,9 @@ No number fails: a reader judges the ratios.
 """
 
 import argparse
-import os
-import re
-import shutil
 import statistics
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -21,14 +17,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-import nbformat
 import pandas as pd
 import psutil
 
 from benchmarks.latency import KINDS, RATES_HZ, latency_s
-from helpers.fusion import fuse, simulate
 from helpers.queue_model import explain, predict
-from helpers.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parent.parent
 IDLE_CORES = 0.1
@@ -108,71 +101,6 @@ def model(sizes: Sequence[int] = (1_000, 10_000, 100_000, 1_000_000)) -> Iterabl
         yield from growth(f'explain {{}} messages, threads: {threads}', explained)
 
 
-def fusion(sizes: Sequence[int] = (600, 6_000, 60_000)) -> Iterable[Row]:
-    """One step of the filter, in drives of different lengths."""
-    costs = {}
-    for steps in sizes:
-        measurements = simulate(seed=9, seconds=steps / 50).measurements
-        costs[steps] = [each / len(measurements) for each in seconds(fuse, measurements)]
-    return growth('one of {} steps of the filter', costs)
-
-
-def interface(sizes: Sequence[int] = (1, 10), rounds: int = 3) -> Iterable[Row]:
-    """Build a package of services from nothing: that of the lesson on interfaces, and copies."""
-    costs = {count: [_build_s(count) for _ in range(rounds)] for count in sizes}
-    return growth('build a package of {} services', costs)
-
-
-def _build_s(count: int) -> float:
-    (path,) = (ROOT / 'notebooks').glob('*_use_a_message_in_your_own_interface.ipynb')
-    texts = {}  # a file that the lesson writes twice keeps its last text
-    for cell in nbformat.read(path, as_version=4).cells:
-        if found := re.match(r'%%write (src/custom_interfaces/\S+)\n', cell.source):
-            texts[found[1]] = cell.source[found.end() :]
-    (service,) = (name for name in texts if name.endswith('.srv'))
-    short = service.removeprefix('src/custom_interfaces/')
-    copies = [short.replace('.srv', f'{number}.srv') for number in range(1, count)]
-    texts |= {f'src/custom_interfaces/{copy}': texts[service] for copy in copies}
-    cmake = 'src/custom_interfaces/CMakeLists.txt'
-    listed = ' '.join(f'"{name}"' for name in [short, *copies])
-    # The lesson leaves out one line, which the reader adds.
-    texts[cmake] = texts[cmake].replace(f'"{short}"', f'{listed} DEPENDENCIES sensor_msgs')
-    workspace = Workspace('benchmark')
-    for name, text in texts.items():
-        workspace.write(name, text)
-    started = time.perf_counter()
-    result = workspace.build()
-    if not result.ok:
-        raise RuntimeError(str(result))
-    return time.perf_counter() - started
-
-
-def set_up() -> Iterable[Row]:
-    """The installation, with empty caches and with filled ones. A slow network slows it."""
-    with tempfile.TemporaryDirectory() as folder:
-        checkout = shutil.copytree(
-            ROOT,
-            Path(folder, 'checkout'),
-            ignore=shutil.ignore_patterns('.*', 'notebooks', 'scratch'),
-        )
-        caches = {f'{tool}_CACHE_DIR': str(Path(folder, tool)) for tool in ('UV', 'PIP')}
-        found = {'empty caches': [], 'filled caches': []}
-        for _ in range(3):
-            for caches_are, costs in found.items():
-                if caches_are == 'empty caches':
-                    for cache in caches.values():
-                        shutil.rmtree(cache, ignore_errors=True)
-                shutil.rmtree(checkout / '.venv', ignore_errors=True)
-                costs += seconds(
-                    lambda: subprocess.run(
-                        ['tools/set_up.sh'], cwd=checkout, env=os.environ | caches, check=True
-                    ),
-                    rounds=1,
-                )
-        empty, filled = found.values()
-        return [Row('set-up, empty caches', empty, 'filled caches', filled)]
-
-
 def checks() -> Iterable[Row]:
     """`make test`, against the lessons under nbval alone. It takes half an hour."""
     found = {'make test': [], 'pytest -n 4 notebooks': []}
@@ -185,7 +113,7 @@ def checks() -> Iterable[Row]:
     return [Row(whole, all_s, alone, notebooks_s)]
 
 
-BENCHMARKS = {b.__name__: b for b in (latency, model, fusion, interface, set_up, checks)}
+BENCHMARKS = {b.__name__: b for b in (latency, model, checks)}
 
 
 # --- The tool ------------------------------------------------------------------------------------

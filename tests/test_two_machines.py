@@ -172,38 +172,26 @@ def heard_by(listener: subprocess.Popen) -> list[str]:
     return listener.stdout.readline().split()
 
 
-def test_discovery_range_that_two_machines_need(machines):
-    one, two = machines
-    # On machine two, one hears the network and one its machine only. `local` is its own talker.
-    wide = two.start(LISTENER, DOMAIN, 'SUBNET', 'robot')
-    narrow = two.start(LISTENER, DOMAIN, 'LOCALHOST', 'local')
-    with ended(wide, narrow):
-        assert [wide.stdout.readline(), narrow.stdout.readline()] == ['open\n', 'open\n']
-        robot = one.start(TALKER, 'robot', **ROBOT)
-        shy = one.start(TALKER, 'shy', **ROBOT | {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'})
-        stranger = one.start(TALKER, 'stranger', **ROBOT | {'ROS_DOMAIN_ID': '43'})
-        with ended(robot, shy, stranger):
-            assert heard_by(wide) == ['robot']
-            local = two.start(TALKER, 'local', **ROBOT)
-            with ended(local):
-                assert heard_by(narrow) == ['local']
-        ports = {int(port) for port in wide.stdout.readline().split()}
-    assert {port for port in ports if 7400 <= port < 32768} <= PORTS
-    assert 7400 + 250 * DOMAIN in ports
-
-
-def test_ports_that_a_firewall_must_open(machines):
+def test_discovery_range_and_open_ports_that_two_machines_need(machines):
     one, two = machines
     first, *_, last = sorted(PORTS)
-    with (
-        one.firewall('drop', f'udp dport {first}-{last} accept'),
-        two.firewall('drop', f'udp dport {first}-{last} accept'),
-    ):
-        listener = two.start(LISTENER, DOMAIN, 'SUBNET', 'robot')
-        robot = one.start(TALKER, 'robot', **ROBOT)
-        with ended(listener, robot):
-            assert listener.stdout.readline() == 'open\n'
-            assert heard_by(listener) == ['robot']
+    rule = f'udp dport {first}-{last} accept'
+    with one.firewall('drop', rule), two.firewall('drop', rule):
+        # On machine two, one hears the network and one its machine only: `local`.
+        wide = two.start(LISTENER, DOMAIN, 'SUBNET', 'robot')
+        narrow = two.start(LISTENER, DOMAIN, 'LOCALHOST', 'local')
+        with ended(wide, narrow):
+            assert [wide.stdout.readline(), narrow.stdout.readline()] == ['open\n', 'open\n']
+            robot = one.start(TALKER, 'robot', **ROBOT)
+            shy = one.start(TALKER, 'shy', **ROBOT | {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'})
+            with ended(robot, shy):
+                assert heard_by(wide) == ['robot']
+                local = two.start(TALKER, 'local', **ROBOT)
+                with ended(local):
+                    assert heard_by(narrow) == ['local']
+            ports = {int(port) for port in wide.stdout.readline().split()}
+    assert {port for port in ports if 7400 <= port < 32768} <= PORTS
+    assert 7400 + 250 * DOMAIN in ports
 
 
 def test_a_network_without_multicast(machines):

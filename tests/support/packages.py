@@ -24,7 +24,6 @@ PACKAGE_XML = """\
 INTERFACE_DEPENDS = """\
 <buildtool_depend>ament_cmake</buildtool_depend>
   <buildtool_depend>rosidl_default_generators</buildtool_depend>
-  <depend>sensor_msgs</depend>
   <exec_depend>rosidl_default_runtime</exec_depend>
   <member_of_group>rosidl_interface_packages</member_of_group>
 """
@@ -34,11 +33,9 @@ project(custom_interfaces)
 
 find_package(ament_cmake REQUIRED)
 find_package(rosidl_default_generators REQUIRED)
-find_package(sensor_msgs REQUIRED)
 
 rosidl_generate_interfaces(${PROJECT_NAME}
   "srv/TurnCamera.srv"
-  DEPENDENCIES sensor_msgs
 )
 
 ament_package()
@@ -134,14 +131,12 @@ def package_xml(name: str, build_type: str, depends: str = '') -> str:
     return PACKAGE_XML.format(name=name, build_type=build_type, depends=depends)
 
 
-def write_interfaces(workspace: Workspace, cmake: str = CMAKE_LISTS) -> None:
+def write_interfaces(workspace: Workspace) -> None:
     top = 'src/custom_interfaces'
     xml = package_xml('custom_interfaces', 'ament_cmake', INTERFACE_DEPENDS)
     workspace.write(f'{top}/package.xml', xml)
-    workspace.write(f'{top}/CMakeLists.txt', cmake)
-    workspace.write(
-        f'{top}/srv/TurnCamera.srv', 'float32 deg_turn\n---\nsensor_msgs/Image camera_image\n'
-    )
+    workspace.write(f'{top}/CMakeLists.txt', CMAKE_LISTS)
+    workspace.write(f'{top}/srv/TurnCamera.srv', 'float32 deg_turn\n---\nbool done\n')
 
 
 def write_talker(workspace: Workspace, setup: str = SETUP_PY, talker: str = TALKER) -> None:
