@@ -237,13 +237,15 @@ def _no_message(source: Source, field: parser.Field) -> str:
         if f'msg/{short}.msg' in source.files:
             return ''
         others = [name for name in messages if name.endswith(f'/{short}')]
-        hint = f', for example {others[0].replace("/msg/", "/")}' if others else ''
-        return f'the package of the type {short} of {field.name!r}{hint}'
+        return f'the package of the type {short} of {field.name!r}{_hint(", for example", others)}'
     if not share_folder(package) or f'{package}/msg/{short}' in messages:
         return ''
     near = nearest(f'{package}/msg/{short}', messages, 1)
-    hint = f'. The nearest is {near[0].replace("/msg/", "/")}' if near else ''
-    return f'a message that exists: {package} has no {short}{hint}'
+    return f'a message that exists: {package} has no {short}{_hint(". The nearest is", near)}'
+
+
+def _hint(words: str, names: list[str]) -> str:
+    return f'{words} {names[0].replace("/msg/", "/")}' if names else ''
 
 
 def _packages(source: Source) -> Iterator[Finding]:
@@ -251,10 +253,9 @@ def _packages(source: Source) -> Iterator[Finding]:
         if not share_folder(package):
             names = {name.partition('/')[0] for name in installed_names()}
             near = difflib.get_close_matches(package, names, 1)
-            hint = f'. Is it {near[0]}?' if near else ''
             yield Finding(
                 source.uses.get(package, CMAKE),
-                f'the package {package}, which is not installed{hint}',
+                f'the package {package}, which is not installed{_hint(". The nearest is", near)}',
                 f'find_package() does not find "{package}Config.cmake"',
             )
 

@@ -26,7 +26,7 @@ def said_by(wait, *arguments):
 
 def test_a_node_without_an_executor():
     with ros_session() as session:
-        talker, listener = Talker(4), Listener()
+        talker, listener, _ = Talker(4), Listener(), Node('a_node_with_nothing_to_run')
         recording = Recording(talker.publisher, listener.subscription)
         spin(session, talker)
         session.wait_until(lambda: recording.published == 4)

@@ -213,7 +213,8 @@ def test_list_interfaces(prefix, capsys):
     assert messages == sorted(messages)
     assert '    sensor_msgs/msg/Image' in messages
     assert '    custom_interfaces/srv/TurnCamera' in services
-    assert actions == ['    custom_interfaces/action/Turn']
+    assert '    custom_interfaces/action/Turn' in actions
+    assert actions == sorted(actions)
     assert not [line for line in lines if 'TurnCamera_Request' in line]
     assert len(lines) == len(installed_names()) + 3 == len(set(lines))
     list_interfaces('custom')
