@@ -21,6 +21,7 @@ from helpers.workspace.processes import POLL_S, Process
 from helpers.workspace.sourcing import source, use
 from helpers.workspace.wheels import fix_wheels
 
+CMAKE_MODULES = Path(__file__).with_name('cmake')
 CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
 
 _open_workspace: Workspace | None = None
@@ -103,8 +104,9 @@ class Workspace:
         self._sourced = None
         command = ['colcon', 'build', *(['--packages-select', *packages] if packages else [])]
         settings = ['--event-handlers', 'console_direct+', 'desktop_notification-', 'status-']
-        # Without it, CMake takes the newest Python on the PATH.
-        settings += ['--cmake-args', f'-DPython3_EXECUTABLE={sys.executable}', *cmake_args]
+        # Without the first, CMake takes the newest Python on the PATH.
+        python = [f'-DPython3_EXECUTABLE={sys.executable}', f'-DCMAKE_MODULE_PATH={CMAKE_MODULES}']
+        settings += ['--cmake-args', *python, *cmake_args]
         total = len(packages) or len(list(self.path.glob('src/**/package.xml'))) or 1
         output = self._colcon([*command[1:], *settings], total)
         return read_result(self.path, ' '.join(command), packages, output)
