@@ -6,9 +6,11 @@ help: ## show this list
 lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, LAB_ARGS=... change how
 	@$(call open_lab,false,/lab/tree/notebooks/00_start_here.ipynb)
 
-present: set_up ## open JupyterLab on a lesson as slides whose cells run: LESSON=02; PORT=... as above
-	@[ -n "$(deck)" ] || { echo 'Name one lesson, for example: make present LESSON=02' >&2; exit 1; }
-	@$(call open_lab,true,/lab/workspaces/present/tree/$(deck)?reset)
+present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02; NEW=yes makes it anew
+	@deck=$$($(PYTHON) -m tools.lessons.present "$(LESSON)" --root "$(ROOT)" $(if $(filter yes,$(NEW)),--new) \
+		$(if $(filter no,$(FRESH)),--saved-outputs)) && \
+	rm -f "$(JUPYTER_CONFIG_DIR)"/lab/workspaces/present-* && \
+	$(call open_lab,true,/lab/workspaces/present/tree/$$deck)
 
 test: set_up lint ## lint, tests of the helpers, every notebook compared with its saved outputs
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(PYTEST_ARGS)
@@ -79,7 +81,6 @@ CHROMIUM ?= $(shell command -v chromium || command -v chromium-browser || comman
 no_chromium = There is no Chromium: install it, on Debian with `sudo apt install chromium`, or name yours with CHROMIUM=...
 
 ROOT := .
-deck = $(if $(LESSON),$(wildcard notebooks/$(LESSON)_*.ipynb))
 
 # The first argument says whether JupyterLab shows the notebook as slides, the second is its address.
 # A port that you name is the one you get, or an error. Without a name, the first free one from 8888.
@@ -90,7 +91,7 @@ open_lab = settings="$(JUPYTER_CONFIG_DIR)/lab/$(if $(filter true,$(1)),presente
 	cp tools/deck.css "$(JUPYTER_CONFIG_DIR)/custom/custom.css" && \
 	echo '{"active": $(1)}' > "$$slides/plugin.jupyterlab-settings" && \
 	JUPYTERLAB_SETTINGS_DIR="$$settings" exec $(PYTHON) -m jupyterlab --ServerApp.root_dir="$(ROOT)" --LabApp.custom_css=True \
-	--LabApp.default_url='$(2)' \
+	--LabApp.default_url="$(2)" \
 	$(if $(PORT),--port="$(PORT)" --ServerApp.port_retries=0) \
 	$(if $(filter no,$(BROWSER)),--no-browser) \
 	$(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)
