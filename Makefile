@@ -9,7 +9,8 @@ lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, LAB
 present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02; NEW=yes makes it anew
 	@deck=$$($(PYTHON) -m tools.lessons.present "$(LESSON)" --root "$(ROOT)" $(if $(filter yes,$(NEW)),--new) \
 		$(if $(filter no,$(FRESH)),--saved-outputs)) && \
-	rm -f "$(JUPYTER_CONFIG_DIR)"/lab/workspaces/present-* && \
+	rm -f "$(JUPYTER_CONFIG_DIR)"/lab/workspaces/present-* \
+		$(if $(filter yes,$(NEW)),"$(JUPYTER_CONFIG_DIR)"/lab/workspaces/deck-*) && \
 	$(call open_lab,true,/lab/workspaces/present/tree/$$deck)
 
 test: set_up lint ## lint, tests of the helpers, every notebook compared with its saved outputs
@@ -91,7 +92,7 @@ open_lab = settings="$(JUPYTER_CONFIG_DIR)/lab/$(if $(filter true,$(1)),presente
 	cp tools/deck.css "$(JUPYTER_CONFIG_DIR)/custom/custom.css" && \
 	echo '{"active": $(1)}' > "$$slides/plugin.jupyterlab-settings" && \
 	JUPYTERLAB_SETTINGS_DIR="$$settings" exec $(PYTHON) -m jupyterlab --ServerApp.root_dir="$(ROOT)" --LabApp.custom_css=True \
-	--LabApp.default_url="$(2)" \
+	--LabApp.default_url="$(2)" $(if $(filter true,$(1)),--LabApp.extra_labextensions_path="$(CURDIR)/tools/labextensions") \
 	$(if $(PORT),--port="$(PORT)" --ServerApp.port_retries=0) \
 	$(if $(filter no,$(BROWSER)),--no-browser) \
 	$(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)

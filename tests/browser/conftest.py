@@ -41,8 +41,9 @@ def student_server(tmp_path_factory) -> Iterator[Server]:
 
 @pytest.fixture(scope='session')
 def instructor_server(tmp_path_factory) -> Iterator[Server]:
-    """Yield what `make present LESSON=02` starts."""
-    with server(tmp_path_factory.mktemp('present'), 'present', 'LESSON=02') as running:
+    """Yield what `make present LESSON=02 FRESH=no` starts."""
+    folder = tmp_path_factory.mktemp('present')
+    with server(folder, 'present', 'LESSON=02', 'FRESH=no') as running:
         yield running
 
 
@@ -92,16 +93,6 @@ def lab(chromium, student_server, request) -> Iterator[LabPage]:
 def deck(chromium, instructor_server, request) -> Iterator[LabPage]:
     """Yield an instructor's page."""
     with page(chromium, instructor_server, request.node.name) as opened:
-        yield opened
-
-
-@pytest.fixture
-def own_deck(chromium, tmp_path, request) -> Iterator[LabPage]:
-    """Yield an instructor's page on a server of its own, which remembers that slides have ended."""
-    with (
-        server(tmp_path, 'present', 'LESSON=02') as running,
-        page(chromium, running, request.node.name) as opened,
-    ):
         yield opened
 
 

@@ -45,6 +45,7 @@ SLIDE_DRAWN = f"""index => {{
         && slide.every(cell => [...cell.node.querySelectorAll('img')].every(img => img.complete))
         && slide.every(cell => cell.node.getAnimations().length === 0);
 }}"""
+SLIDES_SHOWN = "() => document.querySelector('.jp-deck-mod-onscreen')?.isConnected"
 # What of a slide is cut off, or needs a scroll bar.
 CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
     if (!cell.node.classList.contains('jp-deck-mod-onscreen')) return [];
@@ -75,25 +76,27 @@ class LabPage:
         self.server = server
         self.artefacts = artefacts
 
-    def goto(self, path: str, **wait: Any) -> None:
+    def goto(self, path: str) -> None:
         """Open an address of the server."""
-        join = '&' if '?' in path else '?'
-        self.page.goto(f'{self.server.url}{path}{join}token={self.server.token}', **wait)
+        self.page.goto(f'{self.server.url}{path}?reset&token={self.server.token}')
 
     def open(self, name: str) -> None:
         """Open a notebook, and wait for its kernel."""
-        self.goto(f'lab/tree/notebooks/{name}?reset')
-        self.wait_for_notebook(name)
+        self.goto(f'lab/tree/notebooks/{name}')
+        self.wait_for_notebook(f'notebooks/{name}')
 
     def present(self, name: str) -> None:
-        """Open a notebook as slides, and wait for its kernel."""
-        self.goto(f'lab/workspaces/present/tree/notebooks/{name}?reset')
-        self.wait_for_notebook(name)
+        """Open the copy of a notebook as slides, from the first, and wait for its kernel."""
+        self.goto(f'lab/workspaces/present/tree/presentation/{name}')
+        self.wait_for_notebook(f'presentation/{name}')
+        self.command('deck:start')  # which does nothing where slides are shown
+        self.page.wait_for_function(SLIDES_SHOWN)
+        self.page.keyboard.press('Home')
         self.wait_for_slide(0)
 
-    def wait_for_notebook(self, name: str) -> None:
+    def wait_for_notebook(self, path: str) -> None:
         """Wait until a notebook is open and its kernel idle."""
-        self.page.wait_for_function(READY, arg=f'notebooks/{name}', timeout=LIMIT_S * 1000)
+        self.page.wait_for_function(READY, arg=path, timeout=LIMIT_S * 1000)
 
     def close(self) -> None:
         """End the kernels of this page's server."""

@@ -6,8 +6,8 @@ into the checkout but what lessons build in `scratch`.
 
 from __future__ import annotations
 
-import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -25,8 +25,10 @@ START_LIMIT_S = 60
 class Server(NamedTuple):
     """A running JupyterLab."""
 
+    address: str  # as printed
     url: str
     token: str
+    folder: Path
 
 
 @contextmanager
@@ -57,12 +59,11 @@ def server(folder: Path, *make: str) -> Iterator[Server]:
 
 
 def _address(process: subprocess.Popen, folder: Path) -> Server:
-    """Wait until the server has written the file with its address."""
+    """Wait until the server has printed its address."""
     end = time.monotonic() + START_LIMIT_S
     while time.monotonic() < end and process.poll() is None:
-        for file in Path(folder, 'JUPYTER_RUNTIME_DIR').glob('jpserver-*.json'):
-            found = json.loads(file.read_text() or '{}')
-            if found:
-                return Server(found['url'], found['token'])
+        printed = Path(folder, 'log').read_text()
+        if found := re.search(r'(http://localhost:\d+/)\S+token=(\w+)\n', printed):
+            return Server(found[0].strip(), found[1], found[2], folder)
         time.sleep(0.05)
     raise RuntimeError(f'JupyterLab did not start:\n{Path(folder, "log").read_text()}')

@@ -30,13 +30,6 @@ def test_every_slide_is_reached_and_nothing_is_cut_off(deck, path):
     assert cut_off == []
 
 
-def test_make_present_opens_its_lesson_as_slides(deck):
-    deck.goto('')
-    deck.wait_for_notebook('02_lose_messages.ipynb')
-    deck.wait_for_slide(0)
-    assert deck.on_screen() == [0]
-
-
 def test_run_and_change_a_cell_in_a_slide(deck):
     deck.present('00_start_here.ipynb')
     deck.command('notebook:clear-all-cell-outputs')

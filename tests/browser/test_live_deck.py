@@ -1,0 +1,89 @@
+"""In front of a class: what is typed stays where it was typed, and the deck where it was."""
+
+from lab_page import PANEL, printed
+from lab_server import ROOT
+
+LESSON = '02_lose_messages.ipynb'
+SAVED = f'() => !{PANEL}.context.model.dirty'
+AUTOSAVE = f'() => {PANEL}.context.save()'  # what JupyterLab's timer does
+IN_SIGHT = f"""() => {{
+    const box = {PANEL}.content.activeCell.node.getBoundingClientRect();
+    return !document.body.dataset.jpDeckMode && box.height && box.top > 0 && box.top < innerHeight;
+}}"""
+
+
+def walk_to_code(deck):
+    cells = deck.cells()
+    code = next(i for i, cell in enumerate(cells) if cell['cell_type'] == 'code')
+    while deck.active() < code:
+        deck.press('Space')
+    return code
+
+
+def test_the_printed_address_opens_the_deck(deck):
+    deck.page.goto(deck.server.address)
+    deck.wait_for_notebook(f'presentation/{LESSON}')
+    deck.wait_for_slide(0)
+    assert deck.on_screen() == [0]
+
+
+def test_typing_goes_on_whatever_is_saved_and_printed(deck):
+    deck.present(LESSON)
+    code = walk_to_code(deck)
+    deck.page.keyboard.press('Enter')
+    deck.page.keyboard.press('Control+A')
+    typed = 'import time\nfor number in range(9):\ntime.sleep(0.2)\nprint(number)'
+    deck.page.keyboard.type(typed[:5])
+    deck.page.keyboard.press('Control+S')
+    deck.page.wait_for_function(SAVED)
+    for part in (typed[5:9], typed[9:20], typed[20:]):
+        deck.page.keyboard.type(part)
+        deck.page.evaluate(AUTOSAVE)
+    deck.page.keyboard.press('Control+Enter')
+    deck.page.keyboard.press('Enter')
+    deck.page.keyboard.press('Control+End')
+    deck.page.keyboard.type('  # a')
+    deck.wait_until_ran(code)
+    deck.page.keyboard.type('bxd')
+    source = 'import time\nfor number in range(9):\n    time.sleep(0.2)\n    print(number)  # abxd'
+    cell = deck.cells()[code]
+    assert ''.join(cell['source']) == source
+    assert printed(cell).split() == [str(number) for number in range(9)]
+    deck.page.evaluate(AUTOSAVE)
+    copy, lesson = (deck.server.folder / name / LESSON for name in ('presentation', 'notebooks'))
+    assert '# abxd' in copy.read_text()
+    assert lesson.read_bytes() == (ROOT / 'notebooks' / LESSON).read_bytes()
+
+
+def test_a_key_walks_blackens_or_does_nothing(deck):
+    deck.present(LESSON)
+    code = walk_to_code(deck)
+    before = deck.cells()
+    for key in [*'abcdefghjklmnopqrstuvwxyzdd123456', 'Shift+M', 'Shift+V', 'Shift+L', 'Alt+Enter']:
+        black = key == 'b'
+        deck.page.keyboard.press(key)
+        assert deck.page.locator('body.deck-black').count() == black
+        if black:
+            deck.screenshot('black')
+            deck.page.keyboard.press('Space')
+            assert deck.page.locator('body.deck-black').count() == 0
+    deck.page.keyboard.press('Control+Z')
+    assert deck.cells() == before
+    assert deck.active() == code
+    forth = deck.press('PageDown')
+    assert forth > code
+    assert deck.press('PageUp') == code
+
+
+def test_the_deck_stays_where_it_was(deck):
+    deck.present(LESSON)
+    walk_to_code(deck)
+    place = deck.press('PageDown')
+    for reopen in (deck.page.reload, lambda: deck.page.goto(deck.server.address)):
+        reopen()
+        deck.wait_for_notebook(f'presentation/{LESSON}')
+        deck.wait_for_slide(place)
+        place = deck.press('Space')
+    deck.page.keyboard.press('Escape')
+    deck.page.wait_for_function(IN_SIGHT)
+    assert deck.active() == place

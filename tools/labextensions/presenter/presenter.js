@@ -1,0 +1,126 @@
+// What `make present` adds to jupyterlab-slideshow 0.3.4: editing stays editing, keys that change
+// the notebook do nothing, a clicker walks, and the deck stands where it was after a reload.
+//
+// JupyterLab loads this file as it is. It has the form of a prebuilt extension, so that neither
+// webpack nor npm is needed.
+
+const STATE = 'deck'; // a workspace of JupyterLab's server: it outlives the tab and the server
+// Of JupyterLab's keys in command mode, those that leave the notebook as it is.
+const HARMLESS =
+  /^(Arrow(Left|Right|Up|Down)|(Control|Shift) Enter|(Shift )?Tab|Enter|Control s|i|0)$/;
+const ACTIONS = {
+  ' ': 'next',
+  PageDown: 'next',
+  'Shift  ': 'back',
+  PageUp: 'back',
+  Home: 'first',
+  b: 'black',
+  '.': 'black',
+  Escape: 'leave',
+};
+
+async function extension() {
+  // The slideshow's plugin object is the only way to the token of its manager.
+  const slideshow = await window._JUPYTERLAB['jupyterlab-slideshow'].get('./extension');
+  const { provides } = slideshow().default.find(plugin => plugin.id.endsWith(':plugin'));
+  const plugin = { id: 'presenter:plugin', autoStart: true, requires: [provides], activate };
+  return () => ({ __esModule: true, default: plugin });
+}
+
+function activate(app, manager) {
+  // The slideshow waits for `started`, too, and for more: this comes before its first slide.
+  void app.started.then(() => {
+    const presenter = manager._presenters.find(one => one.id === 'notebooks');
+    keepEditing(presenter);
+    keepPlace(presenter, app.serviceManager.workspaces);
+    window.addEventListener('keydown', event => onKey(event, app, manager), true);
+  });
+}
+
+// The slideshow takes the focus out of the editor at each change of the state of the document: at
+// the first key after a save, because that makes it unsaved again.
+function keepEditing(presenter) {
+  const show = presenter._onActiveCellChanged;
+  presenter._onActiveCellChanged = async function (notebook) {
+    const editing = notebook.mode === 'edit';
+    if (editing && notebook.activeCell.hasClass('jp-deck-mod-visible')) return;
+    await show.call(this, notebook);
+    if (editing) notebook.mode = 'edit';
+  };
+}
+
+function keepPlace(presenter, workspaces) {
+  const start = presenter.start;
+  const fetched = workspaces.fetch(STATE).then(({ data }) => data ?? {}, () => ({}));
+  const known = new WeakSet();
+  let saved = fetched;
+  presenter.start = async function (panel) {
+    await start.call(this, panel);
+    if (known.has(panel)) return;
+    known.add(panel);
+    const [places] = await Promise.all([fetched, panel.context.ready]);
+    const { path } = panel.context;
+    if (path in places) panel.content.activeCellIndex = places[path];
+    panel.content.activeCellChanged.connect(notebook => {
+      places[path] = notebook.activeCellIndex;
+      const state = { data: places, metadata: { id: STATE } };
+      saved = saved.then(() => workspaces.save(STATE, state)).catch(console.warn);
+    });
+  };
+}
+
+function onKey(event, app, manager) {
+  const notebook = manager.activeWidget?.content;
+  const nowhere = event.target === document.body; // as after a reload
+  if (
+    document.body.dataset.jpDeckMode !== 'presenting' ||
+    !notebook?.activeCell ||
+    !(nowhere || notebook.node.contains(event.target)) ||
+    notebook.node.matches('.jp-mod-readWrite') ||
+    (notebook.mode === 'edit' && !nowhere)
+  ) {
+    return;
+  }
+  if (nowhere) notebook.activeCell.node.focus();
+  const modifiers = ['Control', 'Alt', 'Shift', 'Meta'].filter(key => event.getModifierState(key));
+  const key = [...modifiers, event.key].join(' ');
+  const black = document.body.classList.contains('deck-black');
+  const action = black ? 'black' : ACTIONS[key];
+  if (!action && HARMLESS.test(key) && !nowhere) return;
+  event.stopImmediatePropagation(); // the browser's own keys, such as F5 and F11, still work
+  if (action) {
+    event.preventDefault();
+    act(action, app, manager);
+  } else if (HARMLESS.test(key)) {
+    event.preventDefault();
+    notebook.activeCell.node.dispatchEvent(new KeyboardEvent('keydown', event));
+  }
+}
+
+function act(action, app, manager) {
+  const { content } = manager.activeWidget;
+  switch (action) {
+    case 'next':
+      return manager.go('down', 'forward');
+    case 'back':
+      return manager.go('up', 'back');
+    case 'first':
+      content.activeCellIndex = 0;
+      return;
+    case 'black':
+      document.body.classList.toggle('deck-black');
+      return;
+    case 'leave':
+      return leave(manager, content);
+  }
+}
+
+async function leave(manager, notebook) {
+  await manager.stop();
+  // JupyterLab lays the notebook out in the next frame, and knows the heights of its cells then.
+  await new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)));
+  await notebook.scrollToItem(notebook.activeCellIndex, 'center');
+}
+
+window._JUPYTERLAB ??= {};
+window._JUPYTERLAB.presenter = { init: () => {}, get: extension };
