@@ -17,6 +17,8 @@ SHARED_MEMORY = re.compile(r'/dev/shm/fastrtps_\w+')
 # Threads of Fast DDS that belong to no participant: they live until the process ends.
 OF_PROCESS = ('dds.shm.wdog', 'dds.log')
 OF_ZMQ = 'GarbageCollectorThread'  # frees what Jupyter has sent, from its first picture on
+# Of Python: it comes with the first pool of processes, and lives until the kernel ends.
+TRACKER = 'from multiprocessing.resource_tracker import main'
 # Where /dev/shm cannot be written, LTTng, which rclpy is linked with, forks a child of a kernel
 # every 5 s. It tries once more to write, and ends.
 MOMENT_S = 1.0
@@ -58,10 +60,17 @@ def state_of_process() -> dict[str, str]:
             name = (task / 'comm').read_text().strip()
             if name.startswith('dds.') and name not in OF_PROCESS:
                 found[f'native {task.name}'] = f'The thread {name} still runs.'
-    found |= processes_that_stay(psutil.Process().children(recursive=True), MOMENT_S)
+    children = [child for child in psutil.Process().children(recursive=True) if not _of_pool(child)]
+    found |= processes_that_stay(children, MOMENT_S)
     for file in SHARED_MEMORY.findall(Path('/proc/self/maps').read_text()):
         found[file] = f'The kernel still uses {file}.'
     return found
+
+
+def _of_pool(process: psutil.Process) -> bool:
+    with suppress(psutil.NoSuchProcess):  # nor a zombie
+        return any(word.startswith(TRACKER) for word in process.cmdline())
+    return False
 
 
 def processes_that_stay(processes: list[psutil.Process], timeout_s: float) -> dict[str, str]:
