@@ -166,17 +166,20 @@ class CallbackRecording:
     """Records every run of some callbacks, from now on.
 
     `CallbackRecording(tick=node.timer, look=node.service)` watches timers, services and
-    subscriptions, each under a name. They are plain rclpy objects, and stay what they are.
+    subscriptions, each under a name. They are plain rclpy objects, and stay what they are. `watch`
+    is for what has no `callback` of its own, such as an action server.
     """
 
     def __init__(self, **watched) -> None:
         # For each name its runs: [started, finished, thread id]; finished is NaN while it runs.
         self.runs: dict[str, list[list]] = {name: [] for name in watched}
         for name, thing in watched.items():
-            thing.callback = self._watch(thing.callback, self.runs[name])
+            thing.callback = self.watch(name, thing.callback)
 
-    @staticmethod
-    def _watch(callback: Callable, runs: list[list]) -> Callable:
+    def watch(self, name: str, callback: Callable) -> Callable:
+        """Return the callback, which is recorded under this name from now on."""
+        runs = self.runs.setdefault(name, [])
+
         def start(*arguments) -> list:
             row = [time.monotonic(), float('nan'), threading.get_ident()]
             runs.append(row)
