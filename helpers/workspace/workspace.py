@@ -28,7 +28,7 @@ _open_workspace: Workspace | None = None
 
 
 class Workspace:
-    """A colcon workspace of this notebook, empty when it is made: `Workspace('lesson_07')`.
+    """A colcon workspace of this notebook, empty when it is made: `Workspace('lesson_08')`.
 
     It lies in the folder `scratch` of this checkout, which git ignores. Where another kernel has a
     workspace of this name, another folder is taken, so that the two do not meet. `path` is the
@@ -41,7 +41,7 @@ class Workspace:
         global _open_workspace
         if not re.fullmatch(r'[A-Za-z0-9_-]+', name):
             raise ValueError(
-                f'Name a workspace with letters, digits, _ and -, such as lesson_07, not {name!r}.'
+                f'Name a workspace with letters, digits, _ and -, such as lesson_08, not {name!r}.'
             )
         _close()
         self.path = claim(name)
