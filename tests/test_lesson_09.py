@@ -1,4 +1,4 @@
-"""What lesson 11 claims, on other drives: it is not luck of the lesson's seeds 1 to 3.
+"""What lesson 12 claims, on other drives: it is not luck of the lesson's seeds 1 to 3.
 
 Where a claim allows it, the drives are half as long as those of the lesson.
 """

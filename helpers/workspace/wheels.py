@@ -16,21 +16,27 @@ def fix_wheels(prefix: str | Path = sys.prefix) -> int:
 
     The wheels were built in a container, and 20 of their CMake files name its folders, such as
     /opt/python/cp311-cp311/include/python3.11. CMake stops at a folder that does not exist. Here
-    these are replaced by the folders of this Python and this NumPy. A second call finds nothing.
+    these are replaced by the folders of this Python and this NumPy. Fast DDS also asks for the
+    development files of two libraries which it brings along: nobody else needs them. A second call
+    finds nothing.
 
     Raises RuntimeError where a file needs it and cannot be written.
     """
     import numpy
 
-    folders = {
+    replacements = {
         rb'/opt/python/[^/";]+/include/python[^/";]+': sysconfig.get_path('include'),
         rb'/opt/python/[^";]+/numpy/(?:_core|core)/include': numpy.get_include(),
+        rb'find_package\(OpenSSL REQUIRED\)\n': '',
+        rb'BOOL:1>:OpenSSL': 'BOOL:0>:OpenSSL',
+        rb'/usr/lib64/libtinyxml2\.so;': '',
     }
     changed = 0
-    for file in Path(prefix).glob('share/*/cmake/*Export.cmake'):
+    share = Path(prefix, 'share')
+    for file in [*share.glob('*/cmake/*Export.cmake'), *share.glob('fastrtps/cmake/*.cmake')]:
         old = new = file.read_bytes()
-        for pattern, folder in folders.items():
-            new = re.sub(pattern, lambda _, folder=folder: os.fsencode(folder), new)
+        for pattern, replacement in replacements.items():
+            new = re.sub(pattern, lambda _, text=replacement: os.fsencode(text), new)
         if new != old:
             _replace(file, new)
             changed += 1
