@@ -27,6 +27,7 @@ from helpers.interrupts import uninterrupted
 
 try:
     import rclpy
+    from rclpy.action import ActionClient, ActionServer
     from rclpy.client import Client
     from rclpy.executors import Executor, ExternalShutdownException
     from rclpy.node import Node
@@ -371,6 +372,7 @@ def destroy_nodes(context: rclpy.Context) -> None:
 
 def _destroy(node: Node) -> None:
     for destroy in (
+        lambda: _destroy_actions(node),
         node.destroy_node,
         lambda: Node.destroy_node(node),  # past a mistake in an own destroy_node
         # A node whose __init__ failed or was interrupted has only some of its parts: destroy_node
@@ -379,6 +381,13 @@ def _destroy(node: Node) -> None:
     ):
         with contextlib.suppress(Exception):
             destroy()
+
+
+def _destroy_actions(node: Node) -> None:
+    """Destroy what destroy_node leaves, and with it the participant while a variable holds it."""
+    for one in list(node.waitables):
+        if isinstance(one, ActionClient | ActionServer):
+            one.destroy()
 
 
 def find(kind: type, context: rclpy.Context) -> Iterator:

@@ -10,13 +10,15 @@ import warnings
 
 import pytest
 import rclpy
+from rclpy.action import ActionClient, ActionServer
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle, InvalidNodeNameException
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 from support.processes import run_python, running, traces
+from test_msgs.action import Fibonacci
 
 from helpers.domain import configure_discovery, reserve_domain_id
 from helpers.session import current_session, ros_session
@@ -461,6 +463,21 @@ def test_node_that_could_not_be_made(make, error):
         assert not hasattr(failure.value, '__notes__')
     assert destroyed(complete)
     talk()
+
+
+def test_actions_leave_nothing():
+    with nothing_left():
+        with ros_session() as session:
+            node, executor = Node('node'), MultiThreadedExecutor(num_threads=2)
+            server = ActionServer(node, Fibonacci, 'count', lambda goal_handle: Fibonacci.Result())
+            client = ActionClient(node, Fibonacci, 'count')
+            executor.add_node(node)
+            session.spin(executor)
+            session.wait_until(client.server_is_ready, LIMIT_S)
+            goal = client.send_goal_async(Fibonacci.Goal())
+            session.wait_until(goal.done, LIMIT_S)
+        assert destroyed(node)
+    del server  # until here it is held, as by a variable of a notebook
 
 
 def test_node_that_cannot_be_destroyed():
