@@ -292,8 +292,9 @@ def _not_handed_on(source: Source) -> list[str]:
 
 def _not_named(source: Source) -> list[str]:
     """The used packages without <depend>. Those of DEPENDENCIES must be named themselves."""
-    named = _depends(source.manifest, 'buildtool', 'build')
-    brought = _with_brought(named)
+    build = _depends(source.manifest, 'buildtool', 'build')
+    named = build & _depends(source.manifest, 'exec')  # who uses the interfaces needs them, too
+    brought = _with_brought(build)
     packages = [p for p in dict.fromkeys([*source.given, *source.uses]) if share_folder(p)]
     return [p for p in packages if p not in (named if p in source.given else brought)]
 

@@ -244,6 +244,16 @@ def test_what_comes_with_others_is_not_asked_for(package):
     assert check_package(package(files)) == ()
 
 
+def test_needed_to_build_and_to_use(package):
+    both = '<build_depend>sensor_msgs</build_depend><exec_depend>sensor_msgs</exec_depend>'
+    files = edited('package.xml', '<depend>sensor_msgs</depend>', both)
+    assert check_package(package(files)) == ()
+    build = '<build_depend>sensor_msgs</build_depend>'
+    files = edited('package.xml', '<depend>sensor_msgs</depend>', build)
+    [finding] = check_package(package(files))
+    assert finding.missing == '<depend>sensor_msgs</depend>'
+
+
 def test_a_message_of_the_package_itself(package):
     files = edited('CMakeLists.txt', '"srv', 'msg/Goal.msg "srv')
     files |= {'msg/Goal.msg': 'int8 x\n', 'srv/TurnCamera.srv': f'Goal goal\n{SRV}'}
