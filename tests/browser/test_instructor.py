@@ -7,6 +7,23 @@ from lab_server import NOTEBOOKS
 
 from tools.lessons.slides import slide_types
 
+SIZES = ((1024, 768), (1920, 1080), (1280, 720))  # the last is that of the screenshots
+TWO_FRAMES = '() => new Promise(d => requestAnimationFrame(() => requestAnimationFrame(d)))'
+OPEN_ANSWERS = f"""index => {{
+    const answers = [...{PANEL}.content.widgets[index].node.querySelectorAll('details')];
+    answers.forEach(answer => answer.open = true);
+    return answers.length;
+}}"""
+
+
+def cut_off(deck):
+    found = []
+    for width, height in SIZES:
+        deck.page.set_viewport_size({'width': width, 'height': height})
+        deck.page.evaluate(TWO_FRAMES)
+        found += [f'{width} x {height}: {what}' for what in deck.page.evaluate(CUT_OFF)]
+    return found
+
 
 @pytest.mark.parametrize('path', NOTEBOOKS, ids=[path.name for path in NOTEBOOKS])
 def test_every_slide_is_reached_and_nothing_is_cut_off(deck, path):
@@ -17,17 +34,21 @@ def test_every_slide_is_reached_and_nothing_is_cut_off(deck, path):
         deck.command('notebook:run-all-cells')  # a widget is not saved
         deck.page.evaluate(f'() => {{ {PANEL}.content.activeCellIndex = 0 }}')
         deck.wait_for_slide(0)
-    visited, cut_off = [deck.active()], []
+    visited, found = [deck.active()], []
     while True:
         cells = deck.on_screen()
         if visited[-1] == max(cells):
             deck.screenshot(path.stem, f'{visited[-1]:02d}')
-            cut_off += deck.page.evaluate(CUT_OFF)
+            found += cut_off(deck)
+            if notebook.cells[visited[-1]].source.startswith('### Question '):
+                assert deck.page.evaluate(OPEN_ANSWERS, visited[-1]) >= 3
+                deck.screenshot(path.stem, f'{visited[-1]:02d}_answers')
+                found += cut_off(deck)
         if visited[-1] == wanted[-1]:
             break
         visited.append(deck.press('Space'))
     assert visited == wanted
-    assert cut_off == []
+    assert found == []
 
 
 def test_run_and_change_a_cell_in_a_slide(deck):

@@ -6,6 +6,18 @@ from lab_server import ROOT
 LESSON = '02_lose_messages.ipynb'
 SAVED = f'() => !{PANEL}.context.model.dirty'
 AUTOSAVE = f'() => {PANEL}.context.save()'  # what JupyterLab's timer does
+LETTER = (
+    "() => parseFloat(getComputedStyle(document.querySelector('.cm-focused .cm-line')).fontSize)"
+)
+# Of a traceback: it is cut, its end is not, and it is on the screen.
+LAST_LINE = """() => {
+    const seen = document.querySelector('.jp-deck-mod-onscreen [data-mime-type$="jupyter.stderr"]');
+    const text = document.createRange();
+    text.selectNodeContents(seen);
+    const end = Math.max(...[...text.getClientRects()].map(line => line.bottom));
+    const box = seen.getBoundingClientRect();
+    return [seen.scrollHeight > box.height, end <= box.bottom + 1, box.bottom <= innerHeight];
+}"""
 IN_SIGHT = f"""() => {{
     const box = {PANEL}.content.activeCell.node.getBoundingClientRect();
     return !document.body.dataset.jpDeckMode && box.height && box.top > 0 && box.top < innerHeight;
@@ -53,6 +65,21 @@ def test_typing_goes_on_whatever_is_saved_and_printed(deck):
     copy, lesson = (deck.server.folder / name / LESSON for name in ('presentation', 'notebooks'))
     assert '# abxd' in copy.read_text()
     assert lesson.read_bytes() == (ROOT / 'notebooks' / LESSON).read_bytes()
+
+
+def test_code_is_large_and_of_a_traceback_the_last_line_is_seen(deck):
+    deck.present(LESSON)
+    code = walk_to_code(deck)
+    deck.page.keyboard.press('Enter')
+    deck.page.keyboard.press('Control+A')
+    deck.page.keyboard.insert_text(
+        ''.join(f'def f{n}():\n    f{n + 1}()\n' for n in range(9)) + 'f0()'
+    )
+    assert deck.page.evaluate(LETTER) >= 20
+    deck.page.keyboard.press('Control+Enter')
+    deck.wait_until_ran(code)
+    assert deck.page.evaluate(LAST_LINE) == [True, True, True]
+    deck.screenshot('traceback')
 
 
 def test_a_key_walks_blackens_or_does_nothing(deck):

@@ -61,7 +61,7 @@ def table(rows):
             'slide slide fragment subslide',
         ),
         ([TITLE, code(), text('### Explain\n\nWhy.')], 'slide fragment fragment'),
-        ([TITLE, code(24), text('### Explain\n\n' + 'word ' * 80)], 'slide fragment subslide'),
+        ([TITLE, code(20), text('### Explain\n\n' + 'word ' * 80)], 'slide fragment subslide'),
         ([TITLE, code(), code(1, 'solution'), code(1)], 'slide fragment subslide fragment'),
         ([TITLE, text('', 'deck-break'), code()], 'slide subslide fragment'),
         ([TITLE, code(25, 'deck-skip'), code(16)], 'slide skip fragment'),

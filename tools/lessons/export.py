@@ -20,7 +20,7 @@ from nbconvert.exporters import SlidesExporter
 from nbformat import NotebookNode
 
 from tools.lessons.lesson import FOLDER, GLOSSARY, ROOT, chosen
-from tools.lessons.slides import CODE, slide_types
+from tools.lessons.slides import CODE, folded, slide_types
 
 HERE = Path(__file__).resolve().parents[1]
 TEMPLATE = HERE / 'deck_template'
@@ -74,6 +74,7 @@ def for_reveal(notebook: NotebookNode) -> NotebookNode:
         if cell.cell_type == 'markdown':
             cell.source = re.sub(r'\]\((\d\d_\w+)\.ipynb', r'](\1.html', cell.source)
         else:
+            cell.metadata.transient = {'remove_source': folded(cell)}
             lines = len(cell.source.splitlines())
             tags += [f'more-than-{most}-lines' for most in CODE if lines > most]
             cell.outputs = [output for output in cell.outputs if not _is_widget(output)]

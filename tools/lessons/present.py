@@ -19,6 +19,7 @@ import nbformat
 
 from tools.lessons import lesson
 from tools.lessons.clean import text_of
+from tools.lessons.slides import folded
 
 FOLDER = 'presentation'
 MADE = '.made.json'  # the hash of each copy as it was made
@@ -26,8 +27,10 @@ MADE = '.made.json'  # the hash of each copy as it was made
 
 def _copy_of(path: Path, outputs: bool) -> str:
     notebook = nbformat.read(path, as_version=4)
-    for cell in notebook.cells if not outputs else ():
-        if cell.cell_type == 'code':
+    for cell in notebook.cells:
+        if folded(cell):
+            cell.metadata.jupyter = {'source_hidden': True}
+        if cell.cell_type == 'code' and not outputs:
             cell.outputs, cell.execution_count = [], None
     return text_of(notebook)
 

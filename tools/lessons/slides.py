@@ -16,6 +16,7 @@ jupyterlab-slideshow has traps: it hides a cell of the type `-`, and from one of
 where Shift+Enter can lead, no key leads on. So no cell gets these types.
 """
 
+import ast
 import re
 from base64 import b64decode
 from math import ceil
@@ -27,7 +28,7 @@ ALONE = {'deck-break', 'solution'}
 
 # The sizes of deck.css, in hundredths of the slide's height. Letters are taken a little wider than
 # in most fonts. tests/browser measures what they really are.
-SLIDE, WIDTH = 97.0, 148.0
+SLIDE, WIDTH = 97.0, 155.0
 FOLDED, BORDER = 4.0, 1.5
 PROSE_LINE, PROSE_GAP, PROSE_CHARACTERS, PROSE_PICTURE = 4.2, 3.1, 82, 47.0
 HEADINGS = {'#': 17.0, '##': 12.0, '###': 9.0}
@@ -35,8 +36,9 @@ TABLE_ROW, TABLE_CHARACTERS = 4.6, 120
 UNFOLDED = re.compile(r'<summary>(.*?)</summary>.*?</details>', re.DOTALL)
 MARKUP = re.compile(r'<[^>]+>|\]\([^)]*\)|[*`\[]')
 # Lines of code at most: the size of a letter, the height of a figure.
-CODE = {8: (2.4, 62.0), 18: (2.4, 40.0), 26: (2.15, 28.0), 999: (1.85, 28.0)}
-CODE_LINE, CODE_CHARACTER = 1.3, 0.61  # times the size of a letter
+CODE = {8: (2.78, 62.0), 18: (2.78, 38.0), 24: (2.78, 28.0), 999: (2.1, 28.0)}
+DENSE = 2.1  # the size of a letter in a cell of more than 18 lines with a figure
+CODE_LINE, CODE_CHARACTER = 1.2, 0.61  # times the size of a letter
 PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 
 
@@ -89,10 +91,24 @@ def height(cell: NotebookNode) -> float:
         return sum(_height_of_prose(block) for block in re.split(r'\n{2,}', source))
     lines = len(cell.source.splitlines())
     letter, figure = next(sizes for most, sizes in CODE.items() if lines <= most)
-    folded = cell.metadata.get('jupyter', {}).get('source_hidden')
-    source = FOLDED if folded else lines * letter * CODE_LINE
+    if lines > 18 and any(map(png_of, cell.outputs)):
+        letter = DENSE
+    source = FOLDED if folded(cell) else _height_of_text(cell.source, letter)
     outputs = sum(_height_of_output(output, letter, figure) for output in cell.outputs)
     return BORDER + source + outputs + (BORDER if cell.outputs else 0)
+
+
+def folded(cell: NotebookNode) -> bool:
+    """Return whether a slide shows only the outputs of a cell: a check, imports, what is folded."""
+    if cell.cell_type != 'code':
+        return False
+    if 'check' in _tags(cell) or cell.metadata.get('jupyter', {}).get('source_hidden'):
+        return True
+    try:
+        statements = ast.parse(cell.source).body
+    except SyntaxError:  # a magic command
+        return False
+    return bool(statements) and all(isinstance(s, ast.Import | ast.ImportFrom) for s in statements)
 
 
 def _height_of_prose(block: str) -> float:
@@ -126,7 +142,10 @@ def _height_of_output(output: NotebookNode, letter: float, figure: float) -> flo
         return min(figure, WIDTH * tall / max(width, 1)) + BORDER
     if 'text/html' in data:
         return data['text/html'].count('<tr') * TABLE_ROW
-    text = output.get('text', '') or data.get('text/plain', '')
+    return _height_of_text(output.get('text', '') or data.get('text/plain', ''), letter)
+
+
+def _height_of_text(text: str, letter: float) -> float:
     most = int(WIDTH / letter / CODE_CHARACTER)
     lines = sum(max(1, ceil(len(line) / most)) for line in text.splitlines())
     return lines * letter * CODE_LINE
