@@ -2,7 +2,8 @@
 
 `filter` has the filter, message by message, as a node uses it. `tables` lets it run over a table
 of what the sensors said. `drives` simulates such tables, together with the truth. `evaluation`
-compares an estimate with the truth, and with what the filter says of its own errors.
+compares an estimate with the truth, and with what the filter says of its own errors. `nodes` has
+the nodes of the lessons; it is imported by its own name, because it needs rclpy.
 """
 
 from helpers.fusion.drives import Drive, simulate

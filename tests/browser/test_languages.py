@@ -1,6 +1,6 @@
 """The summaries in four languages, unfolded by a student and on a slide."""
 
-LONGEST = '12_fuse_odometry_imu_and_gps.ipynb'
+LONGEST = '05_keep_what_is_fresh.ipynb'
 # The empty space to the left and to the right of the name of a language.
 SPACE = """summary => {
     const name = document.createRange(), line = summary.getBoundingClientRect();

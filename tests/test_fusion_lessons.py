@@ -1,6 +1,6 @@
-"""What lesson 12 claims, on other drives: it is not luck of the lesson's seeds 1 to 3.
+"""What lessons 12 and 13 claim, on other drives: it is not luck of the lessons' seeds 1 to 3.
 
-Where a claim allows it, the drives are half as long as those of the lesson.
+Where a claim allows it, the drives are half as long as those of the lessons.
 """
 
 from functools import cache
