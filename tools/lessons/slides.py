@@ -34,6 +34,7 @@ PROSE_LINE, PROSE_GAP, PROSE_CHARACTERS, PROSE_PICTURE = 4.2, 3.1, 82, 47.0
 HEADINGS = {'#': 17.0, '##': 12.0, '###': 9.0}
 TABLE_ROW, TABLE_CHARACTERS = 4.6, 120
 UNFOLDED = re.compile(r'<summary>(.*?)</summary>.*?</details>', re.DOTALL)
+LISTING = re.compile(r'^```.*?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 MARKUP = re.compile(r'<[^>]+>|\]\([^)]*\)|[*`\[]')
 # Lines of code at most: the size of a letter, the height of a figure.
 CODE = {8: (2.78, 62.0), 18: (2.78, 38.0), 24: (2.78, 28.0), 999: (2.1, 28.0)}
@@ -88,7 +89,11 @@ def height(cell: NotebookNode) -> float:
         return 0.0
     if cell.cell_type == 'markdown':
         source = UNFOLDED.sub(r'\1', cell.source)  # a reader unfolds one part at a time
-        return sum(_height_of_prose(block) for block in re.split(r'\n{2,}', source))
+        listings = LISTING.findall(source)
+        prose = re.split(r'\n{2,}', LISTING.sub('', source).strip())
+        return sum(map(_height_of_prose, prose)) + sum(
+            PROSE_GAP + _height_of_text(listing, CODE[8][0]) for listing in listings
+        )
     lines = len(cell.source.splitlines())
     letter, figure = next(sizes for most, sizes in CODE.items() if lines <= most)
     if lines > 18 and any(map(png_of, cell.outputs)):
@@ -114,9 +119,6 @@ def folded(cell: NotebookNode) -> bool:
 def _height_of_prose(block: str) -> float:
     if block.startswith('#'):
         return HEADINGS.get(block.partition(' ')[0], PROSE_LINE + PROSE_GAP)
-    if block.startswith('```'):
-        lines = block.splitlines()[1:-1]
-        return PROSE_GAP + PROSE_LINE * sum(ceil(len(line) / PROSE_CHARACTERS) for line in lines)
     if block.startswith('!['):
         return PROSE_PICTURE + PROSE_GAP
     text = MARKUP.sub('', block)
