@@ -18,14 +18,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from helpers.recording import COLUMNS, check_table
+from helpers.recording import check_table
 from helpers.values import shown
 
 # A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
 # long as callbacks and timers of the same run were late.
 REST = 0.4
-# So long a run fits into 63 bits of nanoseconds, and its table into a small machine.
-MOST_MESSAGES, MOST_S = 10**6, 3600
 
 
 def predict(
@@ -37,17 +35,12 @@ def predict(
     of `threads` workers; the queue is KEEP_LAST(`depth`). A message that arrives at the very
     moment when a worker becomes free arrives first. Times are exact to the nanosecond.
 
-    Raises TypeError for a value that is no number, ValueError for one that is too small or too
-    large: `callback_s` may be zero, no time is above 3600 s, no count of messages above a million.
+    Raises ValueError for a count below 1, no period, or a negative time of a callback.
     """
-    period = _nanoseconds('period_s', period_s)
-    callback = _nanoseconds('callback_s', callback_s, zero_allowed=True)
-    depth, threads, messages = (
-        _count(name, value)
-        for name, value in (('depth', depth), ('threads', threads), ('messages', messages))
-    )
-    if messages > MOST_MESSAGES:
-        raise ValueError(f'messages must be at most {MOST_MESSAGES}, not {messages}.')
+    period = _nanoseconds('period_s', period_s, least=1e-9)
+    callback = _nanoseconds('callback_s', callback_s, least=0)
+    for name, value in (('depth', depth), ('threads', threads), ('messages', messages)):
+        _check_count(name, value)
     taken, started = [], []
     oldest = 0
     while oldest < messages:
@@ -58,16 +51,18 @@ def predict(
         taken.append(max(oldest, arrived - depth))
         started.append(now)
         oldest = taken[-1] + 1
-    table = pd.DataFrame({'seq': np.arange(messages)}, columns=COLUMNS)
-    table['published_s'] = table['seq'] * period / 1e9
-    table[['started_s', 'finished_s']] = np.nan
     start = np.array(started)
-    names = np.array([f'thread {i}' for i in range(1, min(threads, len(taken)) + 1)], object)
-    thread = np.full(messages, None, object)
-    thread[taken] = names[np.arange(len(taken)) % len(names)]
-    table.loc[taken, 'started_s'] = start / 1e9
-    table.loc[taken, 'finished_s'] = (start + callback) / 1e9
-    table['thread'] = thread
+    callbacks = pd.DataFrame(
+        {
+            'started_s': start / 1e9,
+            'finished_s': (start + callback) / 1e9,
+            'thread': [f'thread {number % threads + 1}' for number in range(len(taken))],
+        },
+        index=taken,
+    )
+    seq = np.arange(messages)
+    table = pd.DataFrame({'seq': seq, 'published_s': seq * period / 1e9}).join(callbacks)
+    table['thread'] = table['thread'].astype(object).where(table['thread'].notna(), None)
     table.attrs = {'period_s': period_s, 'callback_s': callback_s, 'depth': depth}
     return table
 
@@ -125,7 +120,8 @@ def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
     Raises ValueError or TypeError for a table or a number that cannot be used.
     """
     table = check_table(table)
-    depth, threads = _count('depth', depth), _count('threads', threads)
+    _check_count('depth', depth)
+    _check_count('threads', threads)
     # A queue for more messages than there are never overflows, and more workers find nothing to do.
     named_depth, depth, threads = depth, min(depth, len(table)), min(threads, len(table))
     heard = table[table['started_s'].notna()]
@@ -150,40 +146,24 @@ def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
 
 
 def _losses(table: pd.DataFrame, depth: int) -> pd.DataFrame:
-    seq = table['seq']
-    losses = pd.DataFrame(
-        {
-            'seq': seq,
-            'pushed_out_by': seq.shift(-depth).astype('Int64'),
-            'queue_after': seq.shift(-1).astype('Int64').astype(str)
-            + ' to '
-            + seq.shift(-depth).astype('Int64').astype(str),
-        }
-    )[table['started_s'].isna()].reset_index(drop=True)
+    seq = table['seq'].astype('Int64')
+    losses = pd.DataFrame({'seq': table['seq'], 'pushed_out_by': seq.shift(-depth)})
+    losses['queue_after'] = seq.shift(-1).astype(str) + ' to ' + seq.shift(-depth).astype(str)
     losses['queue_after'] = losses['queue_after'].where(losses['pushed_out_by'].notna(), None)
-    return losses
+    return losses[table['started_s'].isna()].reset_index(drop=True)
 
 
 def _impossible_rows(table: pd.DataFrame) -> list[str]:
     """What no queue at all can do."""
-    return (
-        [
-            f'Message {seq} was published before the message in front of it.'
-            for seq in table.loc[table['published_s'].diff() < 0, 'seq']
-        ]
-        + [
-            f'Message {seq} was heard before it was published.'
-            for seq in table.loc[table['started_s'] < table['published_s'], 'seq']
-        ]
-        + [
-            f'The callback of message {seq} finished before it started.'
-            for seq in table.loc[table['finished_s'] < table['started_s'], 'seq']
-        ]
-        + [
-            f'The callback of message {seq} finished but never started.'
-            for seq in table.loc[table['started_s'].isna() & table['finished_s'].notna(), 'seq']
-        ]
-    )
+    published = table['published_s']
+    return [
+        f'Message {seq} was {what}.'
+        for what, wrong in (
+            ('published before the message in front of it', published.diff() < 0),
+            ('heard before it was published', table['started_s'] < published),
+        )
+        for seq in table.loc[wrong, 'seq']
+    ]
 
 
 def _impossible_takes(
@@ -273,19 +253,12 @@ def _regular(durations: pd.Series) -> bool:
     return longest < math.inf and longest <= 2 * durations.median()
 
 
-def _count(name: str, value: int) -> int:
-    if isinstance(value, bool) or not isinstance(value, numbers.Integral):
-        raise TypeError(f'{name} must be a whole number from 1 up, not {shown(value)}.')
-    if value < 1:
+def _check_count(name: str, value: int) -> None:
+    if not isinstance(value, numbers.Integral) or value < 1:
         raise ValueError(f'{name} must be a whole number from 1 up, not {shown(value)}.')
-    return int(value)
 
 
-def _nanoseconds(name: str, value: float, zero_allowed: bool = False) -> int:
-    least = '0' if zero_allowed else 'a nanosecond'
-    said = f'{name} must be a number of seconds, from {least} to {MOST_S}, not {shown(value)}.'
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise TypeError(said)
-    if not (1e-9 <= value <= MOST_S or (value == 0 and zero_allowed)):
-        raise ValueError(said)
+def _nanoseconds(name: str, value: float, least: float) -> int:
+    if not isinstance(value, numbers.Real) or not least <= value < math.inf:
+        raise ValueError(f'{name} must be seconds, {least} or more, not {shown(value)}.')
     return round(float(value) * 1e9)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import pandas as pd
 
-from helpers.values import check_columns, column_of_numbers, column_of_whole_numbers
+from helpers.values import check_columns, column_of_numbers
 
 COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']
 
@@ -104,13 +104,13 @@ class Recording:
         The newest message is never pushed out of a queue: when its callback and all others have
         finished, nothing is waiting any more.
 
-        Raises ValueError for a count that is not a whole number from 1 up, TimeoutError after
-        `timeout_s` seconds, and the exception of a callback that failed.
+        Raises ValueError for a count below 1, TimeoutError after `timeout_s` seconds, and the
+        exception of a callback that failed.
         """
         from helpers.session import current_session
 
         __tracebackhide__ = True
-        if isinstance(messages, bool) or not isinstance(messages, int) or messages < 1:
+        if messages < 1:
             raise ValueError(f'messages must be a whole number from 1 up, not {messages!r}.')
 
         def complete() -> bool:
@@ -256,17 +256,11 @@ def check_table(table: pd.DataFrame) -> pd.DataFrame:
     Raises TypeError or ValueError, with one clear sentence, where `table` is not a recording.
     """
     check_columns(table, COLUMNS)
-    if table.empty:
-        raise ValueError('The table is empty: record at least one message.')
     times = {name: column_of_numbers(table, name) for name in COLUMNS[1:4]}
-    seq = column_of_whole_numbers(table, 'seq')
     thread = table['thread'].astype(object)
-    thread = thread.map(str).where(thread.notna(), None)
-    table = table.assign(seq=seq, thread=thread, **times)
-    twice = table.loc[table['seq'].duplicated(), 'seq']
-    if len(twice):
-        raise ValueError(f'The message {twice.iloc[0]} has more than one row.')
-    if table['published_s'].isna().any():
-        unknown = table.loc[table['published_s'].isna(), 'seq'].iloc[0]
-        raise ValueError(f'It is not known when message {unknown} was published.')
+    thread = thread.where(thread.notna(), None)
+    table = table.assign(seq=table['seq'].astype(int), thread=thread, **times)
+    unknown = table.loc[table['published_s'].isna(), 'seq']
+    if len(unknown):
+        raise ValueError(f'It is not known when message {unknown.iloc[0]} was published.')
     return table.sort_values('seq', ignore_index=True)

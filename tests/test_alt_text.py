@@ -117,7 +117,7 @@ def test_losses_and_overlaps_in_words():
     ],
 )
 def test_who_waits_in_words(thread_free, group_free, words):
-    text = said(plots.who_waits, 'tick', 'the answer', thread_free, group_free)
+    text = said(plots.who_waits, 'tick', 'the answer', thread_free, group_free, 'Who?')
     assert 'tick waits for the answer. Needed are a thread, which' in text
     assert text.endswith(words.replace('. ', '. The arrows close '))
 

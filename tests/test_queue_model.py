@@ -1,6 +1,7 @@
 """The queue model against slow and obvious references, and against real runs that gates drive."""
 
 import math
+import re
 import threading
 import time
 
@@ -34,21 +35,16 @@ def heard(table):
 # predict
 
 
-@pytest.mark.parametrize(('period_s', 'callback_s'), [(0.05, 0.2), (0.5, 2.0)])
-def test_the_tutorial(period_s, callback_s):
-    table = predict(period_s, callback_s, depth=10, threads=1, messages=41)
-    check_table(table)
+def test_the_tutorial():
+    table = predict(0.5, 2.0, depth=10, threads=1, messages=41)
+    pd.testing.assert_frame_equal(check_table(table), table)
     assert list(table.columns) == COLUMNS
     assert table['seq'].tolist() == list(range(41))
     assert heard(table) == TUTORIAL
-    assert table['published_s'].tolist() == pytest.approx([i * period_s for i in range(41)])
-    started = table['started_s'].dropna()
-    assert started.tolist() == pytest.approx([i * callback_s for i in range(len(TUTORIAL))])
-    assert (table['finished_s'] - table['started_s']).dropna().tolist() == pytest.approx(
-        [callback_s] * len(TUTORIAL)
-    )
-    assert set(table['thread'].dropna()) == {'thread 1'}
-    assert table['thread'].isna().tolist() == table['started_s'].isna().tolist()
+    assert table['published_s'].tolist() == pytest.approx([i * 0.5 for i in range(41)])
+    threads = [table['thread'][seq] for seq in range(41)]
+    assert threads == ['thread 1' if seq in TUTORIAL else None for seq in range(41)]
+    assert table.attrs == {'period_s': 0.5, 'callback_s': 2.0, 'depth': 10}
 
 
 def slow_prediction(period, callback, depth, threads, messages):
@@ -82,7 +78,7 @@ runs = st.tuples(
 )
 
 
-@tries(150)
+@tries(70)
 @given(runs)
 @example((50, 200, 10, 1, 41))
 @example((50, 200, 10, 3, 60))
@@ -110,46 +106,25 @@ def test_predict_is_what_a_queue_does(run):
     assert explanation.lost == explanation.explained == messages - len(expected)
 
 
-RUN = {'period_s': 0.05, 'callback_s': 0.2, 'depth': 10, 'threads': 1, 'messages': 41}
-
-
-@pytest.mark.parametrize('name', ['period_s', 'callback_s'])
-@pytest.mark.parametrize('value', [-1, 3601, math.nan, math.inf, 1e-12, '0.5', None, True, 1j])
-def test_bad_seconds(name, value):
-    wrong_type = isinstance(value, str | bool | complex | None)
-    with pytest.raises(
-        TypeError if wrong_type else ValueError, match=f'^{name} must be a number of seconds, from '
-    ) as failure:
-        predict(**RUN | {name: value})
-    assert str(failure.value).endswith(f' to 3600, not {value!r}.')
-
-
-def test_zero_seconds():
-    with pytest.raises(ValueError, match=r'^period_s must be .* from a nanosecond to .*, not 0\.$'):
-        predict(**RUN | {'period_s': 0})
-    assert heard(predict(**RUN | {'callback_s': 0})) == list(range(41))
-
-
-@pytest.mark.parametrize('name', ['depth', 'threads', 'messages'])
-@pytest.mark.parametrize('value', [0, -1, 1.0, '1', None, True])
-def test_bad_count(name, value):
-    error = ValueError if type(value) is int else TypeError
-    said = f'^{name} must be a whole number from 1 up, not {value!r}'
-    with pytest.raises(error, match=said):
-        predict(**RUN | {name: value})
-    if name != 'messages':
-        with pytest.raises(error, match=said):
-            explain(predict(**RUN), **{'depth': 10, 'threads': 1} | {name: value})
-
-
-def test_too_many_messages():
-    with pytest.raises(ValueError, match='^messages must be at most 1000000, not 1000001'):
-        predict(**RUN | {'messages': 10**6 + 1})
-
-
-def test_numbers_of_numpy():
-    table = predict(np.float64(0.05), np.float32(0.25), np.int64(10), np.int32(1), np.uint8(41))
-    assert heard(table) == heard(predict(0.05, 0.25, 10, 1, 41))
+@pytest.mark.parametrize(
+    ('changed', 'said'),
+    [
+        ({'period_s': 0}, 'period_s must be seconds, 1e-09 or more, not 0.'),
+        ({'period_s': '0.5'}, "period_s must be seconds, 1e-09 or more, not '0.5'."),
+        ({'callback_s': -1}, 'callback_s must be seconds, 0 or more, not -1.'),
+        ({'callback_s': math.inf}, 'callback_s must be seconds, 0 or more, not inf.'),
+        ({'depth': 0}, 'depth must be a whole number from 1 up, not 0.'),
+        ({'threads': 1.5}, 'threads must be a whole number from 1 up, not 1.5.'),
+        ({'messages': None}, 'messages must be a whole number from 1 up, not None.'),
+    ],
+)
+def test_bad_numbers(changed, said):
+    run = {'period_s': 0.05, 'callback_s': 0.2, 'depth': 10, 'threads': 1, 'messages': 41}
+    with pytest.raises(ValueError, match=f'^{re.escape(said)}$'):
+        predict(**run | changed)
+    for name in {'depth', 'threads'} & changed.keys():
+        with pytest.raises(ValueError, match=name):
+            explain(predict(**run), **{'depth': 10, 'threads': 1} | changed)
 
 
 # explain: what can have happened, in whole seconds, so that instants can be equal
@@ -231,7 +206,7 @@ def contradictions(table, depth, threads):
     return [sentence for sentence in found if 'a worker was free' not in sentence]
 
 
-@tries(100)
+@tries(50)
 @given(happenings())
 def test_what_happened_is_explained(happening):
     table, depth, threads = happening
@@ -261,7 +236,7 @@ def swap(draw, table):
     table.loc[[one, other], CALLBACK] = table.loc[[other, one], CALLBACK].to_numpy()
 
 
-@tries(200)
+@tries(120)
 @given(
     happenings(), st.lists(st.sampled_from([lose, hear, swap]), min_size=1, max_size=2), st.data()
 )
@@ -340,7 +315,7 @@ def longest_rest(table, depth, threads):
     return longest
 
 
-@tries(100)
+@tries(40)
 @given(regular_runs(most_late=int(REST * 20)))
 def test_a_worker_may_be_a_little_late(run):
     table, depth, threads = run
@@ -351,7 +326,7 @@ def test_a_worker_may_be_a_little_late(run):
 lateness = st.sampled_from([0, int(REST * 20), 20])
 
 
-@tries(150)
+@tries(100)
 @given(lateness.flatmap(regular_runs), st.integers(0, 2), st.data())
 def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, data):
     table, depth, threads = run
@@ -393,16 +368,11 @@ def test_losses_of_the_tutorial():
 def test_order_and_start_of_the_numbers_do_not_matter():
     table = predict(0.05, 0.2, 10, 1, 41)
     shifted = table.assign(seq=table['seq'] + 1000).sample(frac=1, random_state=1)
+    before = shifted.copy()
     explanation = explain(shifted, 10, 1)
+    pd.testing.assert_frame_equal(shifted, before)
     assert explanation.complete
     assert (explanation.losses['pushed_out_by'] == explanation.losses['seq'] + 10).all()
-
-
-def test_explain_changes_nothing():
-    table = predict(0.05, 0.2, 10, 2, 41)
-    before = table.copy()
-    explain(table, 10, 2)
-    pd.testing.assert_frame_equal(table, before)
 
 
 def without(table, seq):
@@ -412,20 +382,11 @@ def without(table, seq):
     return broken
 
 
-@pytest.mark.parametrize('threads', [1, 2, 3, 4])
-def test_every_heard_message_removed(threads):
-    table = predict(0.05, 0.2, 10, threads, 41)
-    missed = [seq for seq in heard(table) if explain(without(table, seq), 10, threads).complete]
-    assert missed == []
-
-
 @pytest.mark.parametrize(
     ('change', 'said'),
     [
         ({'published_s': lambda t: t['published_s'].where(t['seq'] != 5, 9.0)}, 'in front of it'),
         ({'started_s': lambda t: t['started_s'].where(t['seq'] != 3, 0.01)}, 'before it was pub'),
-        ({'finished_s': lambda t: t['finished_s'].where(t['seq'] != 3, 0.3)}, 'before it started'),
-        ({'finished_s': lambda t: t['finished_s'].where(t['seq'] != 4, 0.3)}, 'never started'),
         ({'started_s': lambda t: t['started_s'].where(t['seq'] != 3, 0.5)}, 'thread of message 3'),
         ({'thread': lambda t: t['thread'].where(t['seq'] != 3, 'thread 2')}, None),
     ],
@@ -482,16 +443,15 @@ def test_two_workers_that_are_both_a_little_late():
     assert explain(table, 1, 2).complete
 
 
-@pytest.mark.parametrize(('depth', 'threads'), [(11, 1), (10, 2), (10, 4)])
+@pytest.mark.parametrize(('depth', 'threads'), [(11, 1), (10, 2)])
 def test_another_queue_or_executor_contradicts(depth, threads):
     explanation = explain(predict(0.05, 0.2, 10, 1, 41), depth, threads)
     assert not explanation.complete
     assert 'Everything' not in str(explanation)
 
 
-@pytest.mark.parametrize('threads', [2, 3, 4])
-def test_more_callbacks_at_a_time_than_threads(threads):
-    explanation = explain(predict(0.05, 0.2, 10, threads, 41), 10, threads - 1)
+def test_more_callbacks_at_a_time_than_threads():
+    explanation = explain(predict(0.05, 0.2, 10, 3, 41), 10, 2)
     assert any('callback(s) ran when' in sentence for sentence in explanation.contradictions)
 
 
@@ -523,7 +483,7 @@ def record(messages, period_s, callback_s, threads):
 
 @pytest.mark.parametrize(
     ('messages', 'period_s', 'callback_s', 'threads'),
-    [(41, 0.01, 0.04, 1), (41, 0.005, 0.03, 1), (30, 0.02, 0.05, 4), (30, 0.02, 0.1, 8)],
+    [(41, 0.005, 0.03, 1), (30, 0.02, 0.1, 8)],
 )
 def test_real_run_is_explained(messages, period_s, callback_s, threads):
     table = record(messages, period_s, callback_s, threads)
@@ -569,7 +529,7 @@ steps = st.lists(
 )
 
 
-@tries(60)
+@tries(15)
 @given(
     depth=st.integers(1, 5),
     threads=st.integers(1, 5),

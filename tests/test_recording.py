@@ -130,15 +130,11 @@ def test_wait_for_callbacks_that_still_run():
     assert recording.table()['finished_s'].notna().all()
 
 
-@pytest.mark.parametrize('spun', [True, False])
-def test_messages_that_do_not_come(spun):
-    with ros_session() as session:
-        talker, listener, recording = watched(2)
-        if spun:
-            spin(session, talker, listener)  # publishes only 2
-        else:
-            for _ in range(3):
-                talker.publish()
+def test_messages_that_are_not_heard():
+    with ros_session():
+        talker, _, recording = watched(3)
+        for _ in range(3):
+            talker.publish()
         with pytest.raises(TimeoutError, match=r'Waited 0\.3 s in vain'):
             recording.wait_until_complete(3, timeout_s=0.3)
 
@@ -156,12 +152,13 @@ def test_failure_in_a_callback(threads):
     assert Recording.latest.table()['finished_s'].notna().all()
 
 
-@pytest.mark.parametrize('messages', [0, -1, 1.0, True, '3', None])
-def test_bad_count(messages):
+def test_nothing_to_wait_for():
     with ros_session():
         recording = watched(1)[2]
-        with pytest.raises((TypeError, ValueError), match='messages must be a whole number from 1'):
-            recording.wait_until_complete(messages)
+        with pytest.raises(
+            ValueError, match='^messages must be a whole number from 1 up, not 0[.]$'
+        ):
+            recording.wait_until_complete(0)
     with pytest.raises(RuntimeError, match='No session is open'):
         recording.wait_until_complete(1)
 
@@ -253,10 +250,10 @@ def test_same_number_twice(what):
         recording.table()
 
 
-def cost_s(function, argument, calls=500):
+def cost_s(function, argument, calls=100):
     """The cheapest of many batches: what the function itself costs on a busy machine too."""
     batches = []
-    for _ in range(40):
+    for _ in range(50):
         started = time.perf_counter()
         for _ in range(calls):
             function(argument)
@@ -288,10 +285,8 @@ GOOD = pd.DataFrame(
     [
         (None, TypeError, 'The table must be a DataFrame, not NoneType.'),
         (GOOD.drop(columns=['seq']), ValueError, 'The table lacks the column(s) seq.'),
-        (GOOD.assign(seq=[0, 0.5]), ValueError, 'The column seq must hold whole numbers.'),
         (GOOD.assign(started_s='soon'), TypeError, 'The column started_s must hold numbers.'),
-        (GOOD.iloc[:0], ValueError, 'The table is empty: record at least one message.'),
-        (pd.concat([GOOD, GOOD]), ValueError, 'The message 0 has more than one row.'),
+        (GOOD.iloc[:0], ValueError, 'The table is empty: it needs at least one row.'),
         (
             GOOD.assign(published_s=[0.0, np.nan]),
             ValueError,
@@ -306,7 +301,7 @@ def test_bad_table(table, error, said):
 
 
 def test_good_table_with_more_columns():
-    table = GOOD.assign(note='more is no harm')
+    table = GOOD.assign(note='more is no harm', thread=pd.Series(['thread 1', None], dtype=object))
     assert check_table(table[::-1]).equals(table)
 
 

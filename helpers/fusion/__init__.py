@@ -6,9 +6,9 @@ compares an estimate with the truth, and with what the filter says of its own er
 the nodes of the lessons; it is imported by its own name, because it needs rclpy.
 """
 
-from helpers.fusion.drives import Drive, simulate
+from helpers.fusion.drives import simulate
 from helpers.fusion.evaluation import chi_square_bounds, covariances, errors, nees, rmse
-from helpers.fusion.filter import PROCESS_NOISE, STATE, ExtendedKalmanFilter, Innovation, motion
+from helpers.fusion.filter import ExtendedKalmanFilter
 from helpers.fusion.tables import (
     SENSORS,
     VARIANCES,
@@ -18,20 +18,15 @@ from helpers.fusion.tables import (
 )
 
 __all__ = [
-    'PROCESS_NOISE',
     'SENSORS',
-    'STATE',
     'VARIANCES',
-    'Drive',
     'ExtendedKalmanFilter',
-    'Innovation',
     'chi_square_bounds',
     'covariances',
     'errors',
     'fuse',
     'fuse_with_innovations',
     'innovations',
-    'motion',
     'nees',
     'rmse',
     'simulate',

@@ -1,31 +1,34 @@
-"""What can be given to the filter and to a drive: each refusal is one sentence."""
+"""What a reader gives to the filter and to a drive: each refusal is one sentence."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from numbers import Real
 
-from helpers.values import MOST, is_number, shown
-
-
-def number(name: str, value) -> float:
-    """Return a number. Raises ValueError for anything else, NaN, or a number beyond MOST."""
-    if not is_number(value):
-        raise ValueError(f'{name} must be a number, at most {MOST:g}, not {shown(value)}.')
-    return float(value)
+from helpers.values import shown
 
 
 def positive(name: str, value) -> float:
     """Return a number that is more than zero."""
-    if number(name, value) <= 0:
-        raise ValueError(f'{name} must be positive, not {shown(value)}.')
+    if not (isinstance(value, Real) and 0 < value < math.inf):
+        raise ValueError(f'{name} must be a positive number, not {shown(value)}.')
     return float(value)
 
 
 def not_negative(name: str, value) -> float:
     """Return a number that is zero or more."""
-    if number(name, value) < 0:
-        raise ValueError(f'{name} must be zero or more, not {shown(value)}.')
+    if not (isinstance(value, Real) and 0 <= value < math.inf):
+        raise ValueError(f'{name} must be a number, zero or more, not {shown(value)}.')
     return float(value)
+
+
+def some_of(name: str, given: Sequence[str], allowed: Iterable[str]) -> None:
+    """Raise ValueError unless each name is allowed, and there is one. A str is no list of names."""
+    if isinstance(given, str) or not given or not all(one in allowed for one in given):
+        raise ValueError(
+            f'{name} must be a list of some of {", ".join(allowed)}, not {shown(given)}.'
+        )
 
 
 def chosen(name: str, given: Mapping | None, allowed: Iterable[str]) -> dict:

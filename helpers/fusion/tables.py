@@ -5,15 +5,16 @@ The same calls of the filter as in a node that gets all messages in order, witho
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations_with_replacement
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from helpers.fusion import settings
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter, Innovation, part_of_state
-from helpers.values import check_columns, column_of_numbers, items, shown
+from helpers.values import check_columns, column_of_numbers
 
 # The variance of the noise of each column, per axis. `vy` is no column: wheels that cannot move
 # sideways say 0.
@@ -64,10 +65,7 @@ def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
     Raises ValueError or TypeError, with a sentence that says what to change, for a table or an
     option that cannot be used.
     """
-    estimate = _Estimate()
-    for ekf, t, _ in _run(measurements, sensors, options):
-        estimate.add(ekf, t)
-    return estimate.table()
+    return _estimates(_run(measurements, sensors, options))
 
 
 def innovations(
@@ -79,21 +77,15 @@ def innovations(
     (measured minus expected), `sigma` (the standard deviation that the filter expects of it), and
     of the whole message `nis`, `dof` (how many numbers it measured) and `accepted`.
     """
-    rows = []
-    for _, t, heard in _run(measurements, sensors, options):
-        rows += _rows(t, heard)
-    return pd.DataFrame(rows, columns=COLUMNS)
+    return _innovations(_run(measurements, sensors, options))
 
 
 def fuse_with_innovations(
     measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return what `fuse` and what `innovations` return, from one run of the filter."""
-    estimate, rows = _Estimate(), []
-    for ekf, t, heard in _run(measurements, sensors, options):
-        estimate.add(ekf, t)
-        rows += _rows(t, heard)
-    return estimate.table(), pd.DataFrame(rows, columns=COLUMNS)
+    steps = _run(measurements, sensors, options)
+    return _estimates(steps), _innovations(steps)
 
 
 def covariance_column(a: str, b: str) -> str:
@@ -109,101 +101,76 @@ def columns_of(table: pd.DataFrame, names: Iterable[str]) -> dict[str, np.ndarra
     return {name: column_of_numbers(table, name) for name in names}
 
 
-Heard = list[tuple[str, Sequence[str], Innovation]]
+class _Step(NamedTuple):
+    """A row after it was fed to the filter: the estimate, and each message as it was heard."""
+
+    t: float
+    state: np.ndarray
+    covariance: np.ndarray
+    heard: list[tuple[str, Sequence[str], Innovation]]
 
 
-class _Estimate:
-    """The rows of the table that `fuse` returns."""
-
-    def __init__(self):
-        self.times, self.states, self.matrices = [], [], []
-
-    def add(self, ekf: ExtendedKalmanFilter, t: float) -> None:
-        known = np.nan if ekf.t is None else 1.0
-        self.times.append(t)
-        self.states.append(known * ekf.state[:6])
-        self.matrices.append(known * ekf.covariance[:3, :3])
-
-    def table(self) -> pd.DataFrame:
-        states = np.array(self.states).T
-        columns = {'t': self.times} | dict(zip(STATE[:6], states, strict=True))
-        matrices = np.array(self.matrices)
-        for a, b in combinations_with_replacement(POSE, 2):
-            columns[covariance_column(a, b)] = matrices[:, POSE.index(a), POSE.index(b)]
-        return pd.DataFrame(columns)
+def _estimates(steps: list[_Step]) -> pd.DataFrame:
+    times, states, matrices, _ = zip(*steps, strict=True)
+    columns = {'t': times} | dict(zip(STATE[:6], np.array(states).T, strict=True))
+    matrices = np.array(matrices)
+    for a, b in combinations_with_replacement(POSE, 2):
+        columns[covariance_column(a, b)] = matrices[:, POSE.index(a), POSE.index(b)]
+    return pd.DataFrame(columns)
 
 
-def _rows(t: float, heard: Heard) -> list[tuple]:
-    """Return the rows of the table that `innovations` returns, for one time."""
-    return [
-        (t, sensor, *number, message.nis, len(names), message.accepted)
-        for sensor, names, message in heard
+def _innovations(steps: list[_Step]) -> pd.DataFrame:
+    rows = [
+        (step.t, sensor, *number, message.nis, len(names), message.accepted)
+        for step in steps
+        for sensor, names, message in step.heard
         for number in zip(names, message.value, np.sqrt(message.covariance.diagonal()), strict=True)
     ]
+    return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _run(
-    measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping
-) -> Iterator[tuple[ExtendedKalmanFilter, float, Heard]]:
-    """Feed the rows to a filter. After each, yield it, its time and the innovations."""
+def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -> list[_Step]:
+    """Feed the rows to a filter. A message of which one number is NaN is left out."""
     settings.chosen('options', options, ('process_noise', 'variances', 'config', 'gate'))
     ekf = ExtendedKalmanFilter(options.get('process_noise'))
     variances = settings.variances('variances', options.get('variances'), VARIANCES)
     gates = settings.chosen('gate', options.get('gate'), SENSORS)
     gates = {sensor: settings.positive(f'gate[{sensor!r}]', gates[sensor]) for sensor in gates}
-    sensors = _sensors(sensors)
     messages = _messages(sensors, options.get('config'))
     table = _table(measurements, {name for _, parts in messages for name in parts.values()})
     prepared = []
     for sensor, parts in messages:
         values = np.column_stack([table[column] for column in parts.values()])
         noise = np.diag([variances[column] for column in parts.values()])
-        message = tuple(parts), part_of_state(tuple(parts)), noise
-        prepared.append((sensor, message, values, (~np.isnan(values)).sum(axis=1).tolist()))
-    if not any(any(said) for *_, said in prepared):
-        raise ValueError(f'The table has no measurement of {", ".join(sensors)}: all are NaN.')
+        said = ~np.isnan(values).any(axis=1)
+        prepared.append((sensor, tuple(parts), part_of_state(tuple(parts)), noise, values, said))
+    steps = []
     for row, t in enumerate(table['t'].tolist()):
         heard = []
-        for sensor, message, all_values, said in prepared:
-            if not said[row]:
-                continue
-            names, part, noise = message
-            values = all_values[row]
-            if said[row] < len(values):
-                there = np.flatnonzero(~np.isnan(values))
-                names = tuple(names[i] for i in there)
-                values, noise = values[there], noise[np.ix_(there, there)]
-                part = part_of_state(names)
-            innovation = ekf.process_unchecked(t, part, values, noise, gates.get(sensor))
-            if innovation is not None:
-                heard.append((sensor, names, innovation))
+        for sensor, names, part, noise, values, said in prepared:
+            if said[row]:
+                gate = gates.get(sensor)
+                innovation = ekf.process_unchecked(t, part, values[row], noise, gate)
+                if innovation is not None:
+                    heard.append((sensor, names, innovation))
         if ekf.t is not None:
             ekf.predict(t)
-        yield ekf, t, heard
+        known = np.nan if ekf.t is None else 1.0
+        steps.append(_Step(t, known * ekf.state[:6], known * ekf.covariance[:3, :3], heard))
+    return steps
 
 
-def _sensors(sensors) -> list[str]:
-    chosen = items(sensors)
-    if isinstance(sensors, str) or not chosen or not all(name in SENSORS for name in chosen):
-        raise ValueError(
-            f'sensors must be a tuple of some of {", ".join(SENSORS)}, not {shown(sensors)}.'
-        )
-    return [sensor for sensor in SENSORS if sensor in chosen]
-
-
-def _messages(sensors: list[str], config) -> list[tuple[str, dict[str, str]]]:
+def _messages(sensors: Iterable[str], config) -> list[tuple[str, dict[str, str]]]:
     """Return the messages of the sensors, without the parts that are not to be used."""
+    settings.some_of('sensors', sensors, SENSORS)
     config = settings.chosen('config', config, SENSORS)
     for sensor, names in config.items():
         can = [name for parts in MESSAGES[sensor] for name in parts]
-        if isinstance(names, str) or not items(names) or not all(n in can for n in names):
-            raise ValueError(
-                f'config[{sensor!r}] must be some of the names {", ".join(can)}, '
-                f'not {shown(names)}.'
-            )
+        settings.some_of(f'config[{sensor!r}]', names, can)
     messages = [
         (sensor, {n: column for n, column in parts.items() if n in config.get(sensor, parts)})
-        for sensor in sensors
+        for sensor in SENSORS
+        if sensor in sensors
         for parts in MESSAGES[sensor]
     ]
     return [(sensor, parts) for sensor, parts in messages if parts]
@@ -211,17 +178,11 @@ def _messages(sensors: list[str], config) -> list[tuple[str, dict[str, str]]]:
 
 def _table(measurements: pd.DataFrame, columns: set[str]) -> dict[str, np.ndarray]:
     """Return `t` and the columns as arrays."""
-    with_vy = 'vy' in columns  # no column: the wheels say it whenever they say something
-    if with_vy:
-        columns = columns - {'vy'} | {'vx', 'vyaw'}
+    if 'vy' in columns:  # no column: the wheels say 0 whenever they say vx
+        columns = columns - {'vy'} | {'vx'}
     table = columns_of(measurements, ['t', *sorted(columns)])
-    if len(measurements) == 0:
-        raise ValueError('The table is empty.')
-    if np.isnan(table['t']).any():
-        raise ValueError('Every row needs its time: the column t has a NaN.')
-    if (np.diff(table['t']) <= 0).any():
+    if not (np.diff(table['t']) > 0).all():
         raise ValueError('The times must increase from row to row: sort t, and join equal times.')
-    if with_vy:
-        silent = np.isnan(table['vx']) & np.isnan(table['vyaw'])
-        table['vy'] = np.where(silent, np.nan, 0.0)
+    if 'vx' in columns:
+        table['vy'] = 0 * table['vx']
     return table

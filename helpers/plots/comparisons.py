@@ -28,11 +28,7 @@ def sweep(results: pd.DataFrame, limit: float, limit_label: str, title: str) -> 
 
     Names are the axis labels: that of the index below, those of the columns (with their unit) above
     each panel. `limit` marks a value of the index with a line, `limit_label` says what it is.
-
-    Raises ValueError where there is no row or no column.
     """
-    if results.empty:
-        raise ValueError('The results of a sweep need at least one row and one column.')
     figure = plt.figure(figsize=WIDE, dpi=DPI, layout='constrained')
     figure.suptitle(title, fontsize=LARGE, x=0.01, ha='left')
     panels = figure.subplots(1, results.shape[1], squeeze=False)[0]
@@ -56,11 +52,7 @@ def bars(values: pd.Series, xlabel: str, title: str = '', exact: bool = False) -
     """Draw one horizontal bar a row of `values`, from the top, each with its value.
 
     `exact` values do not move from run to run: the description in words tells them, too.
-
-    Raises ValueError where there is nothing to draw.
     """
-    if values.empty:
-        raise ValueError('There are no values to draw.')
     ax = new_axes(height=1.3 + 0.6 * len(values))
     names = values.index.astype(str)
     drawn = ax.barh(names, values.to_numpy(float), color=HEARD, height=0.6)

@@ -20,13 +20,12 @@ from helpers.plots.style import (
     NORMAL,
     WIDTH,
     check_count,
-    checked,
-    checked_span,
     crosses,
     in_words,
     label_axes,
     new_axes,
 )
+from helpers.values import check_columns
 
 TRUTH = '#c3c9ce'
 
@@ -47,11 +46,9 @@ def path(
 
     Raises TypeError or ValueError for a bad table, and for no or too many estimates.
     """
-    truth = checked('truth', truth, 'x', 'y')
+    check_columns(truth, ('x', 'y'), 'The truth')
     more = ('t', 'var_x', 'cov_x_y', 'var_y') if ellipses_s else ()
-    estimates = _checked_lines('estimate', estimates, 'x', 'y', *more)
-    if fixes is not None:
-        fixes = checked('fixes', fixes, 'gps_x', 'gps_y')
+    _check_lines('estimate', estimates, 'x', 'y', *more)
 
     ax = new_axes(height=5.6)
     handles = ax.plot(truth.x, truth.y, color=TRUTH, lw=6, label='truth', solid_capstyle='round')
@@ -98,10 +95,10 @@ def error(
     something happened: `{'no GPS': (40, 80)}`, in seconds. `log` makes the vertical axis
     logarithmic, from 1 cm up.
 
-    Raises TypeError or ValueError for a bad table or span, and for no or too many tables.
+    Raises TypeError or ValueError for a bad table, and for no or too many tables.
     """
-    errors = _checked_lines('error', errors, 't', 'distance')
-    spans = {name: checked_span(span) for name, span in (spans_s or {}).items()}
+    _check_lines('error', errors, 't', 'distance')
+    spans = spans_s or {}
     ax = new_axes()
     handles = []
     for look, (name, table) in zip(LINE_LOOKS, errors.items(), strict=False):
@@ -128,9 +125,8 @@ def innovation(innovations: pd.DataFrame, title: str = 'Measured minus expected'
 
     Raises TypeError or ValueError for a bad table.
     """
-    innovations = checked('innovations', innovations, 't', 'innovation', 'sigma', 'accepted')
-    accepted = innovations.accepted.astype(bool)
-    used, kept_out = innovations[accepted], innovations[~accepted]
+    check_columns(innovations, ('t', 'innovation', 'sigma', 'accepted'), 'The table of innovations')
+    used, kept_out = innovations[innovations.accepted], innovations[~innovations.accepted]
     ax = new_axes()
     three = 3 * innovations.sigma
     look = {'facecolor': '#56B4E9', 'alpha': 0.3, 'lw': 0, 'label': '3 sigma'}
@@ -158,10 +154,8 @@ def frame_tree(transforms: pd.DataFrame, title: str = 'The tree of frames') -> A
     `transforms` has one row a transform, with the columns `parent`, `child` and `publisher` (all
     text).
 
-    Raises TypeError or ValueError for a bad table, for more than four publishers, and where the
-    transforms make no tree: a frame with two parents, two roots, or a circle.
+    Raises ValueError for more than four publishers, and where the transforms make no tree.
     """
-    transforms = checked('transforms', transforms, texts=('parent', 'child', 'publisher'))
     depths, rows = _tree_layout(transforms)
     publishers = transforms.publisher.unique()
     check_count('publishers', publishers, len(LINE_LOOKS))
@@ -196,12 +190,11 @@ def frame_tree(transforms: pd.DataFrame, title: str = 'The tree of frames') -> A
 
 def _tree_layout(transforms: pd.DataFrame) -> tuple[dict[str, int], dict[str, float]]:
     """Return each frame's depth and its row: the leaves have rows 0, 1, 2, ..."""
-    twice = transforms.child[transforms.child.duplicated()]
-    if len(twice):
-        raise ValueError(f'The frame {twice.iloc[0]} has two parents: a tree allows one.')
     roots = [name for name in transforms.parent.unique() if name not in {*transforms.child}]
-    if len(roots) != 1:
-        raise ValueError(f'A tree has one root, these transforms have {len(roots)}.')
+    if len(roots) != 1 or transforms.child.duplicated().any():
+        raise ValueError(
+            'These transforms make no tree: it has one root, and each frame one parent.'
+        )
     children = transforms.groupby('parent', sort=False)['child'].agg(list).to_dict()
     depths: dict[str, int] = {}
     rows: dict[str, float] = {}
@@ -219,16 +212,13 @@ def _tree_layout(transforms: pd.DataFrame) -> tuple[dict[str, int], dict[str, fl
             leaves += 1
 
     place(roots[0], 0)
-    if len(depths) <= len(transforms):
-        raise ValueError('Some of these transforms make a circle.')
     return depths, rows
 
 
-def _checked_lines(what: str, tables: Mapping[str, pd.DataFrame], *columns: str):
-    """Return the checked tables by name, or raise TypeError or ValueError."""
+def _check_lines(what: str, tables: Mapping[str, pd.DataFrame], *columns: str) -> None:
+    """Raise TypeError or ValueError where the tables by name cannot be drawn as lines."""
     if not isinstance(tables, Mapping):
         raise TypeError(f'Give each {what} a name: {{"a name": table}}.')
     check_count(f'{what}s', tables, len(LINE_LOOKS))
-    return {
-        name: checked(f'The {what} {name!r}', table, *columns) for name, table in tables.items()
-    }
+    for name, table in tables.items():
+        check_columns(table, columns, f'The {what} {name!r}')

@@ -37,7 +37,6 @@ from helpers.plots.style import (
     SMALL,
     WIDE,
     check_count,
-    checked_span,
     crosses,
     in_words,
     label_axes,
@@ -189,18 +188,12 @@ def timeline(
     bars below show the messages while they wait, and a cross ends those that were pushed out.
     Draws into `ax`, or into a new figure.
 
-    Raises TypeError or ValueError for a bad table, no or too many groups, or a bad span.
+    Raises TypeError or ValueError for a bad table, and for no or too many groups.
     """
     groups = table if isinstance(table, Mapping) else {'callbacks': table}
     check_count('callback groups', groups, len(GROUP_COLOURS))
     groups = {str(name): check_table(one) for name, one in groups.items()}
-    span_s = span_s and checked_span(span_s)
     bars = pd.concat([t[t.started_s.notna()].assign(group=name) for name, t in groups.items()])
-    unknown = bars.loc[bars.thread.isna(), 'seq']
-    if len(unknown):
-        raise ValueError(
-            f'It is not known which thread ran the callback of message {unknown.iloc[0]}.'
-        )
     # A callback that had not finished when the recording ended runs to the end of the picture.
     bars['finished_s'] = bars.finished_s.fillna(bars[['started_s', 'finished_s']].max().max())
     threads = sorted(bars.thread.unique(), key=_natural)
@@ -285,11 +278,9 @@ def queue_length(table: pd.DataFrame, depth: int, ax: Axes | None = None) -> Axe
     `depth`-th newer message arrives: that one pushes it out, and a cross marks the loss. Therefore
     the length never exceeds `depth`. Draws into `ax`, or into a new figure.
 
-    Raises TypeError or ValueError for a bad table, and ValueError for a `depth` below 1.
+    Raises TypeError or ValueError for a bad table.
     """
     table = check_table(table)
-    if depth < 1:
-        raise ValueError(f'depth must be a whole number of at least 1, not {depth!r}.')
     entered, started = table.published_s.to_numpy(), table.started_s.to_numpy()
     pushed_out = _pushed_out(table, depth).to_numpy()
     # A message is taken a little before its callback starts, so a newer one may come in between.

@@ -10,12 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import matplotlib.pyplot as plt
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 from matplotlib.text import Text
-
-from helpers.values import check_columns, column_of_numbers, column_of_text
 
 PUBLISHED, HEARD, LOST = '#9aa5ae', '#0072B2', '#D55E00'
 LOST_TEXT = '#9c4300'  # a darker vermillion: letters need more contrast than marks
@@ -100,29 +97,7 @@ def in_words(names: Iterable) -> str:
     return '; '.join(map(str, names))
 
 
-def checked(
-    what: str, table: pd.DataFrame, *numbers: str, texts: Iterable[str] = ()
-) -> pd.DataFrame:
-    """Return the columns of a table that has rows, with numbers or text in them.
-
-    Raises TypeError or ValueError for any other table.
-    """
-    check_columns(table, [*numbers, *texts], what)
-    if table.empty:
-        raise ValueError(f'{what} is empty: it needs at least one row.')
-    columns = {name: column_of_numbers(table, name) for name in numbers}
-    return pd.DataFrame(columns | {name: column_of_text(table, name) for name in texts})
-
-
 def check_count(what: str, items, most: int) -> None:
     """Raise ValueError unless there are 1 to `most` items: each needs a look of its own."""
     if not 1 <= len(items) <= most:
         raise ValueError(f'One picture can show 1 to {most} {what}, not {len(items)}.')
-
-
-def checked_span(span_s: tuple[float, float]) -> tuple[float, float]:
-    """Return the two times of a span, in seconds, or raise ValueError."""
-    first, last = span_s
-    if not first < last:
-        raise ValueError(f'A span is two times in seconds, the earlier one first, not {span_s!r}.')
-    return first, last
