@@ -103,14 +103,9 @@ def show() -> None:
         try:
             lines = _read(path).splitlines()
         except OSError as error:
-            _print(f'Your progress is not kept, because {path} cannot be used: {error.strerror}.')
+            text = f'Your progress is not kept, because {path} cannot be used: {error.strerror}.'
+            print(*wrap(text), sep='\n')
     print(table(known, lines))
-    names = {path.stem[3:] for path in _notebooks()}
-    unknown = [line for line in lines if line and line.rpartition(' ')[0] not in names]
-    if unknown:
-        _print(
-            f'Not understood in {path}, and left as it is: {len(unknown)} of {len(lines)} lines.'
-        )
 
 
 def start_again() -> None:
@@ -154,7 +149,3 @@ def _read(path: Path) -> str:
     with path.open('a+b') as lines:
         lines.seek(0)
         return lines.read().decode(errors='replace')
-
-
-def _print(text: str) -> None:
-    print(*wrap(text), sep='\n')
