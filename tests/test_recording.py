@@ -163,6 +163,19 @@ def test_nothing_to_wait_for():
         recording.wait_until_complete(1)
 
 
+def test_progress_is_the_part_that_was_worked_off(monkeypatch):
+    seen = []
+    session = SimpleNamespace(wait_until=lambda _, __, progress, ___: seen.append(progress()))
+    monkeypatch.setattr('helpers.session.current_session', lambda: session)
+    recording = Recording(publisher := Publisher(), subscription := Subscription())
+    recording.wait_until_complete(4)
+    for number in (3, 4, 5):
+        publisher.publish(Int64(data=number))
+    subscription.callback(Int64(data=4))
+    recording.wait_until_complete(4)
+    assert seen == [0, 2 / 4]
+
+
 @pytest.mark.parametrize('kind', ['message', 'message and info', 'async', 'object'])
 def test_kinds_of_callbacks(kind):
     seen = []
@@ -331,6 +344,13 @@ def test_runs_of_callbacks(style, threads, together):
     assert tables['look'].started_s[0] > 0
     assert tables['ask'].thread[0] == 'thread 1'
     assert tables['look'].thread[0] == f'thread {threads}'
+
+
+def test_a_run_is_inside_where_it_starts():
+    recording = CallbackRecording(inner=Subscription(), outer=Subscription())
+    recording.runs['outer'] += [[2, 4, 1], [6, 8, 1]]  # seconds, and the thread
+    recording.runs['inner'] += [[1, 3, 2], [2, 3, 2], [3, 5, 2], [4, 5, 2], [7, 9, 2]]
+    assert recording.inside('inner', 'outer') == 3
 
 
 def test_run_that_goes_on():
