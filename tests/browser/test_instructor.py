@@ -7,7 +7,9 @@ from lab_server import NOTEBOOKS
 
 from tools.lessons.slides import slide_types
 
-SIZES = ((1024, 768), (1920, 1080), (1280, 720))  # the last is that of the screenshots
+# Of the shapes of projectors, 4:3 and 16:9. All sizes are parts of the slide's height, so what fits
+# one of a shape fits each. The last is that of the screenshots.
+SIZES = ((1024, 768), (1280, 720))
 TWO_FRAMES = '() => new Promise(d => requestAnimationFrame(() => requestAnimationFrame(d)))'
 OPEN_ANSWERS = f"""index => {{
     const answers = [...{PANEL}.content.widgets[index].node.querySelectorAll('details')];
