@@ -22,5 +22,5 @@ if ! cmp -s tools/hub/package-lock.json "$proxy/package-lock.json"; then
     mv "$proxy.new" "$proxy"
 fi
 
-# The build of lesson 09 would do this, but a student may not write into .venv.
+# The first build of a lesson would do this, but a student may not write into .venv.
 .venv/bin/python -c 'from helpers.workspace.wheels import fix_wheels; fix_wheels()'
