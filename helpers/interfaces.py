@@ -16,7 +16,7 @@ import io
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -133,19 +133,19 @@ def _find(name: str) -> Path:
         file = (share_folder(match[1]) or Path()) / match[2] / f'{match[3]}.{match[2]}'
         if file.is_file():
             return file
-    near = nearest(str(name), installed_names())
+    near = _nearest(str(name))
     hint = f'The nearest: {", ".join(near)}.' if near else 'list_interfaces() prints all names.'
     raise ValueError(f'There is no interface {name!r}. {hint}')
 
 
-def nearest(name: str, names: Iterable[str], number: int = 3) -> list[str]:
+def _nearest(name: str) -> list[str]:
     """The names most like `name`: first those that differ only in package, kind or case."""
-    lower = {n.lower(): n for n in names}
+    lower = {known.lower(): known for known in installed_names()}
     last = name.lower().rpartition('/')[2]
-    same = [n for n in lower if n.rpartition('/')[2] == last]
-    same = difflib.get_close_matches(name.lower(), same, number, 0.0)
-    close = difflib.get_close_matches(name.lower(), lower, number, 0.6)
-    return [lower[n] for n in dict.fromkeys([*same, *close])][:number]
+    same = [known for known in lower if known.rpartition('/')[2] == last]
+    same = difflib.get_close_matches(name.lower(), same, cutoff=0)
+    close = difflib.get_close_matches(name.lower(), lower)
+    return [lower[known] for known in dict.fromkeys([*same, *close])][:3]
 
 
 # --- show and dependencies ---

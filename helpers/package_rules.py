@@ -7,7 +7,6 @@ answer is hard to read. All other mistakes are left to the build, which names th
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -23,7 +22,6 @@ from helpers.interfaces import (
     KINDS,
     SEPARATOR,
     installed_names,
-    nearest,
     read_fields,
     share_folder,
 )
@@ -88,7 +86,7 @@ def check_package(path: str | os.PathLike) -> Findings:
     name = manifest.name if manifest else folder.name
     files = sorted(file for kind in KINDS for file in folder.glob(f'{kind}/*.{kind}'))
     source = Source(name, manifest, cmake, [_definition(name, folder, file) for file in files])
-    findings += [*_definitions(source), *_packages(source)]
+    findings += _definitions(source)
     for file, lacks, missing, error in RULES:
         lacking = lacks(source) if source.has(file) else []
         for it in [''] if lacking is True else lacking or []:
@@ -128,9 +126,8 @@ class Source(NamedTuple):
 
     @property
     def given(self) -> list[str]:
-        """The packages after DEPENDENCIES, also where somebody has put commas between them."""
-        words = self.cmake.dependencies if self.cmake else []
-        return [name for word in words for name in word.split(',') if name]
+        """The packages after DEPENDENCIES."""
+        return self.cmake.dependencies if self.cmake else []
 
     @property
     def uses(self) -> dict[str, str]:
@@ -207,10 +204,11 @@ def _definitions(source: Source) -> Iterator[Finding]:
             error = f'{type(definition.error).__name__}: {definition.error}'
             yield Finding(definition.file, _unlike_rosidl(definition), error)
         for field in definition.fields:
-            if field.type.pkg_name and (missing := _no_message(source, field)):
-                file = f'.../{field.type.pkg_name}/msg/{field.type.type}.json'
+            short = field.type.type
+            if field.type.pkg_name == source.name and f'msg/{short}.msg' not in source.files:
+                file = f'.../{source.name}/msg/{short}.json'
                 error = f"FileNotFoundError: [Errno 2] No such file or directory: '{file}'"
-                yield Finding(definition.file, missing, error)
+                yield Finding(definition.file, _without_package(field), error)
 
 
 def _unlike_rosidl(definition: Definition) -> str:
@@ -229,35 +227,12 @@ def _unlike_rosidl(definition: Definition) -> str:
     return 'a definition that rosidl can read'
 
 
-def _no_message(source: Source, field: parser.Field) -> str:
-    """What a field lacks whose message is not in its package, or nothing."""
-    package, short = field.type.pkg_name, field.type.type
-    messages = [name for name in installed_names() if '/msg/' in name]
-    if package == source.name:
-        if f'msg/{short}.msg' in source.files:
-            return ''
-        others = [name for name in messages if name.endswith(f'/{short}')]
-        return f'the package of the type {short} of {field.name!r}{_hint(", for example", others)}'
-    if not share_folder(package) or f'{package}/msg/{short}' in messages:
-        return ''
-    near = nearest(f'{package}/msg/{short}', messages, 1)
-    return f'a message that exists: {package} has no {short}{_hint(". The nearest is", near)}'
-
-
-def _hint(words: str, names: list[str]) -> str:
-    return f'{words} {names[0].replace("/msg/", "/")}' if names else ''
-
-
-def _packages(source: Source) -> Iterator[Finding]:
-    for package in dict.fromkeys([*source.given, *source.uses]):
-        if not share_folder(package):
-            names = {name.partition('/')[0] for name in installed_names()}
-            near = difflib.get_close_matches(package, names, 1)
-            yield Finding(
-                source.uses.get(package, CMAKE),
-                f'the package {package}, which is not installed{_hint(". The nearest is", near)}',
-                f'find_package() does not find "{package}Config.cmake"',
-            )
+def _without_package(field: parser.Field) -> str:
+    """What a field lacks whose message its own package does not have."""
+    short = field.type.type
+    others = [name for name in installed_names() if name.endswith(f'/msg/{short}')]
+    example = f', for example {others[0].replace("/msg/", "/")}' if others else ''
+    return f'the package of the type {short} of {field.name!r}{example}'
 
 
 # --- rules of CMakeLists.txt and package.xml ---
@@ -287,7 +262,7 @@ def _not_handed_on(source: Source) -> list[str]:
     kinds = {file.partition('/')[0] for file in source.files}
     implicit = [package for kind, package in BROUGHT_BY_KIND.items() if kind in kinds]
     brought = _with_brought([*source.given, *implicit])
-    return [package for package in source.uses if package not in brought and share_folder(package)]
+    return [package for package in source.uses if package not in brought]
 
 
 def _not_named(source: Source) -> list[str]:
@@ -295,7 +270,7 @@ def _not_named(source: Source) -> list[str]:
     build = _depends(source.manifest, 'buildtool', 'build')
     named = build & _depends(source.manifest, 'exec')  # who uses the interfaces needs them, too
     brought = _with_brought(build)
-    packages = [p for p in dict.fromkeys([*source.given, *source.uses]) if share_folder(p)]
+    packages = dict.fromkeys([*source.given, *source.uses])
     return [p for p in packages if p not in (named if p in source.given else brought)]
 
 
@@ -323,12 +298,6 @@ RULES = [
         f'"{{it}}" in {GENERATE}()',
         'it builds, but without this interface; another interface that uses it fails with '
         'FileNotFoundError',
-    ),
-    Rule(
-        CMAKE,
-        lambda source: [word for word in source.cmake.dependencies if ',' in word],
-        'blanks in place of commas after DEPENDENCIES: {it}',
-        '"the passed dependency \'{it}\' has not been found before using find_package()"',
     ),
     Rule(
         CMAKE,

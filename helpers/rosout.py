@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from rcl_interfaces.msg import Log
+from rclpy.logging import LoggingSeverity
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-
-LEVELS = {10: 'DEBUG', 20: 'INFO', 30: 'WARN', 40: 'ERROR', 50: 'FATAL'}
 
 
 @dataclass
@@ -49,7 +48,7 @@ class Rosout:
             with handle:
                 while (taken := handle.take_message(Log, False)) is not None:
                     message = taken[0]
-                    level = LEVELS.get(message.level, str(message.level))
+                    level = LoggingSeverity(message.level).name
                     self._records.append(Record(level, message.name, message.msg))
         return self._records
 

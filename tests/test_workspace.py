@@ -112,9 +112,6 @@ Every line: log/latest_build/before/stdout_stderr.log"""
 
 def test_mistakes_of_a_python_package(other):
     assert other.build().errors == ['Nothing was built: src/ has no package.']
-    assert other.build('talker').errors == [
-        'Nothing was built: src/ has no package talker, it is empty.'
-    ]
     write_talker(other, setup=SETUP_PY.replace("'resource/'", "'resources/'"))
     assert other.build().errors == [
         "error: can't copy 'resources/talker_pkg': doesn't exist or not a regular file"
@@ -131,11 +128,8 @@ def test_mistakes_of_a_python_package(other):
     assert "doesn't explicitly install a marker in the package index" in str(result)
     result = other.build('talker')
     assert not result.ok
-    assert str(result).splitlines()[1:] == [
-        'Nothing was built: src/ has no package talker, only talker_pkg.',
-        '',
-        'Summary: 0 packages finished',
-    ]
+    assert "ignoring unknown package 'talker'" in ' '.join(result.errors)
+    assert str(result).endswith('\n\nSummary: 0 packages finished')
 
 
 def test_without_a_compiler_one_sentence_says_what_to_install(other, monkeypatch, tmp_path):

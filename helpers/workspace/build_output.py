@@ -74,13 +74,8 @@ def read_result(
     errors = []
     if failed:
         errors = _errors(workspace, log / failed / 'stderr.log', output)
-    elif not packages and asked:
-        known = sorted(folder.parent.name for folder in workspace.glob('src/**/package.xml'))
-        warnings = [line for line in warnings if 'ignoring unknown package' not in line]
-        there = f'only {", ".join(known)}' if known else 'it is empty'
-        errors = [f'Nothing was built: src/ has no package {" or ".join(asked)}, {there}.']
-    elif not packages and not warnings:
-        errors = ['Nothing was built: src/ has no package.']
+    elif not packages:
+        errors, warnings = warnings or ['Nothing was built: src/ has no package.'], []
     log_file = log / (failed or next(reversed(packages), '')) / 'stdout_stderr.log'
     return BuildResult(
         command,
