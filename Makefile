@@ -6,7 +6,7 @@ help: ## show this list
 lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, LAB_ARGS=... change how
 	@$(call open_lab,false,/lab/tree/notebooks/00_start_here.ipynb)
 
-present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02; NEW=yes makes it anew
+present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02; NEW=yes makes it anew, TABLET=yes shows your notes in the network
 	@deck=$$($(PYTHON) -m tools.lessons.present "$(LESSON)" --root "$(ROOT)" $(if $(filter yes,$(NEW)),--new) \
 		$(if $(filter no,$(FRESH)),--saved-outputs)) && \
 	rm -f "$(JUPYTER_CONFIG_DIR)"/lab/workspaces/present-* \
@@ -91,8 +91,9 @@ open_lab = settings="$(JUPYTER_CONFIG_DIR)/lab/$(if $(filter true,$(1)),presente
 	mkdir -p "$(JUPYTER_CONFIG_DIR)/custom" "$$slides" && \
 	cp tools/deck.css "$(JUPYTER_CONFIG_DIR)/custom/custom.css" && \
 	echo '{"active": $(1)}' > "$$slides/plugin.jupyterlab-settings" && \
-	JUPYTERLAB_SETTINGS_DIR="$$settings" exec $(PYTHON) -m jupyterlab --ServerApp.root_dir="$(ROOT)" --LabApp.custom_css=True \
-	--LabApp.default_url="$(2)" $(if $(filter true,$(1)),--LabApp.extra_labextensions_path="$(CURDIR)/tools/labextensions") \
+	JUPYTERLAB_SETTINGS_DIR="$$settings" TABLET="$(TABLET)" exec $(PYTHON) -m jupyterlab --ServerApp.root_dir="$(ROOT)" --LabApp.custom_css=True \
+	--LabApp.default_url="$(2)" $(if $(filter true,$(1)),--LabApp.extra_labextensions_path="$(CURDIR)/tools/labextensions" \
+	--ServerApp.jpserver_extensions=tools.notes_window=True) \
 	$(if $(PORT),--port="$(PORT)" --ServerApp.port_retries=0) \
 	$(if $(filter no,$(BROWSER)),--no-browser) \
 	$(if $(filter 0,$(shell id -u)),--allow-root) $(LAB_ARGS)

@@ -34,7 +34,7 @@ class Server(NamedTuple):
 @contextmanager
 def server(folder: Path, *make: str) -> Iterator[Server]:
     """Run a command of the Makefile that starts JupyterLab, as a process group of its own."""
-    shutil.copytree(ROOT / 'notebooks', folder / 'notebooks')
+    shutil.copytree(ROOT / 'notebooks', folder / 'notebooks', dirs_exist_ok=True)
     # Two workers start servers at the same moment, and would both find the first free port. The
     # system gives each a port of its own.
     command = ['make', *make, 'PORT=0', 'BROWSER=no', f'ROOT={folder}']

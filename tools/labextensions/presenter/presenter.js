@@ -1,10 +1,12 @@
 // What `make present` adds to jupyterlab-slideshow 0.3.4: editing stays editing, keys that change
-// the notebook do nothing, a clicker walks, and the deck stands where it was after a reload.
+// the notebook do nothing, a clicker walks, and the deck stands where it was after a reload. It also
+// keeps that place for the instructor's window, tools/notes_window.
 //
 // JupyterLab loads this file as it is. It has the form of a prebuilt extension, so that neither
 // webpack nor npm is needed.
 
 const STATE = 'deck'; // a workspace of JupyterLab's server: it outlives the tab and the server
+const LESSON_S = 4 * 3600; // a deck that was left open longer begins anew
 // Of JupyterLab's keys in command mode, those that leave the notebook as it is.
 const HARMLESS =
   /^(Arrow(Left|Right|Up|Down)|(Control|Shift) Enter|(Shift )?Tab|Enter|Control s|i|0)$/;
@@ -16,6 +18,7 @@ const ACTIONS = {
   Home: 'first',
   b: 'black',
   '.': 'black',
+  n: 'notes',
   Escape: 'leave',
 };
 
@@ -51,21 +54,29 @@ function keepEditing(presenter) {
 
 function keepPlace(presenter, workspaces) {
   const start = presenter.start;
-  const fetched = workspaces.fetch(STATE).then(({ data }) => data ?? {}, () => ({}));
+  const empty = { places: {}, began: {} }; // by the notebook's path; `began` in seconds
+  const fetched = workspaces.fetch(STATE).then(({ data }) => ({ ...empty, ...data }), () => empty);
   const known = new WeakSet();
   let saved = fetched;
   presenter.start = async function (panel) {
     await start.call(this, panel);
-    if (known.has(panel)) return;
-    known.add(panel);
-    const [places] = await Promise.all([fetched, panel.context.ready]);
+    const [deck] = await Promise.all([fetched, panel.context.ready]);
     const { path } = panel.context;
-    if (path in places) panel.content.activeCellIndex = places[path];
-    panel.content.activeCellChanged.connect(notebook => {
-      places[path] = notebook.activeCellIndex;
-      const state = { data: places, metadata: { id: STATE } };
+    const keep = notebook => {
+      deck.current = path;
+      deck.places[path] = notebook.activeCellIndex;
+      const now = Date.now() / 1000;
+      if (notebook.activeCellIndex === 0) delete deck.began[path];
+      else if (!(now - deck.began[path] < LESSON_S)) deck.began[path] = now;
+      const state = { data: deck, metadata: { id: STATE } };
       saved = saved.then(() => workspaces.save(STATE, state)).catch(console.warn);
-    });
+    };
+    if (!known.has(panel)) {
+      known.add(panel);
+      if (path in deck.places) panel.content.activeCellIndex = deck.places[path];
+      panel.content.activeCellChanged.connect(keep);
+    }
+    keep(panel.content);
   };
 }
 
@@ -110,9 +121,16 @@ function act(action, app, manager) {
     case 'black':
       document.body.classList.toggle('deck-black');
       return;
+    case 'notes':
+      return openNotes();
     case 'leave':
       return leave(manager, content);
   }
+}
+
+function openNotes() {
+  const { notesWindow } = JSON.parse(document.getElementById('jupyter-config-data').textContent);
+  window.open(`http://${location.hostname}${notesWindow}`, 'notes', 'popup');
 }
 
 async function leave(manager, notebook) {

@@ -1,0 +1,163 @@
+"""The instructor's window, which follows the live deck: a part of the server of `make present`.
+
+It has a port and a secret of its own, and can be read only. JupyterLab's token would let everybody
+who sees it on a tablet run programs here. JupyterLab itself stays on this machine, also where
+`TABLET=yes` opens the window to the network.
+
+Where the deck is, presenter.js keeps in a workspace of JupyterLab. The rest stands in the notebook.
+"""
+
+import hmac
+import html
+import os
+import re
+import secrets
+import socket
+import sys
+import time
+from functools import lru_cache
+from pathlib import Path
+
+import nbformat
+import psutil
+from jupyterlab.commands import get_workspaces_dir
+from jupyterlab_server.workspaces_handler import WorkspacesManager
+from nbconvert.filters import markdown2html
+from tornado import web
+from tornado.httpserver import HTTPServer
+from tornado.netutil import bind_sockets
+
+from tools.lessons.lesson import NOTE
+from tools.lessons.present import FOLDER
+
+HERE = Path(__file__).resolve().parent
+PORTS = range(8900, 8950)
+FILES = {  # by the name in the address
+    '': ('window.html', 'text/html'),
+    'window.css': ('window.css', 'text/css'),
+    'window.js': ('window.js', 'text/javascript'),
+}
+HEADERS = {
+    'Cache-Control': 'no-store',
+    'Content-Security-Policy': "default-src 'self' data:; style-src 'self' 'unsafe-inline'",
+    'Referrer-Policy': 'no-referrer',
+}
+
+
+def state(root: Path, deck: dict) -> dict:
+    """Return what the window shows: of the notebook `deck['current']`, and of its cell.
+
+    `root` is the folder with the copies, `deck` what presenter.js keeps. Without a deck the answer
+    is empty.
+    """
+    file = root / FOLDER / Path(deck.get('current', '')).name
+    if not file.is_file():
+        return {}
+    cells = _cells(file, file.stat().st_mtime_ns)
+    at = min(deck['places'].get(deck['current'], 0), len(cells) - 1)
+    types = [cell.metadata.get('slideshow', {}).get('slide_type') for cell in cells]
+    starts = [i for i, kind in enumerate(types) if kind in ('slide', 'subslide')]
+    starts += [len(cells)] * 2  # the end of the last slide, and of the one after it, which is empty
+    steps = [
+        i
+        for i, cell in enumerate(cells)
+        if cell.cell_type == 'markdown' and re.match('##? ', cell.source)
+    ]
+    slide = sum(start <= at for start in starts)
+    on_slide = range(at + 1, starts[slide])
+    on_slide = [cells[i] for i in on_slide if types[i] == 'fragment']
+    following = [cells[i] for i in range(*starts[slide : slide + 2]) if types[i] != 'skip']
+    notes = [i for i, cell in enumerate(cells) if 'notes' in cell.metadata.get('tags', [])]
+    minutes = {i: _minutes(cells[i].source) for i in notes}
+    step = max((i for i in steps if i <= at), default=0)
+    end = min((i for i in steps if i > at), default=len(cells))
+    before = [i for i in notes if i < end]
+    of_step = [i for i in before if i > step] or before[-1:]  # a note may be for two steps
+    began = deck['began'].get(deck['current'])
+    return {
+        'lesson': cells[0].source.splitlines()[0].lstrip('# '),
+        'step': cells[step].source.splitlines()[0].lstrip('# '),
+        'slide': slide,
+        'slides': len(starts) - 2,
+        'notes': ''.join(markdown2html(cells[i].source) for i in of_step),
+        'next': 'On this slide' if on_slide else 'Next slide',
+        'cells': ''.join(map(_html, on_slide or following)),
+        'planned': sum(minutes[i] for i in before),
+        'all': sum(minutes.values()),
+        'gone': int(time.time() - began) // 60 if began else 0,
+    }
+
+
+@lru_cache(maxsize=2)
+def _cells(file: Path, _changed: int) -> list[nbformat.NotebookNode]:
+    """Return the cells of a notebook. It is read again where the time of its change is another."""
+    return nbformat.read(file, as_version=4).cells
+
+
+def _minutes(note: str) -> int:
+    found = re.match(rf'{NOTE}: (\d+) minutes', note)
+    return int(found[1]) if found else 0
+
+
+def _html(cell: nbformat.NotebookNode) -> str:
+    if cell.cell_type == 'markdown':
+        return markdown2html(cell.source)
+    return f'<pre>{html.escape(cell.source)}</pre>'
+
+
+class Window(web.RequestHandler):
+    """Answers who knows the secret: with the page, its files, and the state as JSON."""
+
+    def initialize(self, root: Path, secret: str) -> None:
+        """Take over what `serve` knows."""
+        self.root, self.secret = root, secret
+
+    def get(self, secret: str, name: str) -> None:
+        """Answer a request for /SECRET/NAME."""
+        if not hmac.compare_digest(secret.encode(), self.secret.encode()):
+            raise web.HTTPError(404)
+        for header, value in HEADERS.items():
+            self.set_header(header, value)
+        if name == 'state':
+            deck = WorkspacesManager(get_workspaces_dir()).load('deck')['data']
+            self.finish(state(self.root, deck))
+        elif name in FILES:
+            file, kind = FILES[name]
+            self.set_header('Content-Type', f'{kind}; charset=UTF-8')
+            self.finish((HERE / file).read_bytes())
+        else:
+            raise web.HTTPError(404)
+
+
+def serve(root: Path, address: str) -> tuple[int, str]:
+    """Serve the window on an address of this machine; return the port and the secret."""
+    secret = secrets.token_hex(6)
+    application = web.Application([(r'/(\w+)/(.*)', Window, {'root': root, 'secret': secret})])
+    for port in PORTS:
+        try:
+            sockets = bind_sockets(port, address, socket.AF_INET)
+        except OSError:  # it is taken
+            continue
+        HTTPServer(application).add_sockets(sockets)
+        return port, secret
+    raise ValueError(f'No port from {PORTS[0]} to {PORTS[-1]} is free for the notes.')
+
+
+def _load_jupyter_server_extension(server) -> None:
+    """Serve the window beside the server of `make present`, and say where.
+
+    With TABLET=yes in the environment, it is open to the networks of this machine.
+    """
+    tablet = os.environ.get('TABLET') == 'yes'
+    port, secret = serve(Path(server.root_dir), '0.0.0.0' if tablet else '127.0.0.1')
+    addresses = [
+        one.address
+        for interface in psutil.net_if_addrs().values()
+        for one in interface
+        if one.family == socket.AF_INET and tablet and not one.address.startswith('127.')
+    ]
+    page_config = server.web_app.settings.setdefault('page_config_data', {})
+    page_config['notesWindow'] = f':{port}/{secret}/'  # for presenter.js
+    lines = [f'http://{address}:{port}/{secret}/' for address in ['localhost', *addresses]]
+    # After all that JupyterLab prints at its start.
+    server.io_loop.add_callback(print, 'Your notes:', *lines, sep='\n    ', file=sys.stderr)
