@@ -18,8 +18,8 @@ HOSTILE = (
     *('CPATH', '*_INCLUDE_PATH', 'LIBRARY_PATH', 'PKG_CONFIG_PATH'),
     # The language of messages. ipykernel asks for colours: then no line starts with "CMake Error".
     *('LC_*', 'LANG*', 'CLICOLOR*', 'FORCE_COLOR'),
-    # What pytest and Python tell their children.
-    *('PYTEST*', 'PYTHON*'),
+    # What pytest, Python and git (in a hook) tell their children.
+    *('PYTEST*', 'PYTHON*', 'GIT_*'),
     # A node gets its domain id and its discovery range from the session.
     *('RCUTILS_*', 'ROS_DOMAIN_ID', 'ROS_STATIC_PEERS', 'ROS_LOCALHOST_ONLY'),
     'ROS_AUTOMATIC_DISCOVERY_RANGE',

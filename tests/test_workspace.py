@@ -132,6 +132,40 @@ def test_mistakes_of_a_python_package(other):
     assert str(result).endswith('\n\nSummary: 0 packages finished')
 
 
+def test_links_make_a_change_count_and_an_overlay_hides_its_underlay(other):
+    write_talker(other)
+    other.write('src/talker_pkg/talker_pkg/talker.py', "def main():\n    print('old')\n")
+    cmake = 'cmake_minimum_required(VERSION 3.8)\nproject(user_pkg LANGUAGES NONE)\n'
+    other.write('src/user_pkg/CMakeLists.txt', f'{cmake}install(CODE "")\n')
+    depends = '<exec_depend>talker_pkg</exec_depend>'
+    other.write('src/user_pkg/package.xml', package_xml('user_pkg', 'cmake', depends))
+    result = other.build(symlink_install=True)
+    assert result.ok, result
+    assert str(result).startswith('colcon build --symlink-install\n')
+
+    def says(workspace):
+        with workspace.run('talker_pkg', 'talker') as talker:
+            talker.wait()
+        return talker.lines
+
+    other.write('src/talker_pkg/talker_pkg/talker.py', "def main():\n    print('linked')\n")
+    assert says(other) == ['linked']
+
+    overlay = Workspace('overlay', underlay=other)
+    write_talker(overlay)
+    overlay.write('src/talker_pkg/talker_pkg/talker.py', "def main():\n    print('above')\n")
+    result = overlay.build()
+    assert result.ok, result
+    (warning,) = result.warnings
+    assert "'talker_pkg' is in: ../install/talker_pkg\n" in warning
+    assert warning.endswith(
+        'This may be promoted to an error in a future release of colcon-override-check.'
+    )
+    assert says(overlay) == ['above']
+    assert says(other) == ['linked']
+    assert other.build('talker_pkg').packages == {'talker_pkg': 'finished'}, 'not the overlay'
+
+
 def test_without_a_compiler_one_sentence_says_what_to_install(other, monkeypatch, tmp_path):
     write_interfaces(other)
     monkeypatch.setenv('PATH', str(tmp_path))  # only what belongs to this Python is left
@@ -497,6 +531,14 @@ def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch):
 
 
 # --- The folder ----------------------------------------------------------------------------------
+
+
+def test_a_terminal_is_a_new_one_in_the_workspace(other, monkeypatch):
+    monkeypatch.setenv('GIT_DIR', '/proc')
+    monkeypatch.setenv('PYTHONPATH', '/proc')
+    said = other.terminal('cd src; git init --quiet .; git status --short; pwd; echo "$PYTHONPATH"')
+    assert said == 'src\n'
+    assert other.terminal('pwd; false; echo two >&2') == '.\ntwo'
 
 
 def test_a_new_workspace_is_empty_and_git_does_not_see_it(other):

@@ -64,12 +64,10 @@ def read_result(
     packages = _packages(log / 'events.log')
     failed = next((name for name, state in packages.items() if state == 'failed'), None)
     warnings = [
-        found[1]
-        for line in _without_folders('\n'.join(output), workspace).splitlines()
-        # Since Python 3.13 colcon's seconds are negative.
-        if (found := re.match(r'\[-?\d[\d.]*s\] ((?:WARNING|ERROR):.*)', line))
+        warning
+        for warning in _warnings(without_folders('\n'.join(output), workspace))
         # The prefix of the wheels is no colcon workspace, and need not be.
-        and "doesn't contain any 'local_setup.*' files" not in line
+        if "doesn't contain any 'local_setup.*' files" not in warning
     ]
     errors = []
     if failed:
@@ -91,13 +89,21 @@ def read_result(
 def _errors(workspace: Path, stderr: Path, output: Sequence[str]) -> list[str]:
     """Return the lines that matter of what a package that failed has printed."""
     text = stderr.read_text(encoding='utf-8', errors='replace')
-    errors = lines_that_matter(_without_folders(text, workspace))
+    errors = lines_that_matter(without_folders(text, workspace))
     if any('CalledProcessError' in line for line in errors):
         # colcon asks setup.py in a process whose output it does not give to the package.
         _, start, rest = '\n'.join(output).partition('Traceback (most recent')
         text = start + rest.partition('Traceback (most recent')[0]
-        errors = lines_that_matter(_without_folders(text, workspace)) or errors
+        errors = lines_that_matter(without_folders(text, workspace)) or errors
     return errors
+
+
+def _warnings(text: str) -> list[str]:
+    """Return colcon's own warnings and errors. One that ends in a colon has more lines."""
+    # Since Python 3.13 colcon's seconds are negative.
+    more = r'(?:(?<=:)\n(?:(?!\[-?\d|Starting >>>).*\n?)*)?'
+    found = re.findall(rf'^\[-?\d[\d.]*s\] ((?:WARNING|ERROR):.*{more})', text, re.M)
+    return [warning.strip() for warning in found]
 
 
 def _packages(events: Path) -> dict[str, str]:
@@ -112,11 +118,12 @@ def _packages(events: Path) -> dict[str, str]:
     return packages
 
 
-def _without_folders(text: str, workspace: Path) -> str:
+def without_folders(text: str, workspace: Path) -> str:
     """Write this machine's folders as they are the same everywhere: '...' for a prefix."""
     folders = {
         f'{workspace}/': '',
         str(workspace): '.',
+        f'{workspace.parent}/': '../',  # an overlay lies in its underlay
         sysconfig.get_path('purelib') + '/': '',
         sysconfig.get_path('stdlib') + '/': STANDARD_LIBRARY,
         sys.prefix: '...',

@@ -15,7 +15,7 @@ from helpers.build_tools import build_environment, build_tools, from_wheels
 from helpers.interrupts import uninterrupted
 from helpers.progress_bar import ProgressBar
 from helpers.session import graph_environment
-from helpers.workspace.build_output import BuildResult, read_result
+from helpers.workspace.build_output import BuildResult, read_result, without_folders
 from helpers.workspace.folders import claim
 from helpers.workspace.processes import POLL_S, Process
 from helpers.workspace.sourcing import source, use
@@ -34,24 +34,36 @@ class Workspace:
     workspace of this name, another folder is taken, so that the two do not meet. `path` is the
     folder; all paths that this class takes and prints are relative to it.
 
+    With `underlay`, another workspace that has been built, this one is an overlay of it: it lies in
+    a folder of the underlay, is built in a terminal that has sourced the underlay, and is closed
+    with it. `%%write` goes on to write into the underlay.
+
     Raises ValueError for a name that is not letters, digits, `_` and `-`.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, underlay: Workspace | None = None) -> None:
         global _open_workspace
         if not re.fullmatch(r'[A-Za-z0-9_-]+', name):
             raise ValueError(
                 f'Name a workspace with letters, digits, _ and -, such as lesson_08, not {name!r}.'
             )
-        _close()
-        self.path = claim(name)
+        if underlay is None:
+            _close()
+        elif name in underlay._overlays:
+            underlay._overlays[name].close()
+        self._underlay = underlay
+        self._overlays: dict[str, Workspace] = {}
+        self.path = underlay.path / name if underlay else claim(name)
         self._processes: dict[tuple[str, ...], Process] = {}
         self._sourced: dict[str, str] | None = None
         if self.path.exists():
             with uninterrupted():  # rmtree makes an OSError of an Interrupt
                 shutil.rmtree(self.path)
         (self.path / 'src').mkdir(parents=True)
-        _open_workspace = self
+        if underlay is None:
+            _open_workspace = self
+        else:
+            underlay._overlays[name] = self
         _register_in_ipython()
 
     # --- Files ---
@@ -86,8 +98,10 @@ class Workspace:
 
     # --- Build ---
 
-    def build(self, *packages: str, cmake_args: Sequence[str] = ()) -> BuildResult:
-        """Run `colcon build` on all packages, or with `--packages-select` on these.
+    def build(
+        self, *packages: str, symlink_install: bool = False, cmake_args: Sequence[str] = ()
+    ) -> BuildResult:
+        """Run `colcon build` on all packages in `src`, or with `--packages-select` on these.
 
         A build that fails is a result, not an exception: print it. Raises RuntimeError where this
         machine lacks a tool, with the command that installs it.
@@ -102,8 +116,12 @@ class Workspace:
         if with_cmake and from_wheels():
             fix_wheels()
         self._sourced = None
-        command = ['colcon', 'build', *(['--packages-select', *packages] if packages else [])]
-        settings = ['--event-handlers', 'console_direct+', 'desktop_notification-', 'status-']
+        command = ['colcon', 'build']
+        command += ['--symlink-install'] if symlink_install else []
+        command += ['--packages-select', *packages] if packages else []
+        # An overlay lies in the folder of its underlay, and is not a part of it.
+        settings = ['--base-paths', 'src', '--event-handlers']
+        settings += ['console_direct+', 'desktop_notification-', 'status-']
         # Without the first, CMake takes the newest Python on the PATH.
         python = [f'-DPython3_EXECUTABLE={sys.executable}', f'-DCMAKE_MODULE_PATH={CMAKE_MODULES}']
         settings += ['--cmake-args', *python, *cmake_args]
@@ -116,7 +134,7 @@ class Workspace:
         # The entry point, because the script `colcon` may be of another environment.
         main = 'import sys; from colcon_core.command import main; sys.exit(main())'
         command = [sys.executable, '-c', main, '--log-base', 'log', *arguments]
-        environment = build_environment()
+        environment = self._underlay.environment() if self._underlay else build_environment()
         colcon = None
         try:
             with uninterrupted():
@@ -184,8 +202,34 @@ class Workspace:
             process.wait()
         return process
 
+    def terminal(self, commands: str) -> str:
+        """Run commands in a new terminal, a bash in the folder of this workspace.
+
+        Nothing of the workspace is sourced in it, and the user's settings of git do not count.
+        Return what the commands print, without this machine's folders.
+
+        Raises TimeoutError where they take longer than 60 s.
+        """
+        environment = build_environment() | {
+            'GIT_CONFIG_GLOBAL': os.devnull,
+            'GIT_CONFIG_NOSYSTEM': '1',
+        }
+        shell = None
+        try:
+            with uninterrupted():
+                bash = shutil.which('bash') or '/bin/bash'
+                command = [bash, '--norc', '-c', commands]
+                shell = Process('bash', command, environment, self.path)
+            shell.wait(60)
+        finally:
+            if shell is not None:
+                shell.stop()
+        return without_folders('\n'.join(shell.lines), self.path)
+
     def close(self) -> None:
         """End every process of this workspace. Its files stay until it is made again."""
+        for overlay in self._overlays.values():
+            overlay.close()
         for process in self._processes.values():
             process.stop()
         self._processes.clear()
