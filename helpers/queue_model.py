@@ -40,7 +40,7 @@ def predict(
     period = _nanoseconds('period_s', period_s, least=1e-9)
     callback = _nanoseconds('callback_s', callback_s, least=0)
     for name, value in (('depth', depth), ('threads', threads), ('messages', messages)):
-        _check_count(name, value)
+        check_count(name, value)
     taken, started = [], []
     oldest = 0
     while oldest < messages:
@@ -120,20 +120,18 @@ def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
     Raises ValueError or TypeError for a table or a number that cannot be used.
     """
     table = check_table(table)
-    _check_count('depth', depth)
-    _check_count('threads', threads)
+    check_count('depth', depth)
+    check_count('threads', threads)
     # A queue for more messages than there are never overflows, and more workers find nothing to do.
     named_depth, depth, threads = depth, min(depth, len(table)), min(threads, len(table))
-    heard = table[table['started_s'].notna()]
+    heard = _heard(table)
     contradictions = _impossible_rows(table)
-    # A callback that was still running when the record ended has not finished.
-    heard = heard.assign(finished_s=heard['finished_s'].fillna(math.inf))
-    heard['worker_free_s'] = (
-        heard.sort_values(['started_s', 'finished_s'])
-        .groupby('thread', sort=False)['finished_s']
-        .shift(fill_value=-math.inf)
-    )
-    contradictions += _impossible_takes(table, heard, depth, threads)
+    contradictions += [
+        f'Message {seq} cannot have been the oldest in the queue for a free worker '
+        'when its callback started.'
+        for seq, (earliest, latest) in take_bounds(table, depth, threads).items()
+        if earliest > latest
+    ]
     contradictions += _too_many_at_once(heard, threads)
     contradictions += _rests(table, heard, depth, threads)
     losses = _losses(table, depth)
@@ -166,15 +164,17 @@ def _impossible_rows(table: pd.DataFrame) -> list[str]:
     ]
 
 
-def _impossible_takes(
-    table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int
-) -> list[str]:
-    """Go through the takes in order, each as early as possible: is it then too late for one?"""
+def take_bounds(table: pd.DataFrame, depth: int, threads: int) -> dict[int, tuple[float, float]]:
+    """Return for each heard message when it was taken: not before, and not after (seconds).
+
+    The takes are in the order of the messages, each as early as possible. Where none is possible,
+    the first time is later than the second. `table` is as `check_table` returns it.
+    """
     published = [*table['published_s'], *[math.inf] * (depth + 1)]
     busy_until = [-math.inf] * threads  # the latest finishes of earlier messages, as a heap
-    found = []
+    found = {}
     expected, previous_take = 0, -math.inf
-    columns = heard[['seq', 'started_s', 'finished_s', 'worker_free_s']]
+    columns = _heard(table)[['seq', 'started_s', 'finished_s', 'worker_free_s']]
     for index, seq, start, finish, free in columns.itertuples(name=None):
         # `arrived` messages were published when this one was the oldest in the queue. Without a
         # gap the queue may have been anywhere between one message and full; after a gap, full.
@@ -182,15 +182,25 @@ def _impossible_takes(
         arrived = full if index > expected else index + 1
         earliest = max(previous_take, published[arrived - 1], busy_until[0], free)
         latest = min(start, published[full + 1])
+        found[seq] = earliest, latest
         if earliest > latest:
-            found.append(
-                f'Message {seq} cannot have been the oldest in the queue for a free worker '
-                'when its callback started.'
-            )
             earliest = start  # go on from what was recorded
         heapq.heappushpop(busy_until, finish)
         expected, previous_take = index + 1, earliest
     return found
+
+
+def _heard(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the heard messages, with `worker_free_s`: when their thread was free for them."""
+    heard = table[table['started_s'].notna()]
+    # A callback that was still running when the record ended has not finished.
+    heard = heard.assign(finished_s=heard['finished_s'].fillna(math.inf))
+    heard['worker_free_s'] = (
+        heard.sort_values(['started_s', 'finished_s'])
+        .groupby('thread', sort=False)['finished_s']
+        .shift(fill_value=-math.inf)
+    )
+    return heard
 
 
 def _too_many_at_once(heard: pd.DataFrame, threads: int) -> list[str]:
@@ -253,7 +263,8 @@ def _regular(durations: pd.Series) -> bool:
     return longest < math.inf and longest <= 2 * durations.median()
 
 
-def _check_count(name: str, value: int) -> None:
+def check_count(name: str, value: int) -> None:
+    """Raise ValueError unless the value is a whole number from 1 up."""
     if not isinstance(value, numbers.Integral) or value < 1:
         raise ValueError(f'{name} must be a whole number from 1 up, not {shown(value)}.')
 

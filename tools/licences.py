@@ -18,6 +18,7 @@ LOCKS = ('requirements.lock', 'requirements-browser.lock', 'requirements-hub.loc
 # What these say in a text or in their source only.
 STATED = {
     'empy': 'LGPL',
+    'quickjs-ng': 'MIT',
     'ros-fastcdr': 'Apache-2.0',
     'ros-fastrtps': 'Apache-2.0',
     'setuptools': 'MIT',

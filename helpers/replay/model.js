@@ -1,0 +1,378 @@
+// What may happen next, decided in one place: messages wait in KEEP_LAST queues, the threads of an
+// executor take them and run their callbacks, groups and locks let one in at a time, and a call
+// waits for its answer. No page and no clock: what a page shows, and when, is not decided here.
+//
+// A setup is what the learner writes:
+//   threads    names of the executor's threads; none where nobody spins
+//   groups     [{name, exclusive}]
+//   callbacks  [{name, group, depth, does, word}]: `group` is an index, `depth` that of the queue,
+//              `word` what waits in it ('message', 'tick', 'request', 'answer'), `does` its steps:
+//                {work: seconds}; without a number it ends when the record says so
+//                {read: name}, {write: name}     reads a number; writes what was read plus one
+//                {lock: name}, {unlock: name}
+//                {call: callback, client: callback}     waits, and holds thread and group
+//                {await: callback, client: callback}    waits, gives the thread back, not the group
+//                {send: callback, client: callback}     goes on; the client takes the answer
+//              Without `does` it is one work without a number.
+//   arrivals   [{at, callback, seq}] in their order, where a schedule says what arrives and when
+// Callbacks, threads and groups are named by their index. Times are seconds.
+//
+// A move is {do, at, ...}; `at` is left out for "now":
+//   {do: 'arrive', callback, seq}   a message comes; a full queue loses its oldest
+//   {do: 'take', callback, thread}  a thread takes the oldest message and starts the callback
+//   {do: 'go', thread}              the callback on the thread does its next step
+//   {do: 'end', thread}             the callback ends, and an answer goes where it was asked for
+//   {do: 'resume', run, thread}     a thread goes on with a callback whose awaited answer has come
+
+function queueModel() {
+  const WORDS = ['No', 'One', 'Two', 'Three', 'Four', 'Five', 'Six', 'Seven', 'Eight', 'Nine', 'Ten'];
+  const count = n => WORDS[n] ?? `${n}`;
+  const capital = text => text[0].toUpperCase() + text.slice(1);
+  const stepsOf = (setup, run) => setup.callbacks[run.callback].does ?? [{ work: undefined }];
+  const step = (setup, run) => stepsOf(setup, run)[run.step];
+  const groupOf = (setup, callback) => setup.groups[setup.callbacks[callback].group];
+
+  function named(setup, { callback, seq }) {
+    const { name, word = 'message' } = setup.callbacks[callback];
+    return setup.callbacks.length > 1 ? `${word} ${seq} of ${name}` : `${word} ${seq}`;
+  }
+
+  // States
+
+  // runs: of threads[i] the run that it has, or null. asleep: runs that await and have no thread.
+  // lost: {callback, seq, by}. locks: name -> id of the run that holds it. values: name -> number.
+  function start(setup) {
+    return {
+      now: 0,
+      queues: setup.callbacks.map(() => []),
+      runs: setup.threads.map(() => null),
+      asleep: [],
+      ended: 0,
+      lost: [],
+      locks: {},
+      values: {},
+      arrived: 0,
+      started: 0,
+    };
+  }
+
+  function copy(state) {
+    return {
+      ...state,
+      queues: state.queues.map(queue => queue.slice()),
+      runs: state.runs.map(run => run && { ...run }),
+      asleep: state.asleep.map(run => ({ ...run })),
+      lost: state.lost.slice(),
+      locks: { ...state.locks },
+      values: { ...state.values },
+    };
+  }
+
+  // All runs that have begun and not ended: they hold their groups.
+  const going = state => state.runs.filter(Boolean).concat(state.asleep);
+
+  function holder(setup, state, callback) {
+    const { group } = setup.callbacks[callback];
+    if (!setup.groups[group].exclusive) return undefined;
+    return going(state).find(run => setup.callbacks[run.callback].group === group);
+  }
+
+  // What the clock brings next, where a schedule or a work with a number says so.
+  function due(setup, state) {
+    const next = setup.arrivals?.[state.arrived];
+    const found = next ? [{ do: 'arrive', ...next }] : [];
+    state.runs.forEach((run, thread) => {
+      if (run && run.until !== undefined) {
+        const last = run.step === stepsOf(setup, run).length - 1;
+        found.push({ do: last ? 'end' : 'go', thread, at: run.until });
+      }
+    });
+    return found.sort((one, other) => one.at - other.at);
+  }
+
+  // The rules: '' where a move is allowed, else the sentence that forbids it.
+  function refusal(setup, state, move) {
+    const at = move.at ?? state.now;
+    if (at < state.now) return `Time does not run backwards: it is ${state.now} s.`;
+    const [first] = due(setup, state);
+    const isDue = first && move.do === first.do && move.thread === first.thread
+      && move.callback === first.callback && move.seq === first.seq;
+    if (first && !isDue && (first.at < at || first.at <= state.now))
+      return `Not yet: ${does(setup, state, first)} comes first.`;
+    if (move.do === 'arrive') {
+      if (setup.arrivals && !isDue) return 'The publisher does not send it now.';
+      return '';
+    }
+    const thread = setup.threads[move.thread];
+    if (thread === undefined) return 'There is no such thread.';
+    const run = state.runs[move.thread];
+    if (move.do === 'take' || move.do === 'resume') {
+      if (run)
+        return `${capital(thread)} is busy with ${named(setup, run)}: `
+          + 'a thread runs one callback at a time.';
+      if (move.do === 'resume') {
+        const asleep = state.asleep.find(({ id }) => id === move.run);
+        return asleep?.waits === 'thread' ? '' : 'Its answer has not come.';
+      }
+      if (!state.queues[move.callback].length) return 'Nothing waits there.';
+      const held = holder(setup, state, move.callback);
+      if (held)
+        return `${capital(named(setup, held))} holds ${groupOf(setup, move.callback).name}: `
+          + 'a mutually exclusive group runs one callback at a time.';
+      return '';
+    }
+    if (!run) return `${capital(thread)} runs nothing.`;
+    if (run.waits === 'answer') return `${capital(named(setup, run))} waits for an answer.`;
+    const now = step(setup, run);
+    if (run.until !== undefined && at < run.until)
+      return `${capital(named(setup, run))} is not done before ${run.until} s.`;
+    const left = stepsOf(setup, run).length - run.step;
+    const finished = left === 0 || (left === 1 && 'work' in now);
+    if (move.do === 'end') return finished ? '' : 'The callback has more to do.';
+    if (finished) return 'The callback has nothing more to do than to end.';
+    if (now.lock && state.locks[now.lock] !== undefined)
+      return `${now.lock} is locked: ${named(setup, runOf(state, state.locks[now.lock]))} has it.`;
+    return '';
+  }
+
+  const runOf = (state, id) => going(state).find(run => run.id === id);
+
+  // All moves that are allowed now. Where a schedule says what comes, the clock's move is one.
+  function moves(setup, state) {
+    const found = due(setup, state).slice(0, 1);
+    setup.threads.forEach((_, thread) => {
+      setup.callbacks.forEach((_, callback) => found.push({ do: 'take', callback, thread }));
+      state.asleep.forEach(({ id }) => found.push({ do: 'resume', run: id, thread }));
+      if (state.runs[thread]?.until === undefined)
+        found.push({ do: 'go', thread }, { do: 'end', thread });
+    });
+    return found.filter(move => !refusal(setup, state, move));
+  }
+
+  // Why does nobody take the oldest of a queue? '' where a thread may take it at once.
+  function cause(setup, state, callback) {
+    if (!setup.threads.length) return 'no executor';
+    if (!state.runs.includes(null)) {
+      if (state.runs.every(run => run.waits === 'answer')) return 'answer';
+      return state.runs.every(run => blocked(setup, state, run)) ? 'lock' : 'thread busy';
+    }
+    const held = holder(setup, state, callback);
+    if (!held) return '';
+    if (held.waits) return 'answer';
+    return blocked(setup, state, held) ? 'lock' : 'group busy';
+  }
+
+  function blocked(setup, state, run) {
+    const { lock } = step(setup, run) ?? {};
+    return lock !== undefined && state.locks[lock] !== undefined;
+  }
+
+  // Who can never go on: runs that wait in a circle. A sentence each says for what.
+  function circle(setup, state) {
+    const runs = going(state);
+    const free = new Set();
+    const can = run => !run || free.has(run.id);
+    const isOpen = callback => can(holder(setup, state, callback));
+    const hasThread = () => state.runs.some(can);
+    const canGo = run => {
+      if (run.waits === 'thread') return hasThread();
+      if (run.waits === 'answer') {
+        const { client, ...asks } = step(setup, run);
+        const service = asks.call ?? asks.await;
+        const asked = item => item.from?.run === run.id;
+        const working = runs.find(asked);
+        if (working?.callback === client) return can(working);
+        if (!hasThread() || !isOpen(client)) return false;
+        if (state.queues[client].some(asked)) return true;
+        return working ? can(working) : state.queues[service].some(asked) && isOpen(service);
+      }
+      return !blocked(setup, state, run)
+        || can(runOf(state, state.locks[step(setup, run).lock]));
+    };
+    for (let grown = true; grown; ) {
+      const before = free.size;
+      runs.filter(run => canGo(run)).forEach(run => free.add(run.id));
+      grown = free.size > before;
+    }
+    return runs.filter(run => !free.has(run.id)).map(run => ({
+      run: run.id,
+      callback: run.callback,
+      says: waitsFor(setup, state, run),
+    }));
+  }
+
+  function waitsFor(setup, state, run) {
+    const who = capital(named(setup, run));
+    if (run.waits !== 'answer')
+      return `${who} waits for the lock that `
+        + `${named(setup, runOf(state, state.locks[step(setup, run).lock]))} has.`;
+    const { client, ...asks } = step(setup, run);
+    const service = asks.call ?? asks.await;
+    const there = state.queues[client].some(item => item.from?.run === run.id);
+    const needed = there ? client : service;
+    const what = there ? 'The answer is there' : `The request waits for ${setup.callbacks[service].name}`;
+    const held = holder(setup, state, needed) ?? (there ? undefined : holder(setup, state, client));
+    if (!state.runs.includes(null)) return `${who} waits for an answer. ${what}, but no thread is free.`;
+    if (!held) return `${who} waits for an answer that never comes.`;
+    return `${who} waits for an answer. ${what}, but ${named(setup, held)} holds `
+      + `${groupOf(setup, held.callback).name}.`;
+  }
+
+  // Moves
+
+  function does(setup, state, move) {
+    if (move.do === 'arrive') return named(setup, move);
+    return `the end of ${named(setup, state.runs[move.thread])}`;
+  }
+
+  // Do a move to the state, and return the sentence that says which rule made it happen.
+  function advance(setup, state, move) {
+    const refused = refusal(setup, state, move);
+    if (refused) throw new Error(refused);
+    state.now = move.at ?? state.now;
+    switch (move.do) {
+      case 'arrive':
+        state.arrived += 1;
+        return `${capital(named(setup, move))} arrives. ${push(setup, state, move)}`;
+      case 'take':
+        return take(setup, state, move);
+      case 'resume': {
+        const index = state.asleep.findIndex(({ id }) => id === move.run);
+        const [run] = state.asleep.splice(index, 1);
+        run.waits = '';
+        state.runs[move.thread] = run;
+        nextStep(setup, state, run);
+        return `${capital(setup.threads[move.thread])} goes on with ${named(setup, run)}.`;
+      }
+      case 'go':
+        return go(setup, state, move.thread);
+      case 'end':
+        return end(setup, state, move.thread);
+    }
+    throw new Error(`There is no move ${move.do}.`);
+  }
+
+  function push(setup, state, { callback, seq, from }) {
+    const queue = state.queues[callback];
+    const { depth } = setup.callbacks[callback];
+    let says = '';
+    if (queue.length >= depth) {
+      const out = queue.shift();
+      state.lost.push({ callback, seq: out.seq, by: seq });
+      says = depth === 1
+        ? `One waits already, ${out.seq}, and is pushed out.`
+        : `${count(depth)} wait, so the oldest, ${out.seq}, is pushed out.`;
+    }
+    queue.push({ seq, from });
+    const why = {
+      '': says || 'A thread is free to take it.',
+      'no executor': 'No executor takes it.',
+      'thread busy': setup.threads.length === 1 ? 'It waits: the thread is busy.' : 'It waits: every thread is busy.',
+      'group busy': 'It waits: a thread is free, but its group is busy.',
+      answer: 'It waits for a callback that waits for an answer.',
+      lock: 'It waits for a callback that waits for a lock.',
+    };
+    return says || why[cause(setup, state, callback)];
+  }
+
+  function take(setup, state, { callback, thread }) {
+    const { seq, from } = state.queues[callback].shift();
+    const run = { id: state.started, callback, seq, from, thread, step: -1, waits: '' };
+    state.started += 1;
+    state.runs[thread] = run;
+    nextStep(setup, state, run);
+    const one = capital(`${setup.threads[thread]} is free and takes the oldest that waits, ${seq}.`);
+    const { exclusive, name } = groupOf(setup, callback);
+    const says = setup.callbacks.length > 1
+      ? capital(`${setup.threads[thread]} is free and takes ${named(setup, run)}.`) : one;
+    return exclusive && setup.threads.length > 1 ? `${says} Nobody else may run in ${name} now.` : says;
+  }
+
+  function nextStep(setup, state, run) {
+    run.step += 1;
+    const now = step(setup, run);
+    run.until = now?.work === undefined ? undefined : state.now + now.work;
+  }
+
+  function go(setup, state, thread) {
+    const run = state.runs[thread];
+    const who = capital(named(setup, run));
+    const now = step(setup, run);
+    let says = `${who} goes on.`;
+    if (now.read !== undefined) {
+      run.seen = state.values[now.read] ?? 0;
+      says = `${who} reads ${now.read}: ${run.seen}.`;
+    } else if (now.write !== undefined) {
+      const lost = (state.values[now.write] ?? 0) > run.seen;
+      state.values[now.write] = run.seen + 1;
+      says = `${who} writes ${now.write}: ${run.seen} + 1 = ${run.seen + 1}.`
+        + (lost ? ' Another callback had written since it read: that update is lost.' : '');
+    } else if (now.lock !== undefined) {
+      state.locks[now.lock] = run.id;
+      says = `${who} takes ${now.lock}. Nobody else can have it now.`;
+    } else if (now.unlock !== undefined) {
+      delete state.locks[now.unlock];
+      says = `${who} gives ${now.unlock} back.`;
+    } else if (now.client !== undefined) {
+      return ask(setup, state, run, now);
+    }
+    nextStep(setup, state, run);
+    return says;
+  }
+
+  function ask(setup, state, run, now) {
+    const service = now.call ?? now.await ?? now.send;
+    const who = `${capital(named(setup, run))} asks ${setup.callbacks[service].name}`;
+    push(setup, state, { callback: service, seq: run.seq, from: { run: run.id, client: now.client } });
+    if (now.send !== undefined) {
+      nextStep(setup, state, run);
+      return `${who} and does not wait.`;
+    }
+    run.waits = 'answer';
+    const asked = `${who} and waits`;
+    if (now.call !== undefined) return `${asked}: its thread and its group wait with it.`;
+    state.runs[run.thread] = null;
+    state.asleep.push(run);
+    return `${asked}: its thread is free again, its group is not.`;
+  }
+
+  function end(setup, state, thread) {
+    const run = state.runs[thread];
+    state.runs[thread] = null;
+    state.ended += 1;
+    const ends = `The callback of ${named(setup, run)} ends. ${capital(setup.threads[thread])} is free.`;
+    const { from } = run;
+    if (from && run.callback !== from.client) {
+      push(setup, state, { callback: from.client, seq: run.seq, from });
+      return `${ends} Its answer waits for ${setup.callbacks[from.client].name}.`;
+    }
+    const asker = from && runOf(state, from.run);
+    if (asker?.waits !== 'answer') return ends;
+    if (state.asleep.includes(asker)) {
+      asker.waits = 'thread';
+      return `${ends} ${capital(named(setup, asker))} has its answer, and needs a thread.`;
+    }
+    asker.waits = '';
+    nextStep(setup, state, asker);
+    return `${ends} ${capital(named(setup, asker))} has its answer.`;
+  }
+
+  // The same, and the state that came in stays as it was.
+  function apply(setup, state, move) {
+    const after = copy(state);
+    const says = advance(setup, after, move);
+    return { state: after, says };
+  }
+
+  // The move of an executor that never rests: what is due first, then the lowest free thread.
+  function eager(setup, state) {
+    const [first] = due(setup, state);
+    if (first && first.at <= state.now) return first;
+    return moves(setup, state).find(move => !isSame(move, first)) ?? first;
+  }
+
+  const isSame = (one, other) =>
+    other && one.do === other.do && one.thread === other.thread && one.seq === other.seq;
+
+  return { start, copy, due, refusal, moves, cause, circle, advance, apply, eager, named };
+}

@@ -1,0 +1,229 @@
+// A replay as a page shows it: lists that can be read, buttons, keys. What may happen is decided in
+// model.js; here each state is drawn. Nothing is global: many replays stand on a page.
+
+const MOST_ITEMS = 100; // of a list; what is more is counted
+const DELAYS = [800, 400, 200, 100, 50]; // ms a step, while it plays
+
+function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (typeof value === 'function') made[name] = value;
+    else if (value !== undefined) made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+// The lists of one run.
+function panel(run, record, picture, { span: [from, until], plot: [left, right] }) {
+  const list = name => element('ul', { 'aria-label': name, role: 'list', class: `replay-${name}` });
+  const [threads, groups, queue, lost] = ['threads', 'groups', 'queue', 'lost'].map(list);
+  const places = element('span', { 'aria-hidden': 'true' });
+  const time = element('span', { class: 'replay-time' });
+  const row = (name, ...content) => element('div', { class: 'replay-row' },
+    element('b', { 'aria-hidden': 'true' }, name), element('div', {}, ...content));
+  const cursor = element('span', { class: 'replay-cursor', 'aria-hidden': 'true' });
+  const shown = element('div', { class: 'replay-picture' }, picture, cursor);
+  const { setup } = record;
+  const { depth } = setup.callbacks[0];
+
+  function fill(target, items) {
+    while (target.children.length > items.length) target.lastChild.remove();
+    items.forEach(([text, kind = ''], index) => {
+      const item = target.children[index] ?? target.appendChild(element('li'));
+      if (item.textContent !== text) item.textContent = text;
+      if (item.className !== kind) item.className = kind;
+    });
+  }
+
+  const seqOf = item => setup.callbacks.length > 1 ? model.named(setup, item) : `${item.seq}`;
+
+  function draw(position) {
+    const { state, says } = run.seek(position);
+    fill(threads, setup.threads.length
+      ? setup.threads.map((name, i) => {
+        const it = state.runs[i];
+        if (!it) return [`${name}: free`];
+        return [`${name}: ${model.named(setup, it)}${it.waits ? ', waits' : ''}`, 'replay-busy'];
+      })
+      : [['no executor']]);
+    fill(groups, setup.groups.map(({ name, exclusive }, group) => {
+      const holders = [...state.runs, ...state.asleep].filter(
+        it => it && setup.callbacks[it.callback].group === group);
+      if (!exclusive) return [`${name}: lets all in`];
+      return holders.length
+        ? [`${name}: held by ${model.named(setup, holders[0])}`, 'replay-busy']
+        : [`${name}: free`];
+    }));
+    const waiting = setup.callbacks.flatMap((_, callback) =>
+      state.queues[callback].map(item => ({ ...item, callback })));
+    const more = waiting.length - MOST_ITEMS;
+    fill(queue, waiting.slice(0, MOST_ITEMS).map(item => [seqOf(item)])
+      .concat(more > 0 ? [[`and ${more} more`]] : []));
+    places.textContent = '';
+    const empty = setup.callbacks.length > 1 ? 0 : Math.min(depth, 40) - waiting.length;
+    for (let i = 0; i < empty; i += 1) places.append(element('i'));
+    const early = state.lost.length - MOST_ITEMS;
+    fill(lost, (early > 0 ? [[`${early} before`]] : []).concat(
+      state.lost.slice(-MOST_ITEMS).map(item => [seqOf(item)])));
+    time.textContent = `${state.now.toFixed(3)} s`;
+    const part = Math.min(Math.max((state.now - from) / (until - from), 0), 1);
+    cursor.style.left = `${100 * (left + part * (right - left))}%`;
+    return says;
+  }
+
+  const node = element('section', { class: 'replay-run', 'aria-label': record.name || undefined },
+    row(record.name || 'time', time),
+    row('threads', threads), row('groups', groups),
+    row('queue', queue, places), row('lost', lost), shown);
+  return { node, draw };
+}
+
+function show(root, record) {
+  const runs = record.runs.map(walk);
+  // Which run each step belongs to: the one whose next event comes first.
+  const order = [];
+  const counts = runs.map(() => [0]);
+  const next = runs.map(() => 0);
+  for (;;) {
+    let who = -1;
+    runs.forEach(({ times }, i) => {
+      if (next[i] < times.length && (who < 0 || times[next[i]] < runs[who].times[next[who]])) who = i;
+    });
+    if (who < 0) break;
+    order.push(who);
+    next[who] += 1;
+    counts.forEach((count, i) => count.push(next[i]));
+  }
+  const last = order.length;
+  let position = 0;
+  let playing = null;
+  let delay = 0;
+
+  const pictures = [...root.querySelectorAll('figure > img')];
+  const panels = record.runs.map((one, i) => panel(runs[i], one, pictures[i], record));
+  const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
+  const slider = element('input', {
+    type: 'range', min: 0, max: last, step: 1, 'aria-label': 'step', oninput: () => go(+slider.value),
+  });
+  const number = element('input', { type: 'number', min: 0, 'aria-label': 'message', onchange: find });
+  const button = (name, onclick, label) =>
+    element('button', { type: 'button', onclick, 'aria-label': label }, name);
+  const play = button('Play', toggle);
+  const faster = button('1×', () => {
+    delay = (delay + 1) % DELAYS.length;
+    faster.textContent = `${DELAYS[0] / DELAYS[delay]}×`;
+    if (playing) begin();
+  }, 'faster');
+  const loss = button('Next loss', () => go(nextLoss()));
+  const back = button('◀', () => go(position - 1), 'back');
+  const forth = button('▶', () => go(position + 1), 'forward');
+
+  function go(to) {
+    position = Math.min(Math.max(to, 0), last);
+    const texts = panels.map(({ draw }, i) => draw(counts[i][position]));
+    const who = order[position - 1];
+    const name = record.runs.length > 1 && position ? `${record.runs[who].name}: ` : '';
+    says.textContent = position ? name + texts[who] : 'Nothing has happened yet. Step forward: ▶ or →.';
+    slider.value = position;
+    slider.setAttribute('aria-valuetext', `step ${position} of ${last}`);
+    back.disabled = position === 0;
+    forth.disabled = position === last;
+    loss.disabled = playing === null && nextLoss() === undefined;
+    if (position === last) stop();
+  }
+
+  // After how many steps of all is the run's own step done?
+  function place(i, own) {
+    let low = 0;
+    for (let high = last; low < high; ) {
+      const middle = (low + high) >> 1;
+      if (counts[i][middle] < own) low = middle + 1;
+      else high = middle;
+    }
+    return low;
+  }
+
+  function nextLoss() {
+    const found = runs.flatMap((run, i) => {
+      const own = run.scan().losses.find(step => step > counts[i][position]);
+      return own === undefined ? [] : [place(i, own)];
+    });
+    return found.length ? Math.min(...found) : undefined;
+  }
+
+  // The next step, from here on and then from the start, that is about this message.
+  function find() {
+    const seq = +number.value;
+    const found = order.map((who, index) => [who, index + 1]).filter(
+      ([who, step]) => runs[who].scan().about[counts[who][step] - 1].includes(seq));
+    const [, step] = found.find(([, one]) => one > position) ?? found[0] ?? [];
+    if (step === undefined) says.textContent = `There is no message ${number.value}.`;
+    else go(step);
+  }
+
+  function begin() {
+    clearInterval(playing);
+    playing = setInterval(() => (root.isConnected ? go(position + 1) : stop()), DELAYS[delay]);
+    play.textContent = 'Pause';
+  }
+
+  function stop() {
+    clearInterval(playing);
+    playing = null;
+    play.textContent = 'Play';
+  }
+
+  function toggle() {
+    if (playing) return stop();
+    if (position === last) go(0);
+    begin();
+  }
+
+  // On a slide a clicker's keys step, too, and at the last step they walk on.
+  const onSlide = () => Boolean(document.body.dataset.jpDeckMode || root.closest('.reveal'));
+  const KEYS = {
+    ArrowRight: () => go(position + 1),
+    ArrowLeft: () => go(position - 1),
+    ' ': toggle,
+    Home: () => go(0),
+    End: () => go(last),
+    PageDown: () => go(position + 1),
+    PageUp: () => go(position - 1),
+  };
+
+  function leaves(key) {
+    return onSlide() && (position === last
+      ? ['ArrowRight', 'PageDown'].includes(key)
+      : position === 0 && ['ArrowLeft', 'PageUp'].includes(key));
+  }
+
+  function onKey(event) {
+    const { key, target } = event;
+    if (event.ctrlKey || event.metaKey || event.altKey || event.shiftKey || key === 'Tab') return;
+    if (leaves(key) || (key === 'Escape' && onSlide())) return;
+    event.stopPropagation(); // what is typed here is no command of JupyterLab
+    if (key.startsWith('Page') && !onSlide()) return;
+    if (!KEYS[key] || (key === ' ' && target.tagName === 'BUTTON')) return;
+    if (target === number) return;
+    event.preventDefault();
+    KEYS[key]();
+  }
+
+  root.classList.add('replay-on');
+  root.setAttribute('role', 'group');
+  root.setAttribute('aria-label', 'replay');
+  root.tabIndex = 0;
+  root.addEventListener('keydown', onKey);
+  root.querySelectorAll('figure').forEach(figure => figure.remove());
+  root.querySelector('.replay-on > p').after(
+    says,
+    element('div', { class: 'replay-controls' }, back, forth, play, faster, slider, loss,
+      element('label', {}, 'Message ', number)),
+    element('div', { class: 'replay-runs' }, ...panels.map(({ node }) => node)),
+  );
+  go(0);
+}
+
+const root = document.currentScript.closest('.replay');
+show(root, JSON.parse(root.dataset.record));

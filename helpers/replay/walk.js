@@ -1,0 +1,63 @@
+// A run that was recorded or predicted, put to any of its steps. No page here.
+
+const CHECKPOINT = 256; // moves between two states that are kept, of a run with many
+const DOES = ['arrive', 'take', 'end', 'go', 'resume'];
+const model = queueModel();
+
+// A record is {setup, moves, first}: the setup of model.js; moves in short, [microseconds, which of
+// DOES, and two numbers]; and how many moves lead to the part that is shown.
+function walk({ setup, moves, first }) {
+  const kept = [model.start(setup)];
+  let state = model.copy(kept[0]);
+  let at = 0; // moves that are done
+  let says = '';
+  let scanned;
+
+  function move(index) {
+    const [us, kind, one, other] = moves[index];
+    const made = { do: DOES[kind], at: us / 1e6 };
+    if (kind === 0) return { ...made, callback: one, seq: other };
+    if (kind === 4) return { ...made, run: one, thread: other };
+    return { ...made, callback: one, thread: other };
+  }
+
+  // Return the state after `step` moves of the part, and the sentence of the last one. The next
+  // call changes the state.
+  function seek(step) {
+    const to = step + first;
+    // From one before, because the sentence belongs to the last move.
+    const near = Math.min(Math.floor(Math.max(to - 1, 0) / CHECKPOINT), kept.length - 1);
+    if (to < at || near * CHECKPOINT > at) {
+      at = near * CHECKPOINT;
+      state = model.copy(kept[near]);
+    }
+    while (at < to) {
+      says = model.advance(setup, state, move(at));
+      at += 1;
+      if (at === kept.length * CHECKPOINT) kept.push(model.copy(state));
+    }
+    return { state, says: step ? says : '' };
+  }
+
+  // Return of each step the numbers that it is about, and which steps lose one.
+  function scan() {
+    if (scanned) return scanned;
+    scanned = { about: [], losses: [] };
+    const now = model.start(setup);
+    moves.forEach((_, index) => {
+      const made = move(index);
+      const item = made.do === 'arrive' ? made
+        : made.do === 'take' ? now.queues[made.callback][0] : now.runs[made.thread];
+      const before = now.lost.length;
+      model.advance(setup, now, made);
+      if (index < first) return;
+      scanned.about.push([item?.seq]);
+      if (now.lost.length === before) return;
+      scanned.about.at(-1).push(now.lost[before].seq);
+      scanned.losses.push(index + 1 - first);
+    });
+    return scanned;
+  }
+
+  return { setup, seek, scan, times: moves.slice(first).map(([us]) => us) };
+}

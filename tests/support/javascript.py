@@ -1,0 +1,75 @@
+"""The script of the replays, without its page, in a JavaScript engine."""
+
+import json
+from pathlib import Path
+
+import quickjs
+
+import helpers.replay
+
+FOLDER = Path(helpers.replay.__file__).parent
+GLUE = """
+// All states of a run, one a step from before the first, as a page could read them.
+function states(record) {
+  const run = walk(record);
+  return Array.from({ length: run.times.length + 1 }, (_, step) => {
+    const { state, says } = run.seek(step);
+    return {
+      now: state.now,
+      queue: state.queues[0].map(({ seq }) => seq),
+      threads: state.runs.map(it => it && it.seq),
+      lost: state.lost.map(({ seq, by }) => [seq, by]),
+      cause: model.cause(record.setup, state, 0),
+      says,
+    };
+  });
+}
+
+// The states of some steps, asked for in this order.
+const seek = (record, steps) => {
+  const run = walk(record);
+  return steps.map(step => {
+    const { state, says } = run.seek(step);
+    return JSON.parse(JSON.stringify([state.queues, state.lost, state.runs, says]));
+  });
+};
+const scan = record => walk(record).scan();
+
+// Play a setup until nothing is left to do; `prefer`, names of moves, says what is done first.
+function play(setup, prefer = []) {
+  let state = model.start(setup);
+  const done = [];
+  for (;;) {
+    const allowed = model.moves(setup, state);
+    const rank = move => (prefer.includes(move.do) ? prefer.indexOf(move.do) : prefer.length);
+    const move = prefer.length
+      ? allowed.sort((one, other) => rank(one) - rank(other))[0] : model.eager(setup, state);
+    if (!move) return { state, done, circle: model.circle(setup, state) };
+    const before = JSON.stringify(state);
+    const { state: after, says } = model.apply(setup, state, move);
+    if (JSON.stringify(state) !== before) throw new Error('apply changed the state it got');
+    done.push({ ...move, at: after.now, says });
+    state = after;
+  }
+}
+
+const after = (setup, moves) =>
+  moves.reduce((was, move) => model.apply(setup, was.state, move), { state: model.start(setup) });
+const refusal = (setup, moves, move) => model.refusal(setup, after(setup, moves).state, move);
+const last = (setup, moves) => after(setup, moves).says;
+"""
+
+
+class Script:
+    """model.js and walk.js. `call` gives and takes what JSON can say."""
+
+    def __init__(self) -> None:
+        self._context = quickjs.Context()
+        for name in ('model.js', 'walk.js'):
+            self._context.eval((FOLDER / name).read_text())
+        self._context.eval(GLUE)
+
+    def call(self, function: str, *arguments):
+        """Return what a function of GLUE returns."""
+        given = ', '.join(json.dumps(argument) for argument in arguments)
+        return json.loads(self._context.eval(f'JSON.stringify({function}({given}))'))

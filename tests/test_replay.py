@@ -1,0 +1,546 @@
+"""The rules of replays, in a JavaScript engine, against slow references and real runs."""
+
+import json
+import math
+import re
+import time
+from html import unescape
+from pathlib import Path
+from urllib.parse import unquote
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+from nbval.plugin import get_sanitize_patterns
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from support.javascript import Script
+from support.nodes import LIMIT_S, Listener, Talker, spin
+from support.runs import happenings, hear, heard, lose, made_table, swap
+
+from helpers.queue_model import explain, predict
+from helpers.recording import Recording
+from helpers.replay import replay, side_by_side
+from helpers.replay.picture import causes
+from helpers.session import ros_session
+from tools.lessons.lesson import lessons
+
+EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
+
+
+@pytest.fixture(scope='module')
+def script():
+    return Script()
+
+
+def tries(number):
+    """This many examples in `make test`, and as much more as a profile asks for."""
+    return settings(max_examples=number * settings.default.max_examples // 100)
+
+
+def html(shown):
+    return shown._repr_mimebundle_()['text/html']
+
+
+def record(shown, index=0):
+    """What the page gets, from the page."""
+    data = re.search("data-record='([^']*)'", html(shown))[1]
+    return json.loads(unescape(data))['runs'][index]
+
+
+def assert_is_the_run(states, table, depth):
+    """Each state is what the counts of arrivals and takes so far make of the table."""
+    published, taken_in_order = table['seq'].tolist(), heard(table)
+    rows = table.set_index('seq')
+    arrived, taken, lost = 0, [], []
+    for before, state in zip(states, states[1:], strict=False):
+        assert before['now'] <= state['now']
+        if 'arrives' in state['says']:
+            seq = published[arrived]
+            arrived += 1
+            assert state['says'].startswith(f'Message {seq} arrives.')
+            assert state['now'] >= rows.published_s[seq] - 1e-6
+            assert (arrived == len(published)) or state['now'] <= rows.published_s[
+                published[arrived]
+            ] + 1e-6
+            out = published[arrived - 1 - depth] if arrived > depth else None
+            if out is not None and math.isnan(rows.started_s[out]):
+                lost.append([out, seq])
+                assert f', {out}, ' in state['says']
+        elif 'takes' in state['says']:
+            seq = taken_in_order[len(taken)]
+            assert f', {seq}.' in state['says']
+            assert seq not in before['threads']
+            assert seq in state['threads']
+            assert state['now'] <= rows.started_s[seq] + 1e-6
+            taken.append(seq)
+        else:
+            (ended,) = set(before['threads']) - set(state['threads']) - {None}
+            assert state['now'] == pytest.approx(rows.finished_s[ended], abs=1e-6)
+            assert f'message {ended} ends' in state['says']
+        gone = {*taken, *(seq for seq, _ in lost)}
+        assert state['queue'] == [seq for seq in published[:arrived] if seq not in gone]
+        assert len(state['queue']) <= depth
+        assert state['lost'] == lost
+        running = [seq for seq in state['threads'] if seq is not None]
+        assert set(running) <= set(taken)
+        assert len(set(running)) == len(running)
+    assert arrived == len(published)
+    assert taken == taken_in_order
+    assert [seq for seq, _ in lost] + states[-1]['queue'] == [
+        seq for seq in published if seq not in taken_in_order
+    ]
+
+
+# The rules against `predict`
+
+runs = st.tuples(
+    st.integers(1, 12),  # milliseconds
+    st.integers(0, 60),  # milliseconds
+    st.integers(1, 12),
+    st.integers(1, 9),
+    st.integers(1, 40),
+    st.booleans(),
+)
+
+
+@tries(260)
+@given(runs)
+@example((50, 200, 10, 1, 41, True))
+@example((50, 200, 10, 4, 41, False))
+@example((3, 0, 1, 4, 20, False))
+@example((1, 60, 1, 9, 30, True))
+def test_an_executor_that_never_rests_is_the_prediction(script, run):
+    period, callback, depth, threads, messages, exclusive = run
+    setup = {
+        'threads': [f'thread {number}' for number in range(1, threads + 1)],
+        'groups': [{'name': 'group', 'exclusive': exclusive}],
+        'callbacks': [{'name': 'topic', 'group': 0, 'depth': depth, 'does': [{'work': callback}]}],
+        'arrivals': [{'at': seq * period, 'callback': 0, 'seq': seq} for seq in range(messages)],
+    }
+    played = script.call('play', setup)
+    taken = [move['at'] for move in played['done'] if move['do'] == 'take']
+    lost = [out['seq'] for out in played['state']['lost']]
+    table = predict(period / 1000, callback / 1000, depth, 1 if exclusive else threads, messages)
+    assert [1000 * at for at in table['started_s'].dropna()] == pytest.approx(taken)
+    assert lost == table.loc[table['started_s'].isna(), 'seq'].tolist()
+    assert played['circle'] == []
+
+
+@tries(100)
+@given(runs)
+def test_a_prediction_is_a_walk(script, run):
+    period, callback, depth, threads, messages, exclusive = run
+    workers = 1 if exclusive else threads
+    table = predict(period / 1000, callback / 1000, depth, workers, messages)
+    group = EXCLUSIVE if exclusive else REENTRANT
+    states = script.call('states', record(replay(table, depth, threads, group)))
+    assert_is_the_run(states, table, depth)
+
+
+# Runs in which all is late by chance
+
+
+@tries(150)
+@given(happenings())
+def test_what_happened_is_a_walk(script, happening):
+    table, depth, workers = happening
+    group = EXCLUSIVE if workers == 1 else REENTRANT
+    threads = max(workers, table['thread'].nunique())
+    states = script.call('states', record(replay(table, depth, threads, group)))
+    assert_is_the_run(states, table, depth)
+
+
+@tries(100)
+@given(
+    happenings(), st.lists(st.sampled_from([lose, hear, swap]), min_size=1, max_size=2), st.data()
+)
+def test_what_cannot_have_happened_is_one_sentence(script, happening, changes, data):
+    table, depth, workers = happening
+    table = table.copy()
+    for change in changes:
+        assume(heard(table))
+        change(data.draw, table)
+    assume((table['started_s'].isna() | (table['started_s'] >= table['published_s'])).all())
+    found = [
+        sentence
+        for sentence in explain(table, depth, workers).contradictions
+        # These may be: a worker rests, and what was never heard still waits.
+        if 'a worker was free' not in sentence and 'was never heard' not in sentence
+    ]
+    group = EXCLUSIVE if workers == 1 else REENTRANT
+    threads = max(workers, table['thread'].nunique())
+    if found:
+        with pytest.raises(ValueError, match='message') as failure:
+            replay(table, depth, threads, group)
+        assert '\n' not in str(failure.value)
+    else:
+        states = script.call('states', record(replay(table, depth, threads, group)))
+        assert_is_the_run(states, table, depth)
+
+
+# Real runs
+
+
+@pytest.mark.parametrize(
+    ('threads', 'group', 'depth'),
+    [
+        (1, EXCLUSIVE, 1),
+        (1, REENTRANT, 4),
+        (4, EXCLUSIVE, 4),
+        (2, REENTRANT, 3),
+        (4, REENTRANT, 2),
+        (8, REENTRANT, 10),
+    ],
+)
+def test_what_rclpy_did_is_a_walk(script, threads, group, depth):
+    kind = {EXCLUSIVE: MutuallyExclusiveCallbackGroup, REENTRANT: ReentrantCallbackGroup}[group]
+    quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
+    recordings = []
+    with ros_session() as session:
+        for number in range(10):
+            topic = f'topic{number}'
+            talker = Talker(25, period_s=0.004, topic=topic)
+            listener = Listener(
+                lambda message: time.sleep(0.012),
+                depth,
+                topic,
+                callback_group=kind(),
+                event_callbacks=quiet,
+            )
+            recordings.append(Recording(talker.publisher, listener.subscription))
+            spin(session, listener, threads=threads)
+            spin(session, talker)
+        for recording in recordings:
+            recording.wait_until_complete(25, LIMIT_S)
+    for recording in recordings:
+        table = recording.table()
+        states = script.call('states', record(replay(table, depth, threads, group)))
+        assert_is_the_run(states, table, depth)
+
+
+# What else the rules say: sentences, causes, calls, locks
+
+
+def says(script, table, *options):
+    return [state['says'] for state in script.call('states', record(replay(table, *options)))]
+
+
+def test_sentences_of_the_tutorial(script):
+    said = says(script, predict(0.05, 0.2, 10, 1, 41), 10)
+    assert said[:4] == [
+        '',
+        'Message 0 arrives. A thread is free to take it.',
+        'Thread 1 is free and takes the oldest that waits, 0.',
+        'Message 1 arrives. It waits: the thread is busy.',
+    ]
+    assert 'Message 14 arrives. Ten wait, so the oldest, 4, is pushed out.' in said
+    assert said[-1] == 'The callback of message 40 ends. Thread 1 is free.'
+
+
+@pytest.mark.parametrize(
+    ('threads', 'group', 'said'),
+    [
+        (2, REENTRANT, 'Message 2 arrives. It waits: every thread is busy.'),
+        (2, EXCLUSIVE, 'Message 2 arrives. It waits: a thread is free, but its group is busy.'),
+    ],
+)
+def test_sentences_with_two_threads(script, threads, group, said):
+    workers = 1 if group == EXCLUSIVE else threads
+    assert said in says(script, predict(1, 10, 3, workers, 9), 3, threads, group)
+    one_place = says(script, predict(1, 10, 1, workers, 9), 1, threads, group)
+    assert 'Message 3 arrives. One waits already, 2, and is pushed out.' in one_place
+
+
+ORDERS = [], ['resume', 'go', 'end', 'take'], ['take', 'end', 'resume', 'go']
+
+
+def services(threads, groups, does):
+    """A timer asks a service of another node, as lesson 06 does. The tick is there at the start."""
+    exclusive = groups != 'Reentrant'
+    return {
+        'threads': [f'thread {number + 1}' for number in range(threads)],
+        'groups': [{'name': name, 'exclusive': exclusive} for name in ('driver', 'own')]
+        + [{'name': 'camera', 'exclusive': True}],
+        'callbacks': [
+            {'name': 'timer', 'word': 'tick', 'group': 0, 'depth': 1, 'does': [does, {'work': 1}]},
+            {'name': 'look', 'word': 'request', 'group': 2, 'depth': 10, 'does': [{'work': 1}]},
+            {
+                'name': 'client',
+                'word': 'answer',
+                'group': 1 if groups == 'two groups' else 0,
+                'depth': 10,
+                'does': [],
+            },
+        ],
+        'arrivals': [{'at': 0, 'callback': 0, 'seq': 0}],
+    }
+
+
+def lesson_06():
+    """Return what the real rclpy did in the table of lesson 06, as it is saved there."""
+    name = 'call_a_service_from_a_callback'
+    (lesson,) = (one for one in lessons() if one.name == name)
+    for cell in lesson.notebook.cells:
+        for output in cell.get('outputs', []):
+            text = output.get('data', {}).get('text/plain', '')
+            if 'done callback' in text and 'Reentrant' in text:
+                return re.findall('yes|no', text.partition('\n')[2].replace('one', ''))
+    raise LookupError('Lesson 06 has no table of call, await and done callback.')
+
+
+def test_who_gets_an_answer_is_what_rclpy_did(script):
+    found = []
+    for threads in (1, 2):
+        for groups in ('one group', 'two groups', 'Reentrant'):
+            for does in ('call', 'await', 'send'):
+                setup = services(threads, groups, {does: 1, 'client': 2})
+                for prefer in ORDERS:
+                    played = script.call('play', setup, prefer)
+                    taken = [(move['do'], move.get('callback')) for move in played['done']]
+                    answered = ('take', 2) in taken
+                    # No order of moves changes it, and who can never go on is known.
+                    assert bool(played['circle']) != answered
+                    going_on = any(played['state']['runs']) or any(played['state']['asleep'])
+                    assert going_on != answered
+                found.append('yes' if answered else 'no')
+    assert found == lesson_06()
+
+
+def test_a_circle_is_said(script):
+    one_group = script.call('play', services(2, 'one group', {'call': 1, 'client': 2}))
+    assert [it['says'] for it in one_group['circle']] == [
+        'Tick 0 of timer waits for an answer. '
+        'The answer is there, but tick 0 of timer holds driver.'
+    ]
+    one_thread = script.call('play', services(1, 'two groups', {'call': 1, 'client': 2}))
+    assert [it['says'] for it in one_thread['circle']] == [
+        'Tick 0 of timer waits for an answer. The request waits for look, but no thread is free.'
+    ]
+    said = [move['says'] for move in one_thread['done']]
+    assert said[-1] == 'Tick 0 of timer asks look and waits: its thread and its group wait with it.'
+
+
+def counting(*does):
+    return {
+        'threads': ['thread 1', 'thread 2'],
+        'groups': [{'name': 'group', 'exclusive': False}],
+        'callbacks': [{'name': 'topic', 'group': 0, 'depth': 9, 'does': does}],
+    }
+
+
+ARRIVALS = [{'do': 'arrive', 'callback': 0, 'seq': seq} for seq in range(2)]
+TAKES = [{'do': 'take', 'callback': 0, 'thread': thread} for thread in range(2)]
+
+
+def test_an_update_is_lost_without_a_lock_and_never_with_one(script):
+    update = [{'read': 'count'}, {'write': 'count'}]
+    eager = ['arrive', 'take', 'go', 'end']
+    arrivals = [{'at': 0, 'callback': 0, 'seq': seq} for seq in range(2)]
+    bare = script.call('play', counting(*update) | {'arrivals': arrivals}, eager)
+    assert [m['thread'] for m in bare['done'] if m['do'] == 'go'] == [0, 0, 1, 1]
+    assert bare['state']['values'] == {'count': 2}
+    go = [{'do': 'go', 'thread': thread} for thread in (0, 1, 0)]
+    moves = [*ARRIVALS, *TAKES, *go]
+    assert script.call('refusal', counting(*update), moves, {'do': 'go', 'thread': 1}) == ''
+    said = script.call('last', counting(*update), [*moves, {'do': 'go', 'thread': 1}])
+    assert said == (
+        'Message 1 writes count: 0 + 1 = 1. '
+        'Another callback had written since it read: that update is lost.'
+    )
+    locked = counting({'lock': 'lock'}, *update, {'unlock': 'lock'})
+    refused = script.call('refusal', locked, [*ARRIVALS, *TAKES, go[0]], {'do': 'go', 'thread': 1})
+    assert refused == 'lock is locked: message 0 has it.'
+    played = script.call('play', locked | {'arrivals': arrivals}, eager)
+    assert played['state']['values'] == {'count': 2}
+    assert played['state']['locks'] == {}
+
+
+@pytest.mark.parametrize(
+    ('moves', 'move', 'said'),
+    [
+        ([], TAKES[0], 'Nothing waits there.'),
+        ([], {'do': 'end', 'thread': 0}, 'Thread 1 runs nothing.'),
+        ([], {'do': 'take', 'callback': 0, 'thread': 2}, 'There is no such thread.'),
+        (
+            [*ARRIVALS, TAKES[0]],
+            TAKES[0],
+            'Thread 1 is busy with message 0: a thread runs one callback at a time.',
+        ),
+        (
+            [*ARRIVALS, TAKES[0]],
+            TAKES[1],
+            'Message 0 holds group: a mutually exclusive group runs one callback at a time.',
+        ),
+        ([*ARRIVALS, TAKES[0]], {'do': 'go', 'thread': 0}, 'The callback has nothing more to do'),
+        ([ARRIVALS[0] | {'at': 2}], ARRIVALS[1] | {'at': 1}, 'Time does not run backwards'),
+    ],
+)
+def test_a_move_is_refused_with_the_rule(script, moves, move, said):
+    setup = counting({'work': None})
+    setup['groups'][0]['exclusive'] = True
+    del setup['callbacks'][0]['does']
+    assert script.call('refusal', setup, moves, move).startswith(said)
+
+
+def test_the_clock_comes_first(script):
+    setup = counting({'work': 2})
+    setup['arrivals'] = [{'at': at, 'callback': 0, 'seq': at} for at in range(4)]
+    moves = [{'do': 'arrive', 'callback': 0, 'seq': 0, 'at': 0}, TAKES[0]]
+    end = {'do': 'end', 'thread': 0, 'at': 2}
+    assert script.call('refusal', setup, moves, end) == 'Not yet: message 1 comes first.'
+    early = script.call('refusal', setup, moves, end | {'at': 1})
+    assert early == 'Message 0 is not done before 2 s.'
+
+
+# What a page gets
+
+
+def test_any_step_in_any_order_is_the_same(script):
+    table = predict(0.01, 0.025, 5, 1, 700)  # more moves than lie between two states that are kept
+    run = record(replay(table, 5))
+    last = len(run['moves'])
+    steps = [last, 0, 1, 256, 257, 255, 512, last, 3, 1024, last - 1]
+    there = script.call('seek', run, steps)
+    assert there == [script.call('seek', run, [step])[0] for step in steps]
+    losses = script.call('scan', run)['losses']
+    lost = table.loc[table['started_s'].isna(), 'seq'].tolist()
+    found = [state[1][-1]['seq'] for state in script.call('seek', run, losses)]
+    assert found == lost
+
+
+def test_of_each_step_the_numbers_are_known(script):
+    run = record(replay(predict(0.05, 0.2, 10, 1, 41), 10))
+    about = script.call('scan', run)['about']
+    assert about[:4] == [[0], [0], [1], [2]]
+    assert [14, 4] in about
+
+
+@pytest.mark.parametrize('threads', [1, 3])
+def test_a_part_is_as_in_the_whole(script, threads):
+    table = predict(0.01, 0.05, 4, threads, 60)
+    group = REENTRANT
+    whole = script.call('states', record(replay(table, 4, threads, group)))
+    part = script.call('states', record(replay(table, 4, threads, group, part=(20, 30))))
+    begin = next(i for i, s in enumerate(whole) if s['says'].startswith('Message 20 arrives')) - 1
+    for here, there in zip(part[1:], whole[begin + 1 :], strict=False):
+        assert {**here, 'lost': []} == {**there, 'lost': []}
+    lost = [seq for seq, _ in part[-1]['lost']]
+    assert set(range(20, 31)) & set(lost) == set(range(20, 31)) - set(heard(table))
+    assert not set(part[-1]['queue']) & set(range(31))
+    assert '11 messages' in str(replay(table, 4, threads, group, part=(20, 30)))
+
+
+def test_where_nothing_was_heard(script):
+    table = made_table([0, 1, 2, 3], {})
+    shown = replay(table, depth=2)
+    assert str(shown) == 'Replay: 4 messages, depth 2, no executor. None was heard.'
+    states = script.call('states', record(shown))
+    assert states[1]['says'] == 'Message 0 arrives. No executor takes it.'
+    assert (states[-1]['queue'], states[-1]['lost']) == ([2, 3], [[0, 2], [1, 3]])
+    assert {state['cause'] for state in states} == {'no executor'}
+    assert 'waits, no executor' in svg(shown)
+
+
+def test_a_callback_that_goes_on(script):
+    table = made_table([0, 1], {0: (0, math.nan, 'thread 1')})
+    states = script.call('states', record(replay(table, depth=2)))
+    assert (states[-1]['threads'], states[-1]['queue']) == ([0], [1])
+
+
+# The picture and the page
+
+
+def svg(shown, index=0):
+    return unquote(re.findall(r'src="data:image/svg\+xml,([^"]*)"', html(shown))[index])
+
+
+@pytest.mark.parametrize(
+    ('threads', 'group', 'cause'),
+    [
+        (1, EXCLUSIVE, 'waits, thread busy'),
+        (3, EXCLUSIVE, 'waits, group busy'),
+        (2, REENTRANT, 'waits, thread busy'),
+    ],
+)
+def test_the_picture_shows_why_messages_wait(script, threads, group, cause):
+    workers = 1 if group == EXCLUSIVE else threads
+    table = predict(0.05, 0.2, 3, workers, 30)
+    shown = replay(table, 3, threads, group)
+    drawn = svg(shown)
+    assert set(re.findall('waits, [a-z ]+', drawn)) == {cause}
+    assert drawn.count('m-3-3') == table['started_s'].isna().sum()
+    # As the rules say it, at every step.
+    run = shown.runs[0]
+    phases = causes(run.events, threads, group == EXCLUSIVE)
+    for state in script.call('states', run.record())[1:]:
+        known = [name for at, name in phases if at <= state['now'] + 1e-9]
+        later = [name for at, name in phases if abs(at - state['now']) < 1e-9]
+        assert state['cause'] in {known[-1], *later, *known[-1 - len(later) :]}
+    assert ElementTree.fromstring(drawn).get('width') == '760'
+
+
+def test_two_runs_side_by_side():
+    slow, fast = predict(0.05, 0.2, 10, 1, 41), predict(0.05, 0.2, 10, 8, 41)
+    both = side_by_side({'A': replay(slow, 10), 'D': replay(fast, 10, 8, REENTRANT)})
+    assert str(both) == (
+        'A: 41 messages, depth 10, one thread. Some were lost. '
+        'D: 41 messages, depth 10, 8 threads, a reentrant group. None was lost.'
+    )
+    pictures = [ElementTree.fromstring(svg(both, index)) for index in (0, 1)]
+    assert len({(one.get('width'), one.get('height')) for one in pictures}) == 1
+    assert [record(both, index)['name'] for index in (0, 1)] == ['A', 'D']
+
+
+def test_what_nbval_compares_does_not_move():
+    slow, slower = predict(0.05, 0.2, 10, 1, 41), predict(0.05, 0.21, 10, 1, 41)
+    rules = get_sanitize_patterns(Path(__file__).with_name('nbval_sanitize.cfg').read_text())
+    pages = [html(replay(table, 10)) for table in (slow, slower)]
+    assert pages[0] != pages[1]
+    for pattern, replacement in rules:
+        pages = [re.sub(pattern, replacement, page) for page in pages]
+    assert pages[0] == pages[1]
+    assert 'Some were lost' in pages[0]
+    assert 'function queueModel' in pages[0]
+
+
+def test_size():
+    page = html(replay(predict(0.05, 0.2, 10, 1, 41), 10))
+    assert len(page) <= 30_000
+    assert sum(map(len, re.findall('<script>(.*?)</script>', page, re.DOTALL))) <= 40_000
+    assert not re.search(r'https?://(?!www\.w3\.org)', page)
+
+
+BAD = predict(0.05, 0.2, 10, 1, 41)
+
+
+@pytest.mark.parametrize(
+    ('table', 'options', 'said'),
+    [
+        (BAD.iloc[:0], {}, 'The table is empty: it needs at least one row.'),
+        (BAD, {'depth': 0}, 'depth must be a whole number from 1 up, not 0.'),
+        (BAD, {'threads': 0}, 'threads must be a whole number from 1 up, not 0.'),
+        (BAD, {'group': 'x'}, "group must be 'mutually exclusive' or 'reentrant', not 'x'."),
+        (BAD, {'part': (50, 60)}, 'There is no message from 50 to 60.'),
+        (BAD, {'depth': 3}, 'No queue of depth 3 with one callback at a time can have made'),
+        (BAD.assign(thread=None), {}, 'It is not known which thread ran message 0.'),
+        (BAD.assign(finished_s=0.0), {}, 'The callback of message 1 ended before it started.'),
+        (
+            BAD.assign(published_s=BAD['published_s'][::-1].to_numpy()),
+            {},
+            'Message 1 was published before the one in front of it.',
+        ),
+        (predict(0.05, 0.2, 10, 3, 41), {}, 'Callbacks ran in 3 threads, more than threads=1.'),
+        (
+            predict(0.01, 0.005, 10, 1, 10_001),
+            {},
+            '10,001 messages are too many to step through. Ask for a part of 10,000 at most: '
+            'part=(0, 9999).',
+        ),
+    ],
+)
+def test_bad_input_is_one_sentence(table, options, said):
+    with pytest.raises(ValueError, match=f'^{re.escape(said)}') as failure:
+        replay(table, **{'depth': 10} | options)
+    assert '\n' not in str(failure.value)
