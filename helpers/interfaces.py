@@ -134,18 +134,18 @@ def _find(name: str) -> Path:
         if file.is_file():
             return file
     near = _nearest(str(name))
-    hint = f'The nearest: {", ".join(near)}.' if near else 'list_interfaces() prints all names.'
+    hint = f'The nearest: {near}.' if near else 'list_interfaces() prints all names.'
     raise ValueError(f'There is no interface {name!r}. {hint}')
 
 
-def _nearest(name: str) -> list[str]:
-    """The names most like `name`: first those that differ only in package, kind or case."""
+def _nearest(name: str) -> str:
+    """The name most like `name`, rather one that differs only in package, kind or case, or ''."""
     lower = {known.lower(): known for known in installed_names()}
     last = name.lower().rpartition('/')[2]
     same = [known for known in lower if known.rpartition('/')[2] == last]
-    same = difflib.get_close_matches(name.lower(), same, cutoff=0)
-    close = difflib.get_close_matches(name.lower(), lower)
-    return [lower[known] for known in dict.fromkeys([*same, *close])][:3]
+    near = difflib.get_close_matches(name.lower(), same, cutoff=0)
+    near = near or difflib.get_close_matches(name.lower(), lower)
+    return lower[near[0]] if near else ''
 
 
 # --- show and dependencies ---

@@ -119,11 +119,12 @@ class Session:
             self._shared.enter_context(share_domain_id(self._domain_id))
         configure_discovery(self._discovery)
         self.environment = domain_variables(self._domain_id, self._discovery)
-        self._context = rclpy.get_default_context()
-        _open_session = self
         try:
-            self._initialise()
-        except BaseException as failure:  # interrupted: nobody will close it
+            with uninterrupted():
+                self._context = rclpy.get_default_context()
+                _open_session = self
+                self._initialise()
+        except BaseException as failure:  # nobody will close it
             clear_frames(failure.__traceback__)
             self._clean_up()
             raise
@@ -279,33 +280,26 @@ class Session:
 
     def __exit__(self, exception_type, exception, traceback) -> None:
         __tracebackhide__ = True
-        if isinstance(exception, KeyboardInterrupt):
-            # What was half made is in the frames alone, and the traceback keeps them.
-            clear_frames(traceback)
-        self._ended_by_exception = exception is not None
-        try:
-            self._close()
-        except BaseException as failure:
-            if exception is None:
-                raise
-            if failure is not exception:
-                exception.add_note(f'While the session closed: {failure!r}')
+        with uninterrupted():
+            if isinstance(exception, KeyboardInterrupt):
+                # What was half made is in the frames alone, and the traceback keeps them.
+                clear_frames(traceback)
+            self._ended_by_exception = exception is not None
+            try:
+                self._close()
+            except BaseException as failure:
+                if exception is None:
+                    raise
+                if failure is not exception:
+                    exception.add_note(f'While the session closed: {failure!r}')
 
     def _close(self) -> None:
-        """Clean up, then say what went wrong: an interrupt, a failure, a callback without end."""
+        """Clean up, then say what went wrong: a failure, or a callback without end."""
         __tracebackhide__ = True
         if self._closed:
             return
-        deadline = time.monotonic() + CLOSE_TIMEOUT_S
-        interrupt = None
-        while not self._closed:
-            try:
-                self._clean_up(deadline)
-            except KeyboardInterrupt as error:  # clean up first
-                interrupt = error
+        self._clean_up()
         self._rosout.print_warnings()
-        if interrupt is not None:
-            raise interrupt
         if self._failures:
             raise self._failures[0]
         stuck = [thread.name for thread in self._threads() if thread.is_alive()]
@@ -315,12 +309,12 @@ class Session:
                 'callback end, or restart the kernel.'
             )
 
-    def _clean_up(self, deadline: float | None = None) -> None:
-        """End all that this session has begun. Every step can be repeated after an interrupt."""
+    def _clean_up(self) -> None:
+        """End all that this session has begun."""
         global _open_session
         if self._closed:
             return
-        self._end_threads(deadline or time.monotonic() + CLOSE_TIMEOUT_S)
+        self._end_threads(time.monotonic() + CLOSE_TIMEOUT_S)
         self._collect_failures()
         for executor in self._spinning:
             rclpy_private.cancel_tasks(executor)

@@ -170,8 +170,9 @@ DEFINITIONS = [
 
 
 @pytest.mark.parametrize(('old', 'new', 'missing', 'error'), DEFINITIONS)
-def test_a_definition_with_a_mistake(package, old, new, missing, error):
+def test_a_definition_with_a_mistake(package, old, new, missing, error, capsys):
     ((file, what, answer),) = check_package(package(edited('srv/TurnCamera.srv', old, new)))
+    assert capsys.readouterr() == ('', '')  # the parser itself prints
     assert file == 'srv/TurnCamera.srv'
     assert what == missing
     assert error in answer

@@ -3,7 +3,6 @@
 import math
 import re
 import threading
-import time
 
 import numpy as np
 import pandas as pd
@@ -404,34 +403,6 @@ def test_last_messages_that_were_never_heard():
 
 
 # Real runs: rclpy and Fast DDS
-
-
-def record(messages, period_s, callback_s, threads):
-    group = ReentrantCallbackGroup() if threads > 1 else None
-    with ros_session() as session:
-        talker = Talker(messages, period_s)
-        listener = Listener(lambda message: time.sleep(callback_s), callback_group=group)
-        recording = Recording(talker.publisher, listener.subscription)
-        spin(session, listener, threads=threads)
-        spin(session, talker)
-        recording.wait_until_complete(messages, LIMIT_S)
-    return recording.table()
-
-
-@pytest.mark.parametrize(
-    ('messages', 'period_s', 'callback_s', 'threads'),
-    [(41, 0.005, 0.03, 1), (30, 0.02, 0.1, 8)],
-)
-def test_real_run_is_explained(messages, period_s, callback_s, threads):
-    table = record(messages, period_s, callback_s, threads)
-    explanation = explain(table, 10, threads)
-    assert explanation.complete, f'{explanation}\n{table.to_string()}'
-    assert explanation.lost == messages - len(heard(table))
-    if threads == 1:
-        assert explanation.lost > 0
-    # A message less is always noticed: the last ten cannot have been pushed out.
-    for seq in range(messages - 10, messages):
-        assert not explain(without(table, seq), 10, threads).complete
 
 
 class Gates:

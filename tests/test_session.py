@@ -3,13 +3,17 @@
 import contextlib
 import gc
 import signal
+import sys
 import threading
 import time
 import traceback
 import warnings
+from collections import Counter
 
 import pytest
 import rclpy
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
 from rclpy.action import ActionClient, ActionServer
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import InvalidHandle, InvalidNodeNameException
@@ -20,6 +24,8 @@ from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 from support.processes import run_python, running, traces
 from test_msgs.action import Fibonacci
 
+import helpers.session
+from helpers import domain, interrupts, rclpy_private, rosout
 from helpers.domain import configure_discovery, reserve_domain_id
 from helpers.session import current_session, ros_session
 
@@ -399,15 +405,6 @@ def test_waiting_ends_with_a_callback_failure(threads, wait):
     assert not hasattr(failure.value, '__notes__')
 
 
-def test_failure_in_a_service():
-    with pytest.raises(ZeroDivisionError) as failure, ros_session() as session:
-        asker = Asker('call', groups=2)
-        spin(session, asker, Answerer(failing_callback), threads=2)
-        session.wait_until(lambda: asker.answer, LIMIT_S)
-    assert 'failing_callback' in frames(failure.value)
-    assert asker.answer is None
-
-
 @EXECUTORS
 def test_failure_of_the_body_comes_first(threads):
     done = threading.Event()
@@ -524,81 +521,97 @@ def test_interrupt():
     assert (process.returncode, out, err) == (0, '', '')
 
 
-def test_interrupt_of_a_deadlock():
-    with pytest.raises(KeyboardInterrupt), ros_session() as session:
-        asker = Asker()
-        executor = spin(session, asker, Answerer())
-        session.wait_until(lambda: asker.asked, LIMIT_S)
-        session.wait_until_quiet(executor)
-        session.wait_until(lambda: signal.raise_signal(signal.SIGINT), LIMIT_S)
-    assert asker.answer is None
-
-
-@EXECUTORS
-def test_interrupt_while_a_thread_starts(threads, monkeypatch):
-    start = threading.Thread.start
-
-    def interrupted_start(thread):
-        signal.raise_signal(signal.SIGINT)
-        start(thread)
-
-    with pytest.raises(KeyboardInterrupt) as interrupt, ros_session() as session:
-        listener = Listener()
-        with monkeypatch.context() as patch:
-            patch.setattr(threading.Thread, 'start', interrupted_start)
-            spin(session, listener, threads=threads)
-    assert not hasattr(interrupt.value, '__notes__')
-    assert destroyed(listener)
-
-
-def interrupt_once(monkeypatch, name):
-    """Replace a function by one that is interrupted when it is called first."""
-
-    def interrupted(*arguments, **options):
-        monkeypatch.undo()
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(name, interrupted)
-
-
-@pytest.mark.parametrize(
-    'name',
-    [
-        'threading.Thread.join',
-        'rclpy.executors.MultiThreadedExecutor.shutdown',
-        'helpers.rosout.Rosout.take',
-        'rclpy.node.Node.destroy_node',
-        'rclpy.try_shutdown',
-    ],
-)
-def test_interrupt_of_close(name, monkeypatch):
-    with pytest.raises(KeyboardInterrupt), ros_session() as session:
-        context, talker, listener = rclpy.get_default_context(), Talker(10**6), Listener()
+def cell():
+    """What the cell of a lesson does with a session."""
+    with ros_session() as session:
+        talker, listener = Talker(10**6), Listener()
         spin(session, talker, listener, threads=2)
         session.wait_until(lambda: listener.heard, LIMIT_S)
-        interrupt_once(monkeypatch, name)
-    assert not context.ok()
-    assert destroyed(talker)
-    assert destroyed(listener)
-    talk()
 
 
-@pytest.mark.parametrize(
-    'name',
-    [
-        'rclpy.node.Node.create_publisher',
-        'rclpy.node.ROSClock',
-        'rclpy.node.TimeSource',
-        'rclpy.node.ParameterService',
-        'rclpy.node.TypeDescriptionService',
-    ],
+# The module of this cell, ours, and those of rclpy that it calls.
+RUN_BY_A_CELL = (
+    *(sys.modules[__name__], domain, interrupts, rclpy_private, rosout, helpers.session),
+    *(rclpy, rclpy.context, rclpy.executors, rclpy.node, threading),
 )
-def test_interrupt_of_a_node_that_is_made(name, monkeypatch):
-    # As the notebook does that shows the traceback, `failure` keeps the half-made node alive.
-    with nothing_left(), pytest.raises(KeyboardInterrupt) as failure, ros_session():  # noqa: F841
-        interrupt_once(monkeypatch, name)
-        Node('half_made')
+
+
+def run_cell(before_line):
+    """Run the cell. Before each line call `before_line(frame, place)`.
+
+    A place is a file, a function, a line, and which time it is reached.
+    """
+    files, times = {module.__file__ for module in RUN_BY_A_CELL}, Counter()
+
+    def trace(frame, event, _):
+        code = frame.f_code
+        if code.co_filename not in files or code.co_name == 'find':  # 100,000 lines
+            return None
+        if event == 'line':
+            line = code.co_filename, code.co_name, frame.f_lineno
+            # Not at the end of a `with`, which has the same line: Python does not interrupt there.
+            begins = next(start for start, _, number in code.co_lines() if number == line[-1])
+            if frame.f_lasti == begins:
+                times[line] += 1
+                before_line(frame, (*line, times[line]))
+        return trace
+
+    sys.settrace(trace)
+    try:
+        cell()
+    finally:
+        sys.settrace(None)
+
+
+@pytest.fixture(scope='module')
+def places(started_once):
+    """Return where a cell can be interrupted, each line at most three times."""
+    found = []
+    run_cell(lambda _, place: found.append(place))
+    return [place for place in found if place[-1] <= 3]
+
+
+@settings(max_examples=settings.default.max_examples // 5)
+@given(data=st.data())
+def test_interrupt_anywhere(places, data):
+    place = data.draw(st.sampled_from(places))
+    reached, before = [], traces()
+
+    def interrupt(_, here):
+        if here == place:
+            reached.append(here)
+            signal.raise_signal(signal.SIGINT)
+
+    # As the notebook does that shows the traceback, `interrupted` keeps what its frames hold.
+    with pytest.raises(KeyboardInterrupt) as interrupted:
+        run_cell(interrupt)
+        assume(reached)  # a wait may have fewer rounds
+    assert not hasattr(interrupted.value, '__notes__')
+    # Between the lines of a `with` statement nobody can clean up: the next session does.
+    if place[1] not in ('__enter__', '__exit__'):
+        assert not rclpy.ok()
+        wait_for(lambda: traces() <= before)
     talk()
+    wait_for(lambda: traces() <= before)
+
+
+@pytest.mark.parametrize('function', ['_initialise', 'start', '_clean_up'])
+def test_interrupts_at_each_line_of_what_must_not_be_cut(function):
+    """A session that opens, a thread that starts, a session that closes."""
+    interrupted = []
+
+    def interrupt(frame, place):
+        caller = frame
+        while caller is not None and caller.f_code.co_name != function:
+            caller = caller.f_back
+        if caller is not None:
+            interrupted.append(place)
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt) as failure:
+        run_cell(interrupt)
+    assert len(interrupted) > 5
+    assert not hasattr(failure.value, '__notes__')
 
 
 def test_interrupt_between_a_publisher_and_its_node():
@@ -610,24 +623,6 @@ def test_interrupt_between_a_publisher_and_its_node():
     with nothing_left(), pytest.raises(KeyboardInterrupt) as failure, ros_session():  # noqa: F841
         node = Node('node')
         node.create_publisher(String, 'topic', 10, publisher_class=interrupted)
-    talk()
-
-
-@pytest.mark.parametrize(
-    'name',
-    [
-        'helpers.session.reserve_domain_id',
-        'rclpy.get_default_context',
-        'rclpy.init',
-        'helpers.session.Node',
-        'helpers.rosout.QoSProfile',
-        'rclpy.node.Node.get_logger',
-    ],
-)
-def test_interrupt_of_open(name, monkeypatch):
-    with nothing_left(), pytest.raises(KeyboardInterrupt) as failure:  # noqa: F841
-        interrupt_once(monkeypatch, name)
-        ros_session().__enter__()
     talk()
 
 

@@ -13,7 +13,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -210,14 +209,3 @@ def test_a_network_without_multicast(machines):
             assert heard_by(told) == ['robot']
             # Nodes announce themselves every 3 s.
             assert select.select([lost.stdout], [], [], 4) == ([], [], [])
-
-
-def test_nothing_is_left():
-    """The namespaces of a process that is killed are gone, and all that ran in them."""
-    with contextlib.ExitStack() as stack:
-        machine = Machine(stack)
-        namespaces = {os.readlink(f'/proc/{machine.pid}/ns/{kind}') for kind in ('net', 'mnt')}
-    for links in Path('/proc').glob('[0-9]*/ns'):
-        with contextlib.suppress(OSError):
-            assert not namespaces & {os.readlink(link) for link in links.iterdir()}
-    assert not Path('/proc', machine.pid).exists()
