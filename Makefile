@@ -21,7 +21,7 @@ test-tools: set_up ## the tools: an installation from nothing, the soak, the lic
 
 test-browser: ## the real JupyterLab in Chromium, as students and instructors use it; it takes minutes
 	@[ -n "$(CHROMIUM)" ] || { echo '$(no_chromium)' >&2; exit 1; }
-	@tools/set_up.sh browser
+	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
 	@CHROMIUM="$(CHROMIUM)" $(PYTHON) -m pytest -n 2 --dist worksteal --max-worker-restart 0 -o faulthandler_timeout=600 tests/browser $(PYTEST_ARGS)
 
 hub: ## a JupyterHub for a class on this machine; HUB_ARGS=... changes how. See teaching.md
@@ -41,6 +41,14 @@ lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04 puts it there;
 slides: set_up ## write the lessons as HTML slides into slides/, which need no network; LESSON=02 for one
 	@$(PYTHON) -m tools.lessons.export $(LESSON)
 
+site: set_up ## write the lessons and documents as a web site into site/, which needs no network
+	@tools/set_up.sh site
+	@$(PYTHON) -m tools.site
+
+book: set_up ## write the lessons as a book on paper into book.pdf; it takes minutes
+	@tools/set_up.sh site
+	@$(PYTHON) -m tools.site book
+
 sources: set_up ## print all external links of the lessons, each with the words that it backs
 	@$(PYTHON) -m tools.lessons.sources
 
@@ -58,18 +66,17 @@ lock: set_up ## write requirements.lock from pyproject.toml; UPGRADE=yes takes n
 	@tools/lock.sh .venv/bin/uv $(if $(filter yes,$(UPGRADE)),--upgrade)
 
 licences: ## write licences.md from the lock files and what the packages say
-	@tools/set_up.sh browser
-	@tools/set_up.sh hub
+	@for group in browser site hub; do tools/set_up.sh $$group; done
 	@$(PYTHON) -m tools.licences
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built
-	rm -rf .venv .jupyter .soak scratch slides .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv .jupyter .soak scratch slides site .site book.pdf .hypothesis .pytest_cache .ruff_cache
 	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-tools test-browser hub test-hub notebooks lesson slides sources soak bench lint \
+.PHONY: help lab present test test-tools test-browser hub test-hub notebooks lesson slides site book sources soak bench lint \
 	lock licences clean set_up
 
 PYTHON := .venv/bin/python

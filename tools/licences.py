@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / 'licences.md'
-LOCKS = ('requirements.lock', 'requirements-browser.lock', 'requirements-hub.lock')
+LOCKS = ('requirements.lock', 'requirements-browser.lock', 'requirements-site.lock', 'requirements-hub.lock')
 # What these say in a text or in their source only.
 STATED = {
     'empy': 'LGPL',

@@ -47,7 +47,7 @@ fi
 echo "requirements.lock: $(grep -c '^[a-z].*==' requirements.lock) pins, Python$pythons"
 
 constraints='--constraint requirements.lock'
-for group in browser hub; do
+for group in browser site hub; do
     resolve "requirements-$group.lock" --group "$group" $constraints "$@"
     {
         echo "# Made by \`make lock\` from the group \`$group\` of pyproject.toml. Do not edit."

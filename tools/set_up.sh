@@ -2,7 +2,7 @@
 # Make .venv and install requirements.lock and this project into it. Where .venv is up to date,
 # this does nothing. After an interruption the next call repairs what the last one left.
 # usage: tools/set_up.sh [GROUP]
-# The group, `browser` or `hub`, adds its requirements-GROUP.lock. Later calls keep it up to date.
+# The group, `browser`, `site` or `hub`, adds its requirements-GROUP.lock. Later calls keep it up to date.
 # usage: tools/set_up.sh --in FOLDER 3.12
 # The same in another folder of this checkout, with this Python.
 set -eu
@@ -23,7 +23,7 @@ exec 9< tools/set_up.sh
 ! command -v flock > /dev/null || flock 9 # two calls at once: the second waits
 
 locks=requirements.lock groups=
-for group in browser hub; do
+for group in browser site hub; do
     if [ "${1-}" = "$group" ] || [ -f "$venv/with_$group" ]; then
         locks="$locks requirements-$group.lock" groups="$groups $venv/with_$group"
     fi

@@ -77,7 +77,7 @@ def for_reveal(notebook: NotebookNode) -> NotebookNode:
             cell.metadata.transient = {'remove_source': folded(cell)}
             lines = len(cell.source.splitlines())
             tags += [f'more-than-{most}-lines' for most in CODE if lines > most]
-            cell.outputs = [output for output in cell.outputs if not _is_widget(output)]
+            cell.outputs = [output for output in cell.outputs if not is_widget(output)]
         if re.match('##? ', cell.source):  # a step begins, and its note is after the heading
             note = None
         cells.append(cell)
@@ -88,7 +88,7 @@ def for_reveal(notebook: NotebookNode) -> NotebookNode:
     return notebook
 
 
-def _is_widget(output: NotebookNode) -> bool:
+def is_widget(output: NotebookNode) -> bool:
     """Say whether an output is the text of a widget, such as `VBox(children=(...))`."""
     data = output.get('data', {})
     return set(data) == {'text/plain'} and bool(re.match(r'\w+\(children=', data['text/plain']))

@@ -1,0 +1,178 @@
+"""Write the lessons and the documents as a web site, or as a book on paper.
+
+    python -m tools.site           site/index.html, which needs no network when it is read
+    python -m tools.site book      book.pdf
+
+Sphinx and myst-nb make the pages from the saved outputs: nothing runs. What they read is prepared
+in .site/pages: the documents, and the notebooks with their notes and solutions folded, their
+figures as files, and a link to the lesson as it is.
+"""
+
+import hashlib
+import html
+import io
+import re
+import shutil
+import sys
+from base64 import b64decode
+from copy import deepcopy
+from pathlib import Path
+
+import nbformat
+from nbformat import NotebookNode
+from nbformat.v4 import new_markdown_cell
+from PIL import Image
+from sphinx.cmd.build import build_main
+
+from tools.lessons.export import fetch_packages, is_widget
+from tools.lessons.lesson import FOLDER, GLOSSARY, PARTS, ROOT, START, Lesson, lessons
+from tools.site.book import write as write_book
+
+HERE = Path(__file__).parent
+WORK = ROOT / '.site'
+DOCUMENTS = ('README', 'environment', 'teaching', 'CONTRIBUTING', 'licences')
+URDU = '@fontsource/noto-nastaliq-urdu/files/noto-nastaliq-urdu-arabic-400-normal.woff2'
+FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
+LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
+CONTENTS = """
+```{{toctree}}
+:hidden:
+:caption: {part}
+
+{pages}
+```
+"""
+
+
+def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
+    """Return a notebook as myst-nb shall read it, and write its figures into a folder."""
+    notebook, cells = deepcopy(notebook), []
+    for cell in notebook.cells:
+        if cell.cell_type == 'raw':
+            cell = _folded_note(cell.source)
+        elif cell.cell_type == 'code':
+            _fold(cell)
+            cell.outputs = [output for output in cell.outputs if not is_widget(output)]
+            for data in (output.get('data', {}) for output in cell.outputs):
+                if 'text/html' in data:
+                    data['text/html'] = _with_files(data['text/html'], figures)
+        cells.append(cell)
+    cells[0].source += f'\n\n<a href="{file}" download>Download this lesson as a notebook</a>'
+    notebook.cells = cells
+    notebook.metadata['language_info'] = {'name': 'python', 'pygments_lexer': 'cell'}
+    return notebook
+
+
+def _folded_note(source: str) -> NotebookNode:
+    summary, _, text = source.partition('\n')
+    return new_markdown_cell(
+        f'<details class="note"><summary>{html.escape(summary)}</summary>\n\n{text}\n\n</details>'
+    )
+
+
+def _fold(cell: NotebookNode) -> None:
+    """Fold the source of a solution, of a check, and of what is folded in JupyterLab."""
+    tags = set(cell.metadata.get('tags', []))
+    if 'check' in tags or cell.metadata.get('jupyter', {}).get('source_hidden'):
+        what = next(iter(tags & {'solution', 'check'}), 'code')
+        cell.metadata['mystnb'] = {
+            f'code_prompt_{verb}': f'{verb.capitalize()} the {what}' for verb in ('show', 'hide')
+        }
+        cell.metadata['tags'] = ['hide-input']
+
+
+def _with_files(text: str, figures: Path) -> str:
+    """Write the figures of an output into a folder, and return its HTML with links to them."""
+
+    def write(found: re.Match) -> str:
+        png = b64decode(found['png'])
+        image = Image.open(io.BytesIO(png))
+        name = f'{hashlib.sha256(png).hexdigest()[:16]}.webp'
+        image.save(figures / name, lossless=True)
+        size = f'width="{image.width}" height="{image.height}" loading="lazy"'
+        return f'<img {found["alt"]}{size} src="../_static/figures/{name}"'
+
+    return FIGURE.sub(write, text)
+
+
+def prepare(pages: Path, book: bool) -> None:
+    """Write what Sphinx reads into a folder. Raises ValueError where npm is missing or fails."""
+    packages = fetch_packages()
+    known = lessons()
+    shutil.rmtree(pages, ignore_errors=True)
+    static, notebooks = pages / 'static', pages / 'notebooks'
+    downloads, figures = pages / 'downloads' / 'notebooks', static / 'figures'
+    for folder in (figures, notebooks, downloads):
+        folder.mkdir(parents=True)
+    for lesson in known:
+        shutil.copy(FOLDER / lesson.file, downloads)
+        page = page_of(lesson.notebook, lesson.file, figures)
+        nbformat.write(page, notebooks / lesson.file)
+    shutil.copytree(FOLDER / 'images', notebooks / 'images')
+    for name in DOCUMENTS:
+        shutil.copy(ROOT / f'{name}.md', pages)
+    for file in _linked(pages):
+        (pages / file).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / file, pages / file)
+    shutil.copy(HERE / 'conf.py', pages)
+    for file in (*HERE.glob('*.css'), packages / URDU):
+        shutil.copy(file, static)
+    parts = _parts(known)
+    first = _printed_contents(parts, known) if book else (HERE / 'index.md').read_text('utf-8')
+    toctrees = (CONTENTS.format(part=part, pages='\n'.join(parts[part])) for part in parts)
+    (pages / 'index.md').write_text(first + ''.join(toctrees), encoding='utf-8')
+
+
+def _linked(pages: Path) -> set[str]:
+    """Return the files of the checkout to which the pages link and which are no pages."""
+    texts = (path.read_text(encoding='utf-8') for path in pages.rglob('*.[mi]*'))
+    links = {link for text in texts for link in LINK.findall(text)}
+    is_page = ('.md', '.ipynb', '.png')
+    return {link for link in links if (ROOT / link).is_file() and not link.endswith(is_page)}
+
+
+def _parts(known: list[Lesson]) -> dict[str, list[str]]:
+    """Return the pages by the parts of the table of contents."""
+    parts: dict[str, list[str]] = {'Start': []} | {part.capitalize(): [] for part in PARTS}
+    names = {START: 'Start', GLOSSARY: 'Terms'}
+    for one in known:
+        part = names.get(one.number) or one.part.capitalize()
+        parts.setdefault(part, []).append(f'notebooks/{Path(one.file).stem}')
+    return parts | {'Documents': list(DOCUMENTS)}
+
+
+def _printed_contents(parts: dict[str, list[str]], known: list[Lesson]) -> str:
+    titles = {f'notebooks/{Path(one.file).stem}': f'{one.number} {one.title}' for one in known}
+    rows = [
+        f'- [{titles[page]}]({page}.ipynb)' if page in titles else f'- [{page}]({page}.md)'
+        for part in parts
+        for page in parts[part]
+    ]
+    return '\n'.join(['# ROS 2 in notebooks', '', ':::{container} contents', *rows, ':::', ''])
+
+
+def main(arguments: list[str]) -> int:
+    """Write the site or the book; return the exit status."""
+    book = arguments == ['book']
+    pages, made = WORK / 'pages', WORK / 'made'
+    kind = ['singlehtml', '-D', 'html_theme=basic'] if book else ['html']
+    try:
+        prepare(pages, book)
+        shutil.rmtree(made, ignore_errors=True)
+        options = ['-q', '-W', '--keep-going', '-E', '-d', f'{WORK}/trees', '-b', *kind]
+        if status := build_main([*options, str(pages), str(made)]):
+            return status
+        if book:
+            output = write_book(made / 'index.html', ROOT / 'book.pdf')
+        else:
+            shutil.rmtree(ROOT / 'site', ignore_errors=True)
+            output = made.rename(ROOT / 'site') / 'index.html'
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 1
+    print(f'{output.relative_to(ROOT)} is written. It needs no network.')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))

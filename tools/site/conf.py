@@ -1,0 +1,31 @@
+"""Sphinx's settings for `make site`. tools/site/__main__.py prepares what is read here."""
+
+from tools.site.lexer import CellLexer
+
+project = 'ROS 2 in notebooks'
+language = 'en'
+extensions = ['myst_nb']
+exclude_patterns = []
+
+nb_execution_mode = 'off'  # the outputs are the saved ones
+nb_merge_streams = True
+nb_number_source_lines = False
+myst_heading_anchors = 4
+suppress_warnings = ['mystnb.unknown_mime_type']
+
+html_theme = 'furo'
+html_title = project
+html_static_path = ['static']
+html_css_files = ['site.css', 'book.css']
+html_extra_path = ['downloads']
+html_copy_source = False
+html_show_sphinx = False
+html_show_copyright = False
+html_permalinks_icon = '#'
+pygments_style = 'a11y-high-contrast-light'
+pygments_dark_style = 'a11y-high-contrast-dark'
+
+
+def setup(app):
+    """Colour a cell that writes a file as the file's language."""
+    app.add_lexer('cell', CellLexer)
