@@ -66,7 +66,7 @@ lock: set_up ## write requirements.lock from pyproject.toml; UPGRADE=yes takes n
 	@tools/lock.sh .venv/bin/uv $(if $(filter yes,$(UPGRADE)),--upgrade)
 
 licences: ## write licences.md from the lock files and what the packages say
-	@for group in browser site hub; do tools/set_up.sh $$group; done
+	@for group in browser site hub; do tools/set_up.sh $$group || exit; done
 	@$(PYTHON) -m tools.licences
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built

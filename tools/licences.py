@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / 'licences.md'
-LOCKS = ('requirements.lock', 'requirements-browser.lock', 'requirements-site.lock', 'requirements-hub.lock')
+LOCKS = sorted(ROOT.glob('requirements*.lock'))
 # What these say in a text or in their source only.
 STATED = {
     'empy': 'LGPL',
@@ -32,7 +32,7 @@ Made by `make licences` from what the packages say about themselves.
 This repository is under [Apache-2.0](LICENSE) and holds none of these packages: each machine gets
 them from a package index. So their licences matter to those who pass the packages on, for example
 in an image of a machine for a class. `make slides` copies reveal.js and MathJax beside the slides,
-with their licences.
+with their licences, `make site` the letters of Urdu (OFL-1.1) and the scripts of Sphinx and furo.
 
 Most licences here ask for one thing: to stay beside the package. Who passes on the following ones
 must also offer their source, with all changes. Programs that only use them keep their own licence.
@@ -53,7 +53,7 @@ brings has its licence in `tools/hub/package-lock.json` and `tools/deck_template
 
 def locked() -> list[str]:
     """Return the names of all Python packages in the lock files."""
-    text = ''.join((ROOT / file).read_text() for file in LOCKS)
+    text = ''.join(file.read_text() for file in LOCKS)
     return sorted(set(re.findall(r'^([a-z][\w.-]*)==', text, re.MULTILINE)))
 
 
