@@ -71,7 +71,7 @@ def check_domain(domain_id: int | None, discovery: str) -> None:
         )
 
 
-def configure_discovery(discovery: str = 'LOCALHOST') -> None:
+def configure_discovery(discovery: str) -> None:
     """Let the nodes of this process be discovered on this machine only, or in its network.
 
     With 'SUBNET', ROS_STATIC_PEERS stays what it is.

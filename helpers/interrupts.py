@@ -13,7 +13,8 @@ def uninterrupted() -> Iterator[None]:
     """Let an Interrupt wait for the end of the block.
 
     A process or a thread that starts needs an owner who ends it: an Interrupt in the middle of
-    `subprocess.Popen` or of `Thread.start` would leave it without one.
+    `subprocess.Popen` or of `Thread.start` would leave it without one. A session that closes has to
+    end all that it has begun.
     """
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread is interrupted

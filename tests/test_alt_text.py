@@ -128,7 +128,7 @@ def test_graphs_are_told_arrow_by_arrow():
         ('talker', 'publisher', '/topic', 'std_msgs/msg/String', 'RELIABLE, depth 10'),
         ('listener', 'subscription', '/topic', 'std_msgs/msg/String', 'BEST_EFFORT, depth 1'),
     ]
-    text = said(plots.topic_graph, pd.DataFrame(ends, columns=columns))
+    text = said(plots.topic_graph, pd.DataFrame(ends, columns=columns), 'Two nodes')
     assert 'talker publishes on /topic (std_msgs/msg/String), RELIABLE, depth 10.' in text
     assert 'listener subscribes to /topic' in text
     edges = pd.DataFrame([('map', 'odom', 'ekf')], columns=['parent', 'child', 'publisher'])

@@ -139,7 +139,7 @@ def test_hostile_variables(monkeypatch, shared_id):
                 assert os.environ.get(name) == expected.get(name)
             assert 'ROS_LOCALHOST_ONLY' not in os.environ
         assert graph_environment() == narrow
-    configure_discovery()  # also where nothing is to be removed
+    configure_discovery('LOCALHOST')  # also where nothing is to be removed
 
 
 @pytest.mark.parametrize(

@@ -435,7 +435,8 @@ FRAMES = pd.DataFrame(
 
 
 def test_topic_graph_has_boxes_and_arrows():
-    ax = plots.topic_graph(ENDPOINTS)
+    ax = plots.topic_graph(ENDPOINTS, 'Who talks to whom?')
+    assert ax.get_title(loc='left') == 'Who talks to whom?'
     assert sorted(words_of(ax)) == [
         '/topic\nstd_msgs/msg/String',
         'listener\nBEST_EFFORT, depth 5',

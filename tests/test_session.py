@@ -90,7 +90,7 @@ def test_a_session_opens_once():
 
 
 def test_bare_init_of_the_notebook_is_replaced():
-    configure_discovery()
+    configure_discovery('LOCALHOST')
     rclpy.init(domain_id=reserve_domain_id())
     talk()
 

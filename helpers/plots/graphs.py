@@ -32,7 +32,7 @@ TREE_MARKERS = 'osD^'
 CHARACTER = 0.1 / WIDTH  # the width of one in SMALL, a part of the figure's
 
 
-def topic_graph(endpoints: pd.DataFrame, title: str = 'Nodes and topics') -> Axes:
+def topic_graph(endpoints: pd.DataFrame, title: str) -> Axes:
     """Draw which nodes publish and subscribe to which topics, and with which quality of service.
 
     `endpoints` has one row a publisher or subscription, with the columns `node`, `role`
