@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from lab_page import LabPage
 from lab_server import Server, server
-from playwright.sync_api import Browser, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, sync_playwright
 
 ARTEFACTS = Path(
     os.environ.get('BROWSER_ARTEFACTS') or Path(tempfile.gettempdir(), 'ros2_notebooks_browser')
@@ -65,11 +65,17 @@ def chromium() -> Iterator[Browser]:
         browser.close()
 
 
+@pytest.fixture(scope='session')
+def tabs(chromium) -> Iterator[BrowserContext]:
+    """Yield what opens tabs of 1280 x 720, which share what they have loaded of JupyterLab."""
+    with chromium.new_context(viewport={'width': 1280, 'height': 720}) as context:
+        yield context
+
+
 @contextmanager
-def page(chromium: Browser, running: Server, name: str) -> Iterator[LabPage]:
-    """Open a tab of 1280 x 720. No request may leave this machine."""
-    context = chromium.new_context(viewport={'width': 1280, 'height': 720})
-    tab = context.new_page()
+def page(tabs: BrowserContext, running: Server, name: str) -> Iterator[LabPage]:
+    """Open a tab. No request may leave this machine."""
+    tab = tabs.new_page()
     outside = []
     tab.on('request', lambda r: r.url.startswith(LOCAL) or outside.append(r.url))
     lab = LabPage(tab, running, ARTEFACTS)
@@ -78,21 +84,21 @@ def page(chromium: Browser, running: Server, name: str) -> Iterator[LabPage]:
     finally:
         lab.screenshot(re.sub(r'\W+', '_', name).strip('_'))
         lab.close()
-        context.close()
+        tab.close()
     assert outside == []
 
 
 @pytest.fixture
-def lab(chromium, student_server, request) -> Iterator[LabPage]:
+def lab(tabs, student_server, request) -> Iterator[LabPage]:
     """Yield a student's page."""
-    with page(chromium, student_server, request.node.name) as opened:
+    with page(tabs, student_server, request.node.name) as opened:
         yield opened
 
 
 @pytest.fixture
-def deck(chromium, instructor_server, request) -> Iterator[LabPage]:
+def deck(tabs, instructor_server, request) -> Iterator[LabPage]:
     """Yield an instructor's page."""
-    with page(chromium, instructor_server, request.node.name) as opened:
+    with page(tabs, instructor_server, request.node.name) as opened:
         yield opened
 
 
