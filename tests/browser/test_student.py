@@ -1,6 +1,7 @@
 """A student's hour: open a lesson, run it, explore, interrupt, start again.
 
-That each lesson runs is what nbval checks, with the same kernel. Here is what only a browser shows.
+That each lesson runs is what nbval checks, with the same kernel, and `make notebooks` that nothing
+else reaches JupyterLab. Here is what only a browser shows.
 """
 
 from lab_page import PANEL, complaints

@@ -95,6 +95,13 @@ def test_a_failing_cell_leaves_the_file_as_it_was(
     assert os.listdir(path.parent) == [path.name]
 
 
+def test_what_only_jupyterlab_would_show_is_reported(tmp_path, capsys):
+    saved(tmp_path, 'import os\n_ = os.write(2, b"[WARN] of rcl")')
+    assert run.main([], tmp_path) == 1
+    said = "JupyterLab would show on red what C wrote: '[WARN] of rcl'"
+    assert capsys.readouterr().err == f'00_try_it.ipynb: {said} (the file is as it was)\n'
+
+
 def test_an_unknown_lesson_is_reported(tmp_path, capsys):
     assert run.main([], tmp_path) == 1
     saved(tmp_path, '1')

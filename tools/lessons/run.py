@@ -17,6 +17,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from copy import deepcopy
 from pathlib import Path
@@ -58,7 +59,7 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     """Return a copy of a notebook, executed in `folder` by a fresh kernel, and cleaned.
 
     Raises RuntimeError with one sentence where a cell fails, takes longer than CELL_TIMEOUT_S,
-    or ends the kernel.
+    ends the kernel, or writes to stderr at C level: a reader sees that, and no output holds it.
     """
     notebook = deepcopy(notebook)
     for cell in notebook.cells:
@@ -92,7 +93,10 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
         FILE_VARIABLE: '',  # what is saved is the table of a reader who has solved nothing
     }
     try:
-        client.execute(env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        with tempfile.TemporaryFile('w+', errors='replace') as written:
+            client.execute(env=environment, stdout=subprocess.DEVNULL, stderr=written)
+            written.seek(0)
+            from_c = ''.join(line for line in written if not line.startswith('[IPKernelApp]'))
     except CellExecutionError as error:
         what = f'{error.ename}: {error.evalue}'.splitlines()[0]
     except CellTimeoutError:
@@ -100,6 +104,8 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     except (DeadKernelError, AssertionError):  # after Ctrl+C nbclient fails its own assertion
         what = 'the kernel ended'
     else:
+        if from_c:
+            raise RuntimeError(f'JupyterLab would show on red what C wrote: {from_c[:200]!r}')
         return clean(notebook)
     raise RuntimeError(f'code cell {running} failed: {what}')
 
