@@ -7,11 +7,17 @@ from urllib.parse import unquote, urlparse
 import pytest
 from lab_server import ROOT
 
+from tools.lessons.export import PACKAGES
+
 SITE = ROOT / 'site'
 PAGES = sorted(path.relative_to(SITE).as_posix() for path in SITE.rglob('*.html'))
 LESSONS = [name for name in PAGES if re.match(r'notebooks/\d\d_', name)]
 MEGABYTE = 1_000_000
 FOUND = "[...document.querySelectorAll('#search-results li a')].map(link => link.href)"
+AXE = PACKAGES / 'node_modules' / 'axe-core' / 'axe.min.js'
+SERIOUS = """async () => (await axe.run()).violations
+    .filter(found => ['serious', 'critical'].includes(found.impact))
+    .map(found => `${found.id}: ${found.nodes[0].html.slice(0, 100)}`)"""
 WORDS = ['deadlock', 'KEEP_LAST', 'durabilité', 'قطار', 'hàng đợi']
 
 
@@ -91,6 +97,8 @@ def test_a_page_fits_its_screen(tab, artefacts, name):
     assert tab.evaluate('document.documentElement.scrollWidth <= innerWidth')
     assert tab.evaluate("[...document.images].every(image => image.alt || image.closest('a'))")
     assert errors == []
+    tab.add_script_tag(path=AXE)
+    assert tab.evaluate(SERIOUS) == []
     tab.screenshot(
         path=artefacts / f'site_{name.replace("/", "_")}_{tab.viewport_size["width"]}.png'
     )

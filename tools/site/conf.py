@@ -26,6 +26,23 @@ pygments_style = 'a11y-high-contrast-light'
 pygments_dark_style = 'a11y-high-contrast-dark'
 
 
+# What screen readers and keyboards miss in the pages of Sphinx, myst-nb and furo: the level of a
+# heading in the menu, the words of a fold, and the key focus of code that scrolls.
+REPAIRS = [
+    ('furo_navigation_tree', 'role="heading"', 'role="heading" aria-level="2"'),
+    ('body', '<summary aria-label="Toggle hidden content">', '<summary>'),
+    ('body', '<pre>', '<pre tabindex="0">'),
+]
+
+
+def repair(app, pagename, templatename, context, doctree):
+    """Let assistive technology read a page; Sphinx calls this for each one."""
+    for part, found, better in REPAIRS:
+        if part in context:
+            context[part] = context[part].replace(found, better)
+
+
 def setup(app):
     """Colour a cell that writes a file as the file's language."""
     app.add_lexer('cell', CellLexer)
+    app.connect('html-page-context', repair, priority=900)
