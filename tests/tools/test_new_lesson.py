@@ -43,6 +43,12 @@ def titles(folder):
     return [one.title for one in lessons(folder / 'notebooks')]
 
 
+def test_a_number_at_the_end_of_a_sentence_is_renumbered():
+    stems = {'05_run_a_long_job': '06_run_a_long_job'}
+    text = 'As in lesson 05. Lesson 05 says more, and lessons 04 and 05.'
+    assert new.renumbered(text, stems) == text.replace('05', '06')
+
+
 def test_added_and_taken_out(tmp_path, capsys):
     copy = copied(tmp_path / 'copy')
     before = lessons(copy / 'notebooks')

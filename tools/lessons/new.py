@@ -26,7 +26,7 @@ EXAMPLE = 'make lesson NAME=count_the_losses'
 # words: lesson 02, lessons 02, 03 and 04, LESSON=02, lesson_02, and the ids of cells, note-02-05.
 LINK = re.compile(r'\[(\d\d)(?=( [^\]\n]*)?\]\((notebooks/)?\1_)')
 STEM = re.compile(r'(?<!\w)\d\d(?:_[a-z0-9]+)+')
-ONE = re.compile(r'\b(?:[Ll]esson[ _-]|note-|quiz-)(\d\d)\b(?!\.)|\b(?:[Ll]esson_)(\d\d)')
+ONE = re.compile(r'\b(?:[Ll]esson[ _-]|note-|quiz-)(\d\d)\b(?!\.\d)|\b(?:[Ll]esson_)(\d\d)')
 MANY = re.compile(
     r'\b(?:[Ll]essons |LESSON=(?:\\?["\'])?)\d\d(?:(?:, and|,| and| or| to)? \d\d\b)*'
 )
