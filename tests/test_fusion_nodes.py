@@ -1,4 +1,4 @@
-"""The nodes that lesson 13 imports are those that lesson 12 writes, which nbval runs."""
+"""The nodes that lesson 14 imports are those that lesson 13 writes, which nbval runs."""
 
 import ast
 import inspect

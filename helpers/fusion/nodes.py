@@ -1,6 +1,6 @@
-"""The nodes of lesson 12, for the lesson after it: a robot, a filter node, and a drive with both.
+"""The nodes of lesson 13, for the lesson after it: a robot, a filter node, and a drive with both.
 
-Lesson 12 writes and explains them; here they stand as they do there, and a test compares the two.
+Lesson 13 writes and explains them; here they stand as they do there, and a test compares the two.
 """
 
 import math
@@ -261,7 +261,7 @@ def drive(measurements, *make_filters, prepare=None):
     with ros_session() as session:
         robot, listener = RobotNode(measurements), Node('listener')
         filters = [make_filter() for make_filter in make_filters]
-        others = prepare(listener) if prepare else []  # for lesson 13
+        others = prepare(listener) if prepare else []  # for lesson 14
         arrived = [[] for _ in filters]
         executor = SingleThreadedExecutor()
         for node in (listener, *filters, *others):
