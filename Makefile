@@ -32,6 +32,13 @@ test-hub: ## a class of 12 on a JupyterHub, who run lessons 02 and 03 at the sam
 	@tools/hub/set_up.sh
 	@$(PYTHON) -m pytest -n 0 -rA -o faulthandler_timeout=1200 tests/hub $(PYTEST_ARGS)
 
+handout: set_up ## a student's edition as one archive: SOLUTIONS=no, OFFLINE=yes (PYTHONS="3.11 3.12") add the packages
+	@$(PYTHON) -m tools.lessons.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
+		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
+
+update: set_up ## get newer lessons, keep what you have written; FROM=ros2_notebooks.tar.gz names a newer archive
+	@$(PYTHON) -m tools.lessons.update $(if $(FROM),"$(FROM)")
+
 notebooks: set_up ## run all notebooks, save their outputs, and write what follows from them; LESSON=02 for one
 	@$(PYTHON) -m tools.lessons.run $(LESSON)
 
@@ -70,14 +77,14 @@ licences: ## write licences.md from the lock files and what the packages say
 	@$(PYTHON) -m tools.licences
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built
-	rm -rf .venv .jupyter .soak scratch slides site .site book.pdf .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv .jupyter .soak scratch slides handout site .site book.pdf .hypothesis .pytest_cache .ruff_cache
 	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
 set_up:
 	@tools/set_up.sh
 
-.PHONY: help lab present test test-tools test-browser hub test-hub notebooks lesson slides site book sources soak bench lint \
-	lock licences clean set_up
+.PHONY: help lab present test test-tools test-browser hub test-hub handout update notebooks lesson slides site book sources \
+	soak bench lint lock licences clean set_up
 
 PYTHON := .venv/bin/python
 
@@ -89,6 +96,8 @@ CHROMIUM ?= $(shell command -v chromium || command -v chromium-browser || comman
 no_chromium = There is no Chromium: install it, on Debian with `sudo apt install chromium`, or name yours with CHROMIUM=...
 
 ROOT := .
+
+this_python = $(shell $(PYTHON) -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 
 # The first argument says whether JupyterLab shows the notebook as slides, the second is its address.
 # A port that you name is the one you get, or an error. Without a name, the first free one from 8888.

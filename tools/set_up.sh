@@ -42,6 +42,8 @@ wanted() {
 # The versions for which every pinned package has a wheel, newest first: tools/lock.sh found them.
 versions=$(sed -n 's/^# Every wheel exists for Python //p' requirements.lock)
 [ -n "$versions" ] || fail 'requirements.lock does not name its Python versions: get it again with `git checkout requirements.lock`.'
+# An archive of `make handout OFFLINE=yes` brings the packages along, for some Pythons.
+[ ! -f wheels/pythons ] || versions=$(cat wheels/pythons)
 if [ -n "$wanted_version" ]; then
     case " $versions " in
         *" $wanted_version "*) versions=$wanted_version ;;
@@ -62,6 +64,11 @@ for name in $(env | sed -n 's/^\(PIP_[A-Z_]*\)=.*/\1/p; s/^\(UV_[A-Z_]*\)=.*/\1/
         *) unset "$name" ;;
     esac
 done
+
+if [ -f wheels/pythons ]; then
+    unset UV_DEFAULT_INDEX UV_INDEX_URL UV_INDEX UV_EXTRA_INDEX_URL UV_FIND_LINKS
+    export PIP_NO_INDEX=1 PIP_FIND_LINKS=wheels
+fi
 
 pip_setting() { # its value, from the environment or a pip.conf; a list is separated by spaces
     for section in :env: install global; do

@@ -283,6 +283,21 @@ def test_a_wrong_hash_installs_nothing_and_the_next_call_repairs(checkout):
     assert checkout.installed() == ALL
 
 
+def test_packages_that_came_along_are_enough(tmp_path):
+    one = Checkout(tmp_path)
+    one.wheels.rename(one.root / 'wheels')
+    (one.root / 'wheels/pythons').write_text(HERE)
+    nowhere = {'UV_DEFAULT_INDEX': 'http://127.0.0.1:9/', 'PIP_FIND_LINKS': '/nowhere'}
+    answer = one.set_up(**nowhere, PIP_NO_INDEX='0')
+    assert answer.returncode == 0, answer.stderr
+    assert one.installed() == ALL
+    (one.root / 'wheels/pythons').write_text('3.9')
+    answer = one.set_up()
+    assert answer.returncode == 0, 'what is installed is used on'
+    shutil.rmtree(one.root / '.venv')
+    assert 'Python 3.9' in last_line(one.set_up().stderr)
+
+
 def test_what_a_group_needs_is_kept_once_it_was_asked_for(checkout):
     checkout.lock(checkout.pins[name] for name in ('setuptools', 'uv'))
     for group, name in (('browser', 'iniconfig'), ('hub', 'pluggy')):

@@ -1,13 +1,12 @@
 #!/bin/sh
-# JupyterHub starts this as the student: their own copy of the notebooks, then their server.
+# JupyterHub starts this as the student: their own copy of the notebooks, with what is newer and with
+# what they have written, then their server.
 set -eu
 root=$(dirname "$0")/../..
 mine=$HOME/ros2_notebooks
-if [ ! -d "$mine" ]; then
-    rm -rf "$mine.new"
-    cp -R "$root/notebooks" "$mine.new"
-    mv "$mine.new" "$mine"
-fi
+mkdir -p "$mine"
+# Without newer lessons, too, a student can work.
+(cd "$root" && exec .venv/bin/python -m tools.lessons.update notebooks --to "$mine") || true
 
 # The path of a socket file is limited to 107 bytes, and a home folder may have a long name.
 JUPYTER_RUNTIME_DIR=${TMPDIR:-/tmp}/jupyter-$(id -u)

@@ -1,0 +1,93 @@
+"""`make handout`: what students get, and what they get with it where there is no network."""
+
+import re
+import subprocess
+import tarfile
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_notebook, new_raw_cell
+
+from tools.lessons import handout, update
+
+ROOT = Path(__file__).resolve().parents[2]
+FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb'}
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """Return a clone with a lesson, and with files that no student needs."""
+    root = tmp_path / 'check out'
+    (root / 'notebooks').mkdir(parents=True)
+    cells = [
+        new_code_cell('start = 1', id='start', metadata={'tags': ['exercise']}),
+        new_raw_cell('For the instructor', id='note', metadata={'tags': ['notes']}),
+        new_code_cell('solved = 2', id='solution', metadata={'tags': ['solution']}),
+    ]
+    nbformat.write(new_notebook(cells=cells), root / 'notebooks/01_publish.ipynb')
+    for name in ('README.md', 'Makefile', 'tests/test_a.py', 'tools/hub/set_up.sh'):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(name)
+    subprocess.run(['git', 'init', '--quiet'], cwd=root, check=True)
+    subprocess.run(['git', 'add', '.'], cwd=root, check=True)
+    (root / 'my draft').write_text('not in git')
+    return root
+
+
+def unpack(root, folder, *options):
+    assert handout.main(['--root', str(root), *options]) == 0
+    with tarfile.open(root / 'handout/ros2_notebooks.tar.gz') as archive:
+        archive.extractall(folder)
+    return folder / 'ros2_notebooks'
+
+
+def cells_of(course):
+    return [c.source for c in nbformat.read(course / 'notebooks/01_publish.ipynb', 4).cells]
+
+
+def test_a_handout_has_no_notes_and_says_how_large_it_is(checkout, tmp_path, capsys):
+    course = unpack(checkout, tmp_path / 'home')
+    printed = capsys.readouterr().out
+    assert re.search(r'ros2_notebooks\.tar\.gz: 0\.0 MB, no packages\.', printed)
+    files = {str(p.relative_to(course)) for p in course.rglob('*') if p.is_file()}
+    assert files == FILES | {f'{update.BASE}/{name}' for name in FILES}
+    assert cells_of(course) == ['start = 1', 'solved = 2']
+
+
+def test_solutions_may_come_later_and_leave_what_was_tried(checkout, tmp_path):
+    course = unpack(checkout, tmp_path / 'home', '--no-solutions')
+    assert cells_of(course) == ['start = 1']
+    lesson = course / 'notebooks/01_publish.ipynb'
+    lesson.write_text(lesson.read_text().replace('start = 1', 'start = 99'))
+    unpack(checkout, tmp_path / 'later')
+    archive = checkout / 'handout/ros2_notebooks.tar.gz'
+    assert update.main([str(archive), '--to', str(course)]) == 0
+    assert cells_of(course) == ['start = 99', 'solved = 2']
+
+
+def test_packages_are_those_of_the_pythons_that_are_asked_for(tmp_path):
+    head, *blocks = re.split(r'\n(?=[a-z])', (ROOT / 'requirements.lock').read_text())
+    names = ('cycler', 'markupsafe', 'empy')
+    # One that only some Pythons need, by their last number, too: 3.11.2 of Debian 12 is one.
+    some = [block for block in blocks if "python_full_version < '3.11.5'" in block.splitlines()[0]]
+    chosen = [block for block in blocks if block.startswith(names)] + some
+    lock = tmp_path / 'requirements.lock'
+    lock.write_text('\n'.join([head, *chosen]))
+    handout.download(lock, tmp_path / 'wheels', ('3.11', '3.12'))
+    found = sorted(path.name for path in (tmp_path / 'wheels').iterdir())
+    assert [sum('cp311-' in n for n in found), sum('cp312-' in n for n in found)] == [1, 1]
+    assert sum(name.startswith('cycler') for name in found) == 1
+    assert sum(name.startswith('empy') for name in found) == 1
+    assert (tmp_path / 'wheels/pythons').read_text() == '3.12 3.11'  # newest first
+    assert len(found) == len(chosen) + 2
+
+
+def test_what_cannot_be_done_is_told_in_one_sentence(checkout, tmp_path, capsys):
+    assert handout.main(['--root', str(tmp_path)]) == 1
+    assert 'clone' in capsys.readouterr().err
+    (checkout / 'requirements.lock').write_text('# Every wheel exists for Python 3.12 3.11\na==1\n')
+    subprocess.run(['git', 'add', '.'], cwd=checkout, check=True)
+    assert handout.main(['--root', str(checkout), '--wheels', '3.9']) == 1
+    assert capsys.readouterr().err.count('\n') == 1
+    assert not (checkout / 'handout').exists()
