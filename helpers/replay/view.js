@@ -44,7 +44,7 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
       ? setup.threads.map((name, i) => {
         const it = state.runs[i];
         if (!it) return [`${name}: free`];
-        return [`${name}: ${model.named(setup, it)}${it.waits ? ', waits' : ''}`, 'replay-busy'];
+        return [`${name}: ${seqOf(it)}${it.waits ? ', waits' : ''}`, 'replay-busy'];
       })
       : [['no executor']]);
     fill(groups, setup.groups.map(({ name, exclusive }, group) => {
@@ -52,7 +52,7 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
         it => it && setup.callbacks[it.callback].group === group);
       if (!exclusive) return [`${name}: lets all in`];
       return holders.length
-        ? [`${name}: held by ${model.named(setup, holders[0])}`, 'replay-busy']
+        ? [`${name}: held by ${seqOf(holders[0])}`, 'replay-busy']
         : [`${name}: free`];
     }));
     const waiting = setup.callbacks.flatMap((_, callback) =>
@@ -87,13 +87,13 @@ function show(root, record) {
   const next = runs.map(() => 0);
   for (;;) {
     let who = -1;
-    runs.forEach(({ times }, i) => {
-      if (next[i] < times.length && (who < 0 || times[next[i]] < runs[who].times[next[who]])) who = i;
-    });
+    for (let i = 0; i < runs.length; i += 1)
+      if (next[i] < runs[i].times.length
+        && (who < 0 || runs[i].times[next[i]] < runs[who].times[next[who]])) who = i;
     if (who < 0) break;
     order.push(who);
     next[who] += 1;
-    counts.forEach((count, i) => count.push(next[i]));
+    for (let i = 0; i < runs.length; i += 1) counts[i].push(next[i]);
   }
   const last = order.length;
   let position = 0;
@@ -115,7 +115,11 @@ function show(root, record) {
     faster.textContent = `${DELAYS[0] / DELAYS[delay]}×`;
     if (playing) begin();
   }, 'faster');
-  const loss = button('Next loss', () => go(nextLoss()));
+  const loss = button('Next loss', () => {
+    const step = nextLoss();
+    if (step === undefined) says.textContent = 'No message is lost after this.';
+    else go(step);
+  });
   const back = button('◀', () => go(position - 1), 'back');
   const forth = button('▶', () => go(position + 1), 'forward');
 
@@ -129,7 +133,6 @@ function show(root, record) {
     slider.setAttribute('aria-valuetext', `step ${position} of ${last}`);
     back.disabled = position === 0;
     forth.disabled = position === last;
-    loss.disabled = playing === null && nextLoss() === undefined;
     if (position === last) stop();
   }
 

@@ -1,6 +1,6 @@
 // A run that was recorded or predicted, put to any of its steps. No page here.
 
-const CHECKPOINT = 256; // moves between two states that are kept, of a run with many
+const CHECKPOINT = 64; // moves between two states that are kept, of a run with many
 const DOES = ['arrive', 'take', 'end', 'go', 'resume'];
 const model = queueModel();
 
