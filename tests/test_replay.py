@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import time
 from html import unescape
 from pathlib import Path
 from urllib.parse import unquote
@@ -13,17 +12,21 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from nbval.plugin import get_sanitize_patterns
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
 from support.javascript import Script
-from support.nodes import LIMIT_S, Listener, Talker, spin
-from support.runs import happenings, hear, heard, lose, made_table, swap
+from support.runs import (
+    assert_is_the_run,
+    happenings,
+    hear,
+    heard,
+    lose,
+    made_table,
+    real_runs,
+    swap,
+)
 
 from helpers.queue_model import explain, predict
-from helpers.recording import Recording
 from helpers.replay import replay, side_by_side
 from helpers.replay.picture import causes
-from helpers.session import ros_session
 from tools.lessons.lesson import lessons
 
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
@@ -47,50 +50,6 @@ def record(shown, index=0):
     """What the page gets, from the page."""
     data = re.search("data-record='([^']*)'", html(shown))[1]
     return json.loads(unescape(data))['runs'][index]
-
-
-def assert_is_the_run(states, table, depth):
-    """Each state is what the counts of arrivals and takes so far make of the table."""
-    published, taken_in_order = table['seq'].tolist(), heard(table)
-    rows = table.set_index('seq')
-    arrived, taken, lost = 0, [], []
-    for before, state in zip(states, states[1:], strict=False):
-        assert before['now'] <= state['now']
-        if 'arrives' in state['says']:
-            seq = published[arrived]
-            arrived += 1
-            assert state['says'].startswith(f'Message {seq} arrives.')
-            assert state['now'] >= rows.published_s[seq] - 1e-6
-            assert (arrived == len(published)) or state['now'] <= rows.published_s[
-                published[arrived]
-            ] + 1e-6
-            out = published[arrived - 1 - depth] if arrived > depth else None
-            if out is not None and math.isnan(rows.started_s[out]):
-                lost.append([out, seq])
-                assert f', {out}, ' in state['says']
-        elif 'takes' in state['says']:
-            seq = taken_in_order[len(taken)]
-            assert f', {seq}.' in state['says']
-            assert seq not in before['threads']
-            assert seq in state['threads']
-            assert state['now'] <= rows.started_s[seq] + 1e-6
-            taken.append(seq)
-        else:
-            (ended,) = set(before['threads']) - set(state['threads']) - {None}
-            assert state['now'] == pytest.approx(rows.finished_s[ended], abs=1e-6)
-            assert f'message {ended} ends' in state['says']
-        gone = {*taken, *(seq for seq, _ in lost)}
-        assert state['queue'] == [seq for seq in published[:arrived] if seq not in gone]
-        assert len(state['queue']) <= depth
-        assert state['lost'] == lost
-        running = [seq for seq in state['threads'] if seq is not None]
-        assert set(running) <= set(taken)
-        assert len(set(running)) == len(running)
-    assert arrived == len(published)
-    assert taken == taken_in_order
-    assert [seq for seq, _ in lost] + states[-1]['queue'] == [
-        seq for seq in published if seq not in taken_in_order
-    ]
 
 
 # The rules against `predict`
@@ -195,27 +154,7 @@ def test_what_cannot_have_happened_is_one_sentence(script, happening, changes, d
     ],
 )
 def test_what_rclpy_did_is_a_walk(script, threads, group, depth):
-    kind = {EXCLUSIVE: MutuallyExclusiveCallbackGroup, REENTRANT: ReentrantCallbackGroup}[group]
-    quiet = SubscriptionEventCallbacks(use_default_callbacks=False)
-    recordings = []
-    with ros_session() as session:
-        for number in range(10):
-            topic = f'topic{number}'
-            talker = Talker(25, period_s=0.004, topic=topic)
-            listener = Listener(
-                lambda message: time.sleep(0.012),
-                depth,
-                topic,
-                callback_group=kind(),
-                event_callbacks=quiet,
-            )
-            recordings.append(Recording(talker.publisher, listener.subscription))
-            spin(session, listener, threads=threads)
-            spin(session, talker)
-        for recording in recordings:
-            recording.wait_until_complete(25, LIMIT_S)
-    for recording in recordings:
-        table = recording.table()
+    for table in real_runs(threads, group, depth, 10):
         states = script.call('states', record(replay(table, depth, threads, group)))
         assert_is_the_run(states, table, depth)
 

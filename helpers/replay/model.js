@@ -47,7 +47,6 @@ function queueModel() {
       queues: setup.callbacks.map(() => []),
       runs: setup.threads.map(() => null),
       asleep: [],
-      ended: 0,
       lost: [],
       locks: {},
       values: {},
@@ -249,7 +248,6 @@ function queueModel() {
       case 'end':
         return end(setup, state, move.thread);
     }
-    throw new Error(`There is no move ${move.do}.`);
   }
 
   function push(setup, state, { callback, seq, from }) {
@@ -339,7 +337,6 @@ function queueModel() {
   function end(setup, state, thread) {
     const run = state.runs[thread];
     state.runs[thread] = null;
-    state.ended += 1;
     const ends = `The callback of ${named(setup, run)} ends. ${capital(setup.threads[thread])} is free.`;
     const { from } = run;
     if (from && run.callback !== from.client) {

@@ -1,12 +1,18 @@
-"""Runs of a queue that are drawn by chance, in whole seconds, so that instants can be equal."""
+"""Runs of a queue: drawn by chance, in whole seconds, so that instants are equal; real ones."""
 
 import math
+import time
 
 import numpy as np
 import pandas as pd
+import pytest
 from hypothesis import strategies as st
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
 
-from helpers.recording import COLUMNS
+from helpers.recording import COLUMNS, Recording
+from helpers.session import ros_session
+from support.nodes import LIMIT_S, Listener, Talker, spin
 
 CALLBACK = ['started_s', 'finished_s', 'thread']
 NOT_HEARD = math.nan, math.nan, None
@@ -71,3 +77,73 @@ def swap(draw, table):
     """Each of two callbacks got the message of the other."""
     one, other = draw(st.sampled_from(heard(table))), draw(st.sampled_from(heard(table)))
     table.loc[[one, other], CALLBACK] = table.loc[[other, one], CALLBACK].to_numpy()
+
+
+def real_runs(threads, group, depth, count):
+    """Let `count` pairs of nodes run at the same time, each slower than its publisher."""
+    kinds = {
+        'mutually exclusive': MutuallyExclusiveCallbackGroup,
+        'reentrant': ReentrantCallbackGroup,
+    }
+    recordings = []
+    with ros_session() as session:
+        for number in range(count):
+            topic = f'topic{number}'
+            talker = Talker(25, period_s=0.004, topic=topic)
+            listener = Listener(
+                lambda message: time.sleep(0.012),
+                depth,
+                topic,
+                callback_group=kinds[group](),
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            )
+            recordings.append(Recording(talker.publisher, listener.subscription))
+            spin(session, listener, threads=threads)
+            spin(session, talker)
+        for recording in recordings:
+            recording.wait_until_complete(25, LIMIT_S)
+    return [recording.table() for recording in recordings]
+
+
+def assert_is_the_run(states, table, depth, accuracy_s=1e-6):
+    """Each state is what the counts of arrivals and takes so far make of the table."""
+    published, taken_in_order = table['seq'].tolist(), heard(table)
+    rows = table.set_index('seq')
+    arrived, taken, lost = 0, [], []
+    for before, state in zip(states, states[1:], strict=False):
+        assert before['now'] <= state['now']
+        if 'arrives' in state['says']:
+            seq = published[arrived]
+            arrived += 1
+            assert state['says'].startswith(f'Message {seq} arrives.')
+            assert state['now'] >= rows.published_s[seq] - accuracy_s
+            assert (arrived == len(published)) or state['now'] <= rows.published_s[
+                published[arrived]
+            ] + accuracy_s
+            out = published[arrived - 1 - depth] if arrived > depth else None
+            if out is not None and math.isnan(rows.started_s[out]):
+                lost.append([out, seq])
+                assert f', {out}, ' in state['says']
+        elif 'takes' in state['says']:
+            seq = taken_in_order[len(taken)]
+            assert f', {seq}.' in state['says']
+            assert seq not in before['threads']
+            assert seq in state['threads']
+            assert state['now'] <= rows.started_s[seq] + accuracy_s
+            taken.append(seq)
+        else:
+            (ended,) = set(before['threads']) - set(state['threads']) - {None}
+            assert state['now'] == pytest.approx(rows.finished_s[ended], abs=accuracy_s)
+            assert f'message {ended} ends' in state['says']
+        gone = {*taken, *(seq for seq, _ in lost)}
+        assert state['queue'] == [seq for seq in published[:arrived] if seq not in gone]
+        assert len(state['queue']) <= depth
+        assert [seq for seq, _ in state['lost']] == [seq for seq, _ in lost]
+        running = [seq for seq in state['threads'] if seq is not None]
+        assert set(running) <= set(taken)
+        assert len(set(running)) == len(running)
+    assert arrived == len(published)
+    assert taken == taken_in_order
+    assert [seq for seq, _ in lost] + states[-1]['queue'] == [
+        seq for seq in published if seq not in taken_in_order
+    ]
