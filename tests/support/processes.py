@@ -6,17 +6,15 @@ import re
 import subprocess
 import sys
 import textwrap
-import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 import psutil
 
 from support.nodes import LIMIT_S
+from tools.soak.leftovers import threads_of_process
 
 HERE = Path(__file__).parents[1]  # for `import support` in a process
-# Threads of Fast DDS that belong to no participant: they live until the process ends.
-OF_PROCESS = ('dds.shm.wdog', 'dds.log')
 SEGMENT = re.compile(r'/dev/shm/fastrtps_[0-9a-f]{16}')
 
 
@@ -68,10 +66,4 @@ def segments(pid: int | str = 'self') -> set[str]:
 
 def traces() -> set[str]:
     """Return what is in this process and can be left behind: threads and shared memory."""
-    found = {f'{thread.name} {thread.ident}' for thread in threading.enumerate()} | segments()
-    for task in Path('/proc/self/task').iterdir():
-        with contextlib.suppress(OSError):  # it has ended
-            name = (task / 'comm').read_text().strip()
-            if name.startswith('dds.') and name not in OF_PROCESS:
-                found.add(f'{name} {task.name}')
-    return found
+    return threads_of_process().keys() | segments()

@@ -46,12 +46,21 @@ def look() -> None:
 
 
 def state_of_process() -> dict[str, str]:
-    """Return a sentence for each thread, child and shared memory, by a key of its own.
+    """Return a sentence for each thread, child and shared memory, by a key of its own."""
+    children = [child for child in psutil.Process().children(recursive=True) if not _of_pool(child)]
+    found = threads_of_process() | processes_that_stay(children, MOMENT_S)
+    for file in SHARED_MEMORY.findall(Path('/proc/self/maps').read_text()):
+        found[file] = f'The kernel still uses {file}.'
+    return found
+
+
+def threads_of_process() -> dict[str, str]:
+    """Return a sentence for each thread, by a key of its own.
 
     Of the threads that C++ started, those of Fast DDS's participants.
     """
     found = {
-        f'thread {thread.ident}': f'The thread {thread.name} still runs.'
+        f'thread {thread.name} {thread.ident}': f'The thread {thread.name} still runs.'
         for thread in threading.enumerate()
         if type(thread).__name__ != OF_ZMQ
     }
@@ -59,11 +68,7 @@ def state_of_process() -> dict[str, str]:
         with suppress(OSError):  # it has ended
             name = (task / 'comm').read_text().strip()
             if name.startswith('dds.') and name not in OF_PROCESS:
-                found[f'native {task.name}'] = f'The thread {name} still runs.'
-    children = [child for child in psutil.Process().children(recursive=True) if not _of_pool(child)]
-    found |= processes_that_stay(children, MOMENT_S)
-    for file in SHARED_MEMORY.findall(Path('/proc/self/maps').read_text()):
-        found[file] = f'The kernel still uses {file}.'
+                found[f'native {name} {task.name}'] = f'The thread {name} still runs.'
     return found
 
 
