@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from lab_page import LabPage
+from lab_page import LIMIT_S, LabPage
 from lab_server import Server, server
 from playwright.sync_api import Browser, BrowserContext, sync_playwright
 
@@ -69,6 +69,7 @@ def chromium() -> Iterator[Browser]:
 def tabs(chromium) -> Iterator[BrowserContext]:
     """Yield what opens tabs of 1280 x 720, which share what they have loaded of JupyterLab."""
     with chromium.new_context(viewport={'width': 1280, 'height': 720}) as context:
+        context.set_default_navigation_timeout(LIMIT_S * 1000)
         yield context
 
 
@@ -97,9 +98,13 @@ def lab(tabs, student_server, request) -> Iterator[LabPage]:
 
 @pytest.fixture
 def deck(tabs, instructor_server, request) -> Iterator[LabPage]:
-    """Yield an instructor's page."""
+    """Yield an instructor's page. What is changed in the copies does not reach the next test."""
+    folder = instructor_server.folder / 'presentation'
+    copies = {path: path.read_bytes() for path in folder.glob('*.ipynb')}
     with page(tabs, instructor_server, request.node.name) as opened:
         yield opened
+    for path, before in copies.items():
+        path.write_bytes(before)
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from lab_server import Server
 from playwright.sync_api import ElementHandle, Page
 
-LIMIT_S = 300  # for what a lesson computes; everything else has Playwright's 30 s
+LIMIT_S = 300  # to open a page, and for what a lesson computes; the rest has Playwright's 30 s
 PANEL = 'window.jupyterapp.shell.currentWidget'
 
 READY = """name => {
@@ -109,16 +109,10 @@ class LabPage:
         self.page.locator('#jp-MainMenu').get_by_text(menu, exact=True).click()
         self.page.locator('.lm-Menu').get_by_text(item, exact=True).click()
 
-    def run_all(self, menu: str = 'Run', item: str = 'Run All Cells') -> None:
+    def run_all(self) -> None:
         """Run all cells, and wait until they have run or one has failed."""
         self.command('notebook:clear-all-cell-outputs')
-        self.menu(menu, item)
-        if menu == 'Kernel':
-            self.page.locator('.jp-Dialog .jp-mod-accept').click()
-        self.wait_until_all_ran()
-
-    def wait_until_all_ran(self) -> None:
-        """Wait until all cells have run since their outputs were cleared, or one has failed."""
+        self.menu('Run', 'Run All Cells')
         self.page.wait_for_function(ALL_RAN, timeout=LIMIT_S * 1000)
 
     def command(self, name: str) -> None:
