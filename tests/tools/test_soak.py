@@ -55,17 +55,14 @@ LEFT_AFTER_RUN = """
 
 
 @needs_root
-def test_what_is_left_in_a_kernel_is_named(failures):
-    said = failures('idle', (LEFT_IN_KERNEL, ''))['what is left in the kernel']
+def test_what_is_left_is_named_and_ended(failures):
+    found = failures('idle', (LEFT_IN_KERNEL, ''), (LEFT_AFTER_RUN, ''))
+    said = found['what is left in the kernel']
     assert 'The thread mine still runs.' in said
     assert 'still runs: sleep 62.' in said
     assert 'The thread dds.' in said
     assert 'The kernel still uses /dev/shm/fastrtps_' in said
-
-
-@needs_root
-def test_what_is_left_of_a_run_is_named_and_ended(failures):
-    said = failures('idle', (LEFT_AFTER_RUN, ''))['after the run']
+    said = found['after the run']
     assert ' still runs: sleep 61.' in said
     assert 'Shared memory is left: /dev/shm/fastrtps_left.' in said
     assert '/home/left has changed.' in said
