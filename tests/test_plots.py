@@ -551,6 +551,18 @@ def test_error_has_a_line_each_and_shaded_times():
     assert plots.error({'a': DRIVE}, log=True).get_yscale() == 'log'
 
 
+def test_paths_draws_each_estimate_beside_the_truth_in_one_scale():
+    axes = plots.paths(DRIVE, {name: DRIVE + number for number, name in enumerate('abcd')})
+    assert [ax.get_title('left') for ax in axes] == list('abcd')
+    for number, ax in enumerate(axes):
+        truth, estimate = ax.lines
+        assert truth.get_xydata().tolist() == DRIVE[['x', 'y']].to_numpy().tolist()
+        assert estimate.get_xydata().tolist() == (DRIVE + number)[['x', 'y']].to_numpy().tolist()
+        assert ax.get_xlim() == axes[0].get_xlim()
+        assert ax.get_aspect() == 1
+    assert len([ax for ax in axes[0].figure.axes if ax.axison]) == 4
+
+
 def test_innovation_has_its_band_and_crosses_for_what_was_kept_out():
     rows = [(1, 0.1, 0.5, True), (2, 9, 0.5, False), (3, -0.2, 0.5, True)]
     table = pd.DataFrame(rows, columns=['t', 'innovation', 'sigma', 'accepted'])
@@ -576,6 +588,7 @@ RUN = table_of([0.0])
         (lambda: plots.path(DRIVE, DRIVE), 'Give each estimate a name'),
         (lambda: plots.path(DRIVE, {'a': DRIVE[['t']]}), "estimate 'a' lacks the column.* x, y"),
         (lambda: plots.error(dict.fromkeys('abcde', DRIVE)), '1 to 4 errors, not 5'),
+        (lambda: plots.paths(DRIVE, dict.fromkeys('abcdefg', DRIVE)), '1 to 6 estimates, not 7'),
         (lambda: plots.innovation(DRIVE), 'innovations lacks the column'),
         (lambda: plots.frame_tree(FRAMES.iloc[[0, 0]]), 'make no tree'),
         (lambda: plots.frame_tree(FRAMES.iloc[1:]), 'make no tree'),

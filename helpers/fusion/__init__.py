@@ -2,13 +2,14 @@
 
 `filter` has the filter, message by message, as a node uses it. `tables` lets it run over a table
 of what the sensors said. `drives` simulates such tables, together with the truth. `evaluation`
-compares an estimate with the truth, and with what the filter says of its own errors. `nodes` has
-the nodes of the lessons; it is imported by its own name, because it needs rclpy.
+compares an estimate with the truth, and with what the filter says of its own errors. `messages`
+writes and reads the messages of a drive, `tf2_msgs` builds that of /tf; both are imported by their
+own names, because they need ROS.
 """
 
 from helpers.fusion.drives import simulate
 from helpers.fusion.evaluation import chi_square_bounds, covariances, errors, nees, rmse
-from helpers.fusion.filter import ExtendedKalmanFilter
+from helpers.fusion.filter import STATE, ExtendedKalmanFilter
 from helpers.fusion.tables import (
     SENSORS,
     VARIANCES,
@@ -19,6 +20,7 @@ from helpers.fusion.tables import (
 
 __all__ = [
     'SENSORS',
+    'STATE',
     'VARIANCES',
     'ExtendedKalmanFilter',
     'chi_square_bounds',

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -13,11 +14,14 @@ from matplotlib.patches import Ellipse
 
 from helpers.alt_text import describe
 from helpers.plots.style import (
+    DPI,
     GREY,
     HEARD,
     INK,
+    LARGE,
     LINE_LOOKS,
     NORMAL,
+    SMALL,
     WIDTH,
     check_count,
     crosses,
@@ -72,6 +76,43 @@ def path(
         + (f' Ellipses show 3 sigma every {ellipses_s:g} seconds.' if ellipses_s else ''),
     )
     return ax
+
+
+def paths(
+    truth: pd.DataFrame,
+    estimates: Mapping[str, pd.DataFrame],
+    title: str = 'The paths, seen from above',
+) -> np.ndarray:
+    """Draw up to six estimates, each in axes of its own beside the truth. Return the axes (n).
+
+    The tables have the columns `x` and `y` in metres. All axes have the same scale.
+
+    Raises TypeError or ValueError for a bad table, and for no or too many estimates.
+    """
+    check_columns(truth, ('x', 'y'), 'The truth')
+    _check_lines('estimate', estimates, 'x', 'y', most=6)
+    columns = min(3, len(estimates))
+    rows = math.ceil(len(estimates) / columns)
+    figure = plt.figure(figsize=(3.6 * columns, 3.1 * rows + 0.7), dpi=DPI, layout='constrained')
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    for ax, (name, table) in zip(grid, estimates.items(), strict=False):
+        ax.plot(truth.x, truth.y, color=TRUTH, lw=5, label='truth', solid_capstyle='round')
+        ax.plot(table.x, table.y, color=HEARD, lw=1.6, label='estimate')
+        ax.scatter(truth.x.iloc[0], truth.y.iloc[0], s=50, color=INK, zorder=5, label='start')
+        ax.set_title(name, fontsize=NORMAL, loc='left')
+        ax.set_aspect('equal')
+        ax.tick_params(labelsize=SMALL)
+        ax.grid(True, color='#e4e7ea', linewidth=0.8)
+        ax.spines[['top', 'right']].set_visible(False)
+    for ax in grid[len(estimates) :]:
+        ax.set_axis_off()
+    figure.suptitle(title, fontsize=LARGE, x=0.01, ha='left')
+    figure.supxlabel('x (m)', fontsize=NORMAL)
+    figure.supylabel('y (m)', fontsize=NORMAL)
+    handles = grid[0].get_legend_handles_labels()[0]
+    figure.legend(handles=handles, loc='upper right', ncols=3, fontsize=SMALL, frameon=False)
+    describe(grid[0], 'Seen from above: a wide line for the truth, and a line for the estimate.')
+    return grid[: len(estimates)]
 
 
 def _ellipse(row, look: dict) -> Ellipse:
@@ -215,10 +256,12 @@ def _tree_layout(transforms: pd.DataFrame) -> tuple[dict[str, int], dict[str, fl
     return depths, rows
 
 
-def _check_lines(what: str, tables: Mapping[str, pd.DataFrame], *columns: str) -> None:
+def _check_lines(
+    what: str, tables: Mapping[str, pd.DataFrame], *columns: str, most: int = len(LINE_LOOKS)
+) -> None:
     """Raise TypeError or ValueError where the tables by name cannot be drawn as lines."""
     if not isinstance(tables, Mapping):
         raise TypeError(f'Give each {what} a name: {{"a name": table}}.')
-    check_count(f'{what}s', tables, len(LINE_LOOKS))
+    check_count(f'{what}s', tables, most)
     for name, table in tables.items():
         check_columns(table, columns, f'The {what} {name!r}')
