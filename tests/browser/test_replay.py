@@ -9,6 +9,7 @@ from support.runs import assert_is_the_run, real_runs
 
 from helpers.queue_model import predict
 from helpers.replay import replay, side_by_side
+from tools.lessons.clean import NOTEBOOK_METADATA
 
 SOURCE = """from helpers.queue_model import predict
 from helpers.replay import replay
@@ -65,7 +66,7 @@ def notebook(*shown):
         content = {'data': data, 'metadata': {}, 'execution_count': number + 1}
         message = {'header': {'msg_type': 'execute_result'}, 'content': content}
         cells.append(new_code_cell('shown', outputs=[output_from_msg(message)]))
-    return new_notebook(cells=cells)
+    return new_notebook(cells=cells, metadata=NOTEBOOK_METADATA)
 
 
 @pytest.fixture
