@@ -9,7 +9,6 @@ model.js decides what may happen, view.js shows it.
 
 from __future__ import annotations
 
-import json
 import re
 from collections import deque
 from collections.abc import Mapping
@@ -17,7 +16,6 @@ from dataclasses import dataclass
 from functools import cache
 from html import escape
 from itertools import chain
-from pathlib import Path
 
 import pandas as pd
 
@@ -25,6 +23,7 @@ from helpers.queue_model import check_count
 from helpers.recording import check_table
 from helpers.replay.events import ARRIVE, END, TAKE, Event, events
 from helpers.replay.picture import LEFT, NARROW, RIGHT, WIDTH, address, picture
+from helpers.replay.script import attribute, source
 from helpers.values import shown
 
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
@@ -36,8 +35,6 @@ ROWS_IN_WORDS = (
 CROSSES_IN_WORDS = (
     ' A cross is where it was pushed out, and a dotted line leads to the message that did it.'
 )
-# A text of JavaScript, or a sign with spaces around it. Lines stay: some end a statement.
-SPACE = re.compile(r"""('(?:\\.|[^'\\])*'|`(?:\\.|[^`\\])*`)| *([-{}()[\],;:?=<>+*&|!]) *""")
 
 
 @dataclass(frozen=True)
@@ -125,11 +122,9 @@ class Replay:
             'plot': [round(LEFT / width, 4), round(1 - RIGHT / width, 4)],
             'runs': [run.record() for run in self.runs],
         }
-        # In single quotes, of which JSON has none but in texts.
-        data = json.dumps(record, separators=(',', ':')).replace('&', '&amp;').replace("'", '&#39;')
         html = (
-            f'<div class="replay" data-record=\'{data.replace("<", "&lt;")}\'>'
-            f'<style>{_part("style.css")}</style><p>{escape(str(self))}</p>{figures}'
+            f'<div class="replay" data-record={attribute(record)}>'
+            f'<style>{source("style.css")}</style><p>{escape(str(self))}</p>{figures}'
             f'<script>{_script()}</script></div>'
         )
         return {'text/plain': str(self), 'text/html': html}
@@ -237,16 +232,4 @@ def _natural(name: str) -> list:
 
 @cache
 def _script() -> str:
-    return f'(() => {{\n{_part("model.js")}{_part("walk.js")}{_part("view.js")}}})();'
-
-
-@cache
-def _part(name: str) -> str:
-    """Return a file of this folder without comments, and without spaces that mean nothing."""
-    text = Path(__file__).with_name(name).read_text()
-    lines = (line.strip() for line in text.splitlines())
-    code = ''.join(f'{line}\n' for line in lines if line and not line.startswith('//'))
-    if name.endswith('.css'):
-        return re.sub(r'\s*([{};,])\s*|: ', lambda found: found[1] or ':', code)
-    code = SPACE.sub(lambda found: found[1] or found[2], code)
-    return re.sub(r'(?<=[{;,(])\n|\n(?=})', '', code)
+    return f'(() => {{\n{source("model.js")}{source("walk.js")}{source("view.js")}}})();'

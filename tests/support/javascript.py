@@ -61,15 +61,15 @@ const last = (setup, moves) => after(setup, moves).says;
 
 
 class Script:
-    """model.js and walk.js. `call` gives and takes what JSON can say."""
+    """model.js and another file, and GLUE. `call` gives and takes what JSON can say."""
 
-    def __init__(self) -> None:
+    def __init__(self, other: str = 'walk.js', glue: str = GLUE) -> None:
         self._context = quickjs.Context()
-        for name in ('model.js', 'walk.js'):
+        for name in ('model.js', other):
             self._context.eval((FOLDER / name).read_text())
-        self._context.eval(GLUE)
+        self._context.eval(glue)
 
     def call(self, function: str, *arguments):
-        """Return what a function of GLUE returns."""
+        """Return what a function of the glue returns."""
         given = ', '.join(json.dumps(argument) for argument in arguments)
         return json.loads(self._context.eval(f'JSON.stringify({function}({given}))'))

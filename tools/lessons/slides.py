@@ -40,7 +40,7 @@ MARKUP = re.compile(r'<[^>]+>|\]\([^)]*\)|[*`\[]')
 CODE = {8: (2.78, 62.0), 18: (2.78, 38.0), 24: (2.78, 28.0), 999: (2.1, 28.0)}
 DENSE = 2.1  # the size of a letter in a cell of more than 18 lines with a figure
 CODE_LINE, CODE_CHARACTER = 1.2, 0.61  # times the size of a letter
-REPLAY = 80.0  # one row of threads, and the picture that it makes smaller
+REPLAY = 80.0  # one row of threads, and the picture that it makes smaller; a level is no higher
 PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 
 
@@ -143,7 +143,7 @@ def _height_of_output(output: NotebookNode, letter: float, figure: float) -> flo
     if png := png_of(output):
         width, tall = (int.from_bytes(png[i : i + 4], 'big') for i in (16, 20))
         return min(figure, WIDTH * tall / max(width, 1)) + BORDER
-    if '<div class="replay"' in data.get('text/html', ''):
+    if '<div class="replay' in data.get('text/html', ''):
         return REPLAY
     if 'text/html' in data:
         return data['text/html'].count('<tr') * TABLE_ROW

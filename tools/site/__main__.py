@@ -24,6 +24,7 @@ from nbformat.v4 import new_markdown_cell
 from PIL import Image
 from sphinx.cmd.build import build_main
 
+from helpers.replay.levels import level
 from tools.lessons.export import fetch_packages, is_widget
 from tools.lessons.lesson import FOLDER, GLOSSARY, PARTS, ROOT, START, Lesson, lessons
 from tools.site.book import write as write_book
@@ -118,7 +119,7 @@ def prepare(pages: Path, book: bool) -> None:
     for file in (*HERE.glob('*.css'), packages / URDU):
         shutil.copy(file, static)
     parts = _parts(known)
-    first = _printed_contents(parts, known) if book else (HERE / 'index.md').read_text('utf-8')
+    first = _printed_contents(parts, known) if book else _first_page()
     toctrees = (CONTENTS.format(part=part, pages='\n'.join(parts[part])) for part in parts)
     (pages / 'index.md').write_text(first + ''.join(toctrees), encoding='utf-8')
 
@@ -139,6 +140,11 @@ def _parts(known: list[Lesson]) -> dict[str, list[str]]:
         part = names.get(one.number) or one.part.capitalize()
         parts.setdefault(part, []).append(f'notebooks/{Path(one.file).stem}')
     return parts | {'Documents': list(DOCUMENTS)}
+
+
+def _first_page() -> str:
+    raw = f'```{{raw}} html\n{level("save").html()}\n```'
+    return (HERE / 'index.md').read_text('utf-8').replace('{level}', raw)
 
 
 def _printed_contents(parts: dict[str, list[str]], known: list[Lesson]) -> str:

@@ -1,0 +1,111 @@
+// The learner is the executor. What is allowed is decided in model.js; here is what may be tried,
+// when a game is over, and how well it went. No page here.
+
+const model = queueModel();
+
+// A game of one setup. `goal` is 'keep' (lose no message), 'lose' (let the number count be too
+// small) or 'answer' (let all callbacks end). A state is one of model.js.
+function game({ setup, goal }) {
+  const { callbacks, arrivals = [] } = setup;
+  const stepOf = run => (callbacks[run.callback].does ?? [{ work: undefined }])[run.step];
+  const canStep = run => run && !run.waits && run.until === undefined;
+
+  const SCORES = {
+    keep: state => state.lost.length,
+    lose: state => state.values.count ?? 0,
+    answer: state => state.runs.concat(state.asleep).filter(Boolean).length,
+  };
+  // The less the better, in each kind of level.
+  const score = SCORES[goal];
+
+  const VERBS = { read: 'read', write: 'write', lock: 'take', unlock: 'give back', call: 'ask' };
+
+  function stepText(run) {
+    const [[verb, what]] = Object.entries(stepOf(run));
+    if (verb === 'work') return `end ${model.named(setup, run)}`;
+    return `${VERBS[verb]} ${verb === 'call' ? callbacks[what].name : what}`;
+  }
+
+  // What may be tried now, [{move, text}]. What the rules forbid is among it, to be refused.
+  function choices(state) {
+    const [first] = model.due(setup, state);
+    const found = first ? [{ move: first, text: 'Wait' }] : [];
+    state.runs.forEach((run, thread) => {
+      if (!canStep(run)) return;
+      const move = { do: 'work' in stepOf(run) ? 'end' : 'go', thread };
+      found.push({ move, text: `${setup.threads[thread]}: ${stepText(run)}` });
+    });
+    const thread = Math.max(state.runs.indexOf(null), 0);
+    callbacks.forEach((_, callback) => state.queues[callback].forEach(({ seq }) => {
+      const text = `Take ${model.named(setup, { callback, seq })}`;
+      found.push({ move: { do: 'take', callback, thread, seq }, text });
+    }));
+    return found;
+  }
+
+  // '' where the choice is allowed, else the sentence of the rule that forbids it.
+  function refusal(state, move) {
+    const refused = model.refusal(setup, state, move);
+    if (refused || move.do !== 'take') return refused;
+    const { callback, seq } = move;
+    const [oldest] = state.queues[callback];
+    if (oldest.seq === seq) return '';
+    const older = model.named(setup, { callback, seq: oldest.seq });
+    return `A queue gives its oldest first, and ${older} is older.`;
+  }
+
+  // What happens without a choice: what is due now, and the end of what has no more to do.
+  function automatic(state) {
+    const [first] = model.due(setup, state);
+    if (first && first.at <= state.now) return first;
+    const thread = state.runs.findIndex(run => canStep(run) && !stepOf(run));
+    return thread < 0 ? undefined : { do: 'end', thread };
+  }
+
+  // Let it happen in the state, and return the sentences. Where nothing more arrives, nothing more
+  // can be lost, and the rest is done at once.
+  function settle(state) {
+    const said = [];
+    let next = automatic(state);
+    for (; next; next = automatic(state)) said.push(model.advance(setup, state, next));
+    if (goal !== 'keep' || state.arrived < arrivals.length) return said;
+    next = model.eager(setup, state);
+    if (next) said.push('No more come. What still waits is done, one after the other.');
+    for (; next; next = model.eager(setup, state)) model.advance(setup, state, next);
+    return said;
+  }
+
+  function start() {
+    const state = model.start(setup);
+    settle(state);
+    return state;
+  }
+
+  // Do what was chosen: a new state, and what happened. The state that came in stays as it was.
+  function choose(state, move) {
+    const after = model.copy(state);
+    const says = [model.advance(setup, after, move), ...settle(after)].join(' ');
+    return { state: after, says };
+  }
+
+  const isOver = state => choices(state).every(({ move }) => refusal(state, move));
+
+  // The lowest score that any order of choices reaches: all are tried.
+  function best() {
+    const seen = new Set();
+    let least = Infinity;
+    function visit(state) {
+      const key = JSON.stringify(state);
+      if (seen.has(key) || (goal === 'keep' && score(state) >= least)) return;
+      seen.add(key);
+      const allowed = choices(state).filter(({ move }) => !refusal(state, move));
+      if (!allowed.length) least = Math.min(least, score(state));
+      // A thread that takes at once is tried first: that is often the best.
+      allowed.reverse().forEach(({ move }) => visit(choose(state, move).state));
+    }
+    visit(start());
+    return least;
+  }
+
+  return { start, choices, refusal, choose, isOver, score, best };
+}

@@ -1,0 +1,250 @@
+"""Levels: the game, played by chance and by the real rclpy."""
+
+import json
+import re
+import threading
+from collections import deque
+from html import unescape
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from std_msgs.msg import Int32
+from support.javascript import FOLDER, Script
+from support.nodes import LIMIT_S, spin
+
+from helpers.replay.levels import LEVELS, level
+from helpers.replay.script import source
+from helpers.session import ros_session
+from tools.lessons.lesson import lessons
+
+GLUE = """
+// Play with numbers that say which choice is tried, and go round in them.
+function play(setup, goal, numbers) {
+  const it = game({ setup, goal });
+  let state = it.start();
+  const tried = [];
+  for (let i = 0; i < 200 && !it.isOver(state); i += 1) {
+    const choices = it.choices(state);
+    const { move } = choices[numbers[i % numbers.length] % choices.length];
+    const before = JSON.stringify(state);
+    const refused = it.refusal(state, move);
+    // A queue is known by its callback: the model takes its oldest.
+    const rules = model.refusal(setup, state, move);
+    const isOldest = move.do !== 'take' || move.seq === state.queues[move.callback][0].seq;
+    tried.push({ ...move, refused, rules, isOldest });
+    if (!refused) state = it.choose(state, move).state;
+    else if (before !== JSON.stringify(state)) throw new Error('a refusal changed the state');
+  }
+  return { tried, over: it.isOver(state), score: it.score(state), best: it.best(), state };
+}
+
+// The lowest score of all orders of the model's own moves, without the choices of game.js.
+function least(setup, goal) {
+  const { score } = game({ setup, goal });
+  const seen = new Set();
+  let found = Infinity;
+  function visit(state) {
+    const key = JSON.stringify(state);
+    if (seen.has(key)) return;
+    seen.add(key);
+    const allowed = model.moves(setup, state);
+    if (!allowed.length) found = Math.min(found, score(state));
+    allowed.forEach(move => visit(model.apply(setup, state, move).state));
+  }
+  visit(model.start(setup));
+  return found;
+}
+
+// Do the moves of a real run; a move that the rules forbid is an error.
+function follow(setup, goal, moves) {
+  const state = model.start(setup);
+  moves.forEach(move => model.advance(setup, state, move));
+  const lost = state.lost.map(({ callback, seq }) => [callback, seq]);
+  return { lost, score: game({ setup, goal }).score(state) };
+}
+"""
+VARIANTS = [
+    pytest.param(one.goal, variant, id='-'.join([name, *map(str, values)]))
+    for name, one in LEVELS.items()
+    for values, variant in one.variants().items()
+]
+OF_TOPICS = [one for one in VARIANTS if one.values[0] == 'keep']
+
+
+@pytest.fixture(scope='module')
+def script():
+    return Script('game.js', GLUE)
+
+
+# The rules
+
+
+@pytest.mark.parametrize(('goal', 'variant'), VARIANTS)
+@settings(max_examples=10)
+@given(numbers=st.lists(st.integers(0, 6), min_size=30, max_size=30))
+def test_what_is_not_refused_is_allowed_by_the_model(script, goal, variant, numbers):
+    played = script.call('play', variant.setup, goal, numbers)
+    for tried in played['tried']:
+        assert bool(tried['refused']) == (bool(tried['rules']) or not tried['isOldest'])
+        assert not tried['rules'] or tried['refused'] == tried['rules']
+    if played['over']:
+        assert played['score'] >= played['best']
+
+
+@pytest.mark.parametrize(('goal', 'variant'), VARIANTS)
+def test_the_best_is_the_best_of_all_walks(script, goal, variant):
+    played = script.call('play', variant.setup, goal, [0])
+    assert played['best'] == script.call('least', variant.setup, goal)
+
+
+def best(script, name, *values):
+    one = level(name)
+    return script.call('play', one.variants()[values].setup, one.goal, [0])['best']
+
+
+def test_what_the_levels_teach_is_so(script):
+    assert best(script, 'save') > 0
+    assert [best(script, 'depth', depth) for depth in (1, 2, 4)] == [3, 2, 0]
+    one, both = 'Mutually exclusive', 'Reentrant'
+    assert [best(script, 'threads', *c) for c in ((1, one), (2, one), (1, both))] == [2, 2, 2]
+    assert best(script, 'threads', 2, both) == 0
+    assert [best(script, 'counter', lock) for lock in ('without', 'with')] == [1, 2]
+
+
+def test_the_first_level_is_short(script):
+    one = level('save')
+    (variant,) = one.variants().values()
+    played = script.call('play', variant.setup, one.goal, [0])
+    allowed = [tried for tried in played['tried'] if not tried['refused']]
+    assert len(allowed) <= 12
+
+
+def test_a_queue_gives_its_oldest_first(script):
+    (variant,) = level('save').variants().values()
+    # Picture 0 is left to wait; with 1 beside it, the newer one is tried.
+    played = script.call('play', variant.setup, 'keep', [0, 2, 1, 0])
+    assert [tried['refused'] for tried in played['tried'][:3]] == [
+        '',
+        'A queue gives its oldest first, and picture 0 is older.',
+        '',
+    ]
+
+
+# The real rclpy
+
+
+def real_run(setup):
+    """Let rclpy be the executor of a setup. Return its moves, and what was never heard.
+
+    The clock is the setup's: a message is published when its time has come, and a callback is held
+    until its work is done. What runs next is rclpy's own choice: each time, the clock waits until
+    it has made it. Which of the free threads takes a message is not compared.
+    """
+    exclusive = [group['exclusive'] for group in setup['groups']]
+    depths = [callback['depth'] for callback in setup['callbacks']]
+    waiting = [deque(maxlen=depth) for depth in depths]
+    entered, running = deque(), []
+    threads = len(setup['threads'])
+
+    def hold(callback, message):
+        done = threading.Event()
+        entered.append((callback, message.data, done))
+        assert done.wait(LIMIT_S)
+
+    def can_start():
+        busy = {setup['callbacks'][callback]['group'] for _, callback, *_ in running}
+        groups = [setup['callbacks'][i]['group'] for i, queue in enumerate(waiting) if queue]
+        return len(running) < threads and any(g not in busy or not exclusive[g] for g in groups)
+
+    arrivals = [(move['at'], move['callback'], move['seq']) for move in setup['arrivals']]
+    moves, heard = [], set()
+    with ros_session() as session:
+        node, publisher_node = Node('listener'), Node('talker')
+        groups = [
+            MutuallyExclusiveCallbackGroup() if one else ReentrantCallbackGroup()
+            for one in exclusive
+        ]
+        publishers = []
+        for index, callback in enumerate(setup['callbacks']):
+            node.create_subscription(
+                Int32,
+                callback['name'],
+                lambda message, index=index: hold(index, message),
+                callback['depth'],
+                callback_group=groups[callback['group']],
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            )
+            publishers.append(publisher_node.create_publisher(Int32, callback['name'], 10))
+        spin(session, node, threads=threads)
+        while arrivals or running:
+            ends = sorted(running)
+            if arrivals and (not ends or arrivals[0][0] <= ends[0][0]):
+                now, callback, seq = arrivals.pop(0)
+                publishers[callback].publish(Int32(data=seq))
+                waiting[callback].append(seq)
+                moves.append({'do': 'arrive', 'at': now, 'callback': callback, 'seq': seq})
+            else:
+                now, callback, seq, thread, done = ends[0]
+                running.remove(ends[0])
+                done.set()
+                moves.append({'do': 'end', 'at': now, 'thread': thread})
+            while can_start():
+                session.wait_until(lambda: entered, LIMIT_S)
+                callback, seq, done = entered.popleft()
+                heard.add((callback, seq))
+                waiting[callback].remove(seq)
+                thread = min(set(range(threads)) - {one[3] for one in running})
+                (step,) = setup['callbacks'][callback]['does']
+                running.append((now + step['work'], callback, seq, thread, done))
+                moves.append({'do': 'take', 'at': now, 'callback': callback, 'thread': thread})
+        assert not entered
+    published = {(move['callback'], move['seq']) for move in setup['arrivals']}
+    return moves, sorted(published - heard)
+
+
+@pytest.mark.parametrize(('goal', 'variant'), OF_TOPICS)
+def test_rclpy_did_what_the_level_says(script, goal, variant):
+    moves, lost = real_run(variant.setup)
+    followed = script.call('follow', variant.setup, goal, moves)
+    assert sorted(map(tuple, followed['lost'])) == lost
+    assert followed['score'] == variant.rclpy
+
+
+def test_who_gets_an_answer_is_what_rclpy_did():
+    """The real run is that of lesson 06: its table, as it is saved there."""
+    (lesson,) = (one for one in lessons() if one.name == 'call_a_service_from_a_callback')
+    texts = [
+        output.get('data', {}).get('text/plain', '')
+        for cell in lesson.notebook.cells
+        for output in cell.get('outputs', [])
+    ]
+    (table,) = (text for text in texts if 'done callback' in text and 'Reentrant' in text)
+    answers = re.findall('yes|no', table.partition('\n')[2].replace('one', ''))[::3]
+    said = [variant.rclpy for variant in level('deadlock').variants().values()]
+    assert ['no' if unfinished else 'yes' for unfinished in said] == answers
+
+
+# The page
+
+
+def test_a_level_is_one_text_each_time():
+    bundle = level('save')._repr_mimebundle_()
+    assert bundle['text/plain'] == str(level('save'))
+    assert bundle == level('save')._repr_mimebundle_()
+    record = json.loads(unescape(re.search("data-level='([^']*)'", bundle['text/html'])[1]))
+    assert record['variants'][0]['setup'] == level('save').variant().setup
+
+
+def test_all_scripts_together_are_small():
+    scripts = list(FOLDER.glob('*.js'))
+    assert sum(len(source(path.name)) for path in scripts) <= 40_000
+
+
+def test_a_name_without_a_level_is_one_sentence():
+    with pytest.raises(ValueError, match="There is no level 'chess'. There are: save, ") as failure:
+        level('chess')
+    assert '\n' not in str(failure.value)
