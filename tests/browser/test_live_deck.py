@@ -6,6 +6,9 @@ from lab_server import ROOT
 LESSON = '02_lose_messages.ipynb'
 SAVED = f'() => !{PANEL}.context.model.dirty'
 AUTOSAVE = f'() => {PANEL}.context.save()'  # what JupyterLab's timer does
+REPLAY = """from helpers.queue_model import predict
+from helpers.replay import replay
+replay(predict(0.05, 0.2, 10, 1, 41), 10)"""
 LETTER = (
     "() => parseFloat(getComputedStyle(document.querySelector('.cm-focused .cm-line')).fontSize)"
 )
@@ -114,3 +117,30 @@ def test_the_deck_stays_where_it_was(deck):
     deck.page.keyboard.press('Escape')
     deck.page.wait_for_function(IN_SIGHT)
     assert deck.active() == place
+
+
+def test_from_the_first_slide_all_come_again(deck):
+    deck.present(LESSON)
+    places = [deck.press('Space') for _ in range(12)]
+    deck.press('Home')
+    assert [deck.press('Space') for _ in range(12)] == places
+
+
+def test_a_clicker_steps_through_a_replay(deck):
+    deck.present(LESSON)
+    code = walk_to_code(deck)
+    deck.page.keyboard.press('Enter')
+    deck.page.keyboard.press('Control+A')
+    deck.page.keyboard.insert_text(REPLAY)
+    deck.page.keyboard.press('Control+Enter')
+    says = deck.page.locator('.jp-deck-mod-onscreen .replay-on [aria-live]')
+    first = says.inner_text()
+    for key in ('PageDown', 'ArrowRight'):
+        deck.page.keyboard.press(key)
+        assert says.inner_text() != first
+        deck.page.keyboard.press('PageUp')
+        assert says.inner_text() == first
+    assert deck.active() == code
+    deck.screenshot('replay')
+    deck.page.keyboard.press('End')
+    assert deck.press('PageDown') > code

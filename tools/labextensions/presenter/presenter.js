@@ -1,6 +1,6 @@
 // What `make present` adds to jupyterlab-slideshow 0.3.4: editing stays editing, keys that change
-// the notebook do nothing, a clicker walks, and the deck stands where it was after a reload. It also
-// keeps that place for the instructor's window, tools/notes_window.
+// the notebook do nothing, a clicker walks and steps through replays, and the deck stands where it
+// was after a reload. It also keeps that place for the instructor's window, tools/notes_window.
 //
 // JupyterLab loads this file as it is. It has the form of a prebuilt extension, so that neither
 // webpack nor npm is needed.
@@ -10,6 +10,7 @@ const LESSON_S = 4 * 3600; // a deck that was left open longer begins anew
 // Of JupyterLab's keys in command mode, those that leave the notebook as it is.
 const HARMLESS =
   /^(Arrow(Left|Right|Up|Down)|(Control|Shift) Enter|(Shift )?Tab|Enter|Control s|i|0)$/;
+const STEPS = ['PageDown', 'ArrowRight']; // a replay on the slide takes these before the deck
 const ACTIONS = {
   ' ': 'next',
   PageDown: 'next',
@@ -36,7 +37,11 @@ function activate(app, manager) {
     const presenter = manager._presenters.find(one => one.id === 'notebooks');
     keepEditing(presenter);
     keepPlace(presenter, app.serviceManager.workspaces);
-    window.addEventListener('keydown', event => onKey(event, app, manager), true);
+    // A replay takes its keys first. At its ends it lets the walking ones go on to the deck.
+    const inReplay = event => event.target.closest?.('.replay-on');
+    const walk = event => onKey(event, manager, presenter);
+    window.addEventListener('keydown', event => inReplay(event) || walk(event), true);
+    window.addEventListener('keydown', event => inReplay(event) && walk(event));
   });
 }
 
@@ -80,7 +85,7 @@ function keepPlace(presenter, workspaces) {
   };
 }
 
-function onKey(event, app, manager) {
+function onKey(event, manager, presenter) {
   const notebook = manager.activeWidget?.content;
   const nowhere = event.target === document.body; // as after a reload
   if (
@@ -96,19 +101,27 @@ function onKey(event, app, manager) {
   const modifiers = ['Control', 'Alt', 'Shift', 'Meta'].filter(key => event.getModifierState(key));
   const key = [...modifiers, event.key].join(' ');
   const black = document.body.classList.contains('deck-black');
+  const replay = notebook.activeCell.node.querySelector('.replay-on');
+  if (replay && !black && !replay.contains(event.target) && STEPS.includes(key)) {
+    event.stopImmediatePropagation();
+    event.preventDefault();
+    replay.focus();
+    replay.dispatchEvent(new KeyboardEvent('keydown', event));
+    return;
+  }
   const action = black ? 'black' : ACTIONS[key];
   if (!action && HARMLESS.test(key) && !nowhere) return;
   event.stopImmediatePropagation(); // the browser's own keys, such as F5 and F11, still work
   if (action) {
     event.preventDefault();
-    act(action, app, manager);
+    act(action, manager, presenter);
   } else if (HARMLESS.test(key)) {
     event.preventDefault();
     notebook.activeCell.node.dispatchEvent(new KeyboardEvent('keydown', event));
   }
 }
 
-function act(action, app, manager) {
+function act(action, manager, presenter) {
   const { content } = manager.activeWidget;
   switch (action) {
     case 'next':
@@ -116,6 +129,7 @@ function act(action, app, manager) {
     case 'back':
       return manager.go('up', 'back');
     case 'first':
+      presenter._extents.delete(content.model); // each slide begins with its first part again
       content.activeCellIndex = 0;
       return;
     case 'black':
