@@ -20,7 +20,7 @@ from nbconvert.exporters import SlidesExporter
 from nbformat import NotebookNode
 
 from tools.lessons.lesson import FOLDER, GLOSSARY, ROOT, chosen
-from tools.lessons.slides import CODE, folded, slide_types
+from tools.lessons.slides import CODE, folded, heading, slide_types
 
 HERE = Path(__file__).resolve().parents[1]
 TEMPLATE = HERE / 'deck_template'
@@ -78,7 +78,7 @@ def for_reveal(notebook: NotebookNode) -> NotebookNode:
             lines = len(cell.source.splitlines())
             tags += [f'more-than-{most}-lines' for most in CODE if lines > most]
             cell.outputs = [output for output in cell.outputs if not is_widget(output)]
-        if re.match('##? ', cell.source):  # a step begins, and its note is after the heading
+        if heading(cell, '##? '):  # a step begins, and its note is after the heading
             note = None
         cells.append(cell)
         if note and slide_type in ('slide', 'subslide'):  # the step goes on: so does its note

@@ -73,11 +73,16 @@ def _groups(notebook: NotebookNode) -> list[list[NotebookNode]]:
 def _slide_type(cell: NotebookNode, first: bool, fits: bool) -> str:
     if _tags(cell) & SKIPPED:
         return 'skip'
-    if first or re.match(r'##? ', cell.source):
+    if first or heading(cell, '##? '):
         return 'slide'
-    if not fits or re.match('### (?!Explain)', cell.source) or _tags(cell) & ALONE:
+    if not fits or heading(cell, '### (?!Explain)') or _tags(cell) & ALONE:
         return 'subslide'
     return 'fragment'
+
+
+def heading(cell: NotebookNode, form: str) -> bool:
+    """Say whether a cell of text begins with a heading of this form, a regular expression."""
+    return cell.cell_type == 'markdown' and bool(re.match(form, cell.source))
 
 
 def _tags(cell: NotebookNode) -> set[str]:
