@@ -82,7 +82,7 @@ function show(root, level) {
     ready.textContent = '';
     now.choices(state).forEach(({ move, text }, place) => ready.append(element('li', {},
       element('button', { type: 'button', onclick: () => choose(move) },
-        element('kbd', { 'aria-hidden': 'true' }, `${place + 1}`), text))));
+        element('span', { 'aria-hidden': 'true', class: 'level-key' }, `${place + 1}`), text))));
     ready.classList.toggle('level-over', over);
     if (over) say(...result());
     if (index >= 0) (buttons()[index] ?? buttons()[0] ?? again).focus();

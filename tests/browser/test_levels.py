@@ -1,0 +1,126 @@
+"""Levels as they are played: by keys alone, on a phone, in JupyterLab."""
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+from helpers.replay.levels import level
+from tools.lessons.clean import NOTEBOOK_METADATA
+
+START = 'Choose what happens next'
+PAGE = '<!doctype html><meta name="viewport" content="width=device-width"><div tabindex="0">'
+
+
+@pytest.fixture
+def page(chromium, tmp_path):
+    """Return a function that opens levels on a page from a file, without a network."""
+    context = chromium.new_context(viewport={'width': 360, 'height': 720}, offline=True)
+    tab = context.new_page()
+    errors = []
+    tab.on('pageerror', lambda error: errors.append(str(error)))
+
+    def open_page(*names):
+        file = tmp_path / 'levels.html'
+        file.write_text(PAGE + ''.join(level(name).html() for name in names), encoding='utf-8')
+        tab.goto(file.as_uri())
+        return tab
+
+    yield open_page
+    context.close()
+    assert errors == []
+
+
+def items(root, name):
+    return root.get_by_role('list', name=name).get_by_role('listitem').all_inner_texts()
+
+
+def test_the_first_level_by_keys_alone(page, artefacts):
+    page = page('save')
+    root = page.get_by_role('group', name='level')
+    says = root.locator('[aria-live=polite]')
+    assert says.inner_text().startswith(START)
+    assert 'run the cell' not in root.inner_text()
+    page.keyboard.press('Tab')
+    page.keyboard.press('Tab')
+    assert root.evaluate('root => document.activeElement === root')
+    assert root.evaluate('root => getComputedStyle(root).outlineStyle') == 'solid'
+    page.keyboard.press('2')
+    assert items(root, 'threads') == ['the program: picture 0']
+    page.keyboard.press('1')
+    page.keyboard.press('2')
+    assert says.inner_text() == (
+        'No. The program is busy with picture 0: a thread runs one callback at a time.'
+    )
+    assert items(root, 'queue') == ['1']
+    page.keyboard.press('1')
+    # The same by Tab and Enter, and by the arrows.
+    page.keyboard.press('ArrowRight')
+    page.keyboard.press('Enter')
+    assert items(root, 'queue') == ['2', '3']
+    assert items(root, 'lost') == ['1']
+    page.keyboard.press('Enter')
+    assert items(root, 'threads') == ['the program: free']
+    page.keyboard.press('ArrowRight')
+    page.keyboard.press('Enter')
+    page.keyboard.press('1')
+    page.keyboard.press('1')
+    assert 'You: 2 lost. The best possible: 2 lost.' in says.inner_text()
+    assert 'no order saves them all' in says.inner_text()
+    page.screenshot(path=artefacts / 'level_save.png')
+    # The focus is on what can be done next, and Escape leaves.
+    page.keyboard.press('Enter')
+    assert says.inner_text().startswith(START)
+    page.keyboard.press('Escape')
+    assert root.evaluate('root => !root.contains(document.activeElement)')
+
+
+def test_a_deadlock_lights_up_and_other_groups_end_it(page, artefacts):
+    page = page('save', 'deadlock')
+    root = page.get_by_role('group', name='level').nth(1)
+    threads, groups = root.get_by_label('threads').first, root.locator('select').nth(1)
+    threads.select_option('2')
+    for key in '1111':
+        root.focus()
+        page.keyboard.press(key)
+    says = root.locator('[aria-live=polite]')
+    assert 'You: the answer never comes. The best possible: the answer never comes.' in (
+        says.inner_text()
+    )
+    assert root.locator('.level-stuck').count() == 2
+    assert 'MultiThreadedExecutor(num_threads=2)' in root.locator('pre').inner_text()
+    page.screenshot(path=artefacts / 'level_deadlock.png', full_page=True)
+    groups.select_option('two groups')
+    for key in '11111':
+        root.focus()
+        page.keyboard.press(key)
+    assert 'You: the answer comes.' in says.inner_text()
+    assert root.locator('.level-stuck').count() == 0
+
+
+def test_on_a_phone(page):
+    page = page('save', 'starve', 'threads', 'deadlock')
+    assert page.evaluate('() => document.documentElement.scrollWidth <= innerWidth')
+    for button in page.locator('.level button, .level select').all():
+        box = button.bounding_box()
+        assert box['height'] >= 44
+        assert box['width'] >= 44
+
+
+def test_in_jupyterlab(lab):
+    source = "from helpers.replay.levels import level\nlevel('save')"
+    cells = [new_markdown_cell('# 98 Play'), new_code_cell(source)]
+    path = lab.server.folder / 'notebooks' / '98_play.ipynb'
+    nbformat.write(new_notebook(cells=cells, metadata=NOTEBOOK_METADATA), path)
+    lab.open(path.name)
+    lab.run(1)
+    root = lab.page.locator('.level')
+    root.focus()
+    before = [(cell['cell_type'], cell['source']) for cell in lab.cells()]
+    for key in ['2', 'd', 'd', 'm', 'b', 'ArrowDown', 'Enter', '1']:
+        lab.page.keyboard.press(key)
+    assert [(cell['cell_type'], cell['source']) for cell in lab.cells()] == before
+    assert items(root, 'threads') == ['the program: picture 0']
+    assert items(root, 'queue') == ['1', '2']
+    lab.screenshot('level_lab')
+    lab.page.keyboard.press('Escape')
+    assert root.evaluate('root => !root.contains(document.activeElement)')
