@@ -108,6 +108,7 @@ def best(script, name, *values):
 
 def test_what_the_levels_teach_is_so(script):
     assert best(script, 'save') > 0
+    assert best(script, 'starve') > 0
     assert [best(script, 'depth', depth) for depth in (1, 2, 4)] == [3, 2, 0]
     one, both = 'Mutually exclusive', 'Reentrant'
     assert [best(script, 'threads', *c) for c in ((1, one), (2, one), (1, both))] == [2, 2, 2]

@@ -153,8 +153,9 @@ def _starve() -> Variant:
                 key=lambda arrival: arrival['at'],
             ),
         },
-        'The best order lets the camera wait: one picture is pushed out, and the IMU loses none. '
-        'With one thread, somebody starves. rclpy does not know whom you would choose.',
+        "No order saves them all. While the camera's callback runs, messages of the IMU push each "
+        'other out; while the camera waits, a picture is pushed out. With one thread somebody has '
+        'to wait, and rclpy does not know whom you would choose.',
         rclpy=2,
     )
 
