@@ -58,7 +58,11 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
                 if 'text/html' in data:
                     data['text/html'] = _with_files(data['text/html'], figures)
         cells.append(cell)
-    cells[0].source += f'\n\n<a href="{file}" download>Download this lesson as a notebook</a>'
+    cells[
+        0
+    ].source += (
+        f'\n\n<a class="lesson-file" href="{file}" download>Download this lesson as a notebook</a>'
+    )
     notebook.cells = cells
     notebook.metadata['language_info'] = {'name': 'python', 'pygments_lexer': 'cell'}
     return notebook
@@ -149,12 +153,13 @@ def _first_page() -> str:
 
 def _printed_contents(parts: dict[str, list[str]], known: list[Lesson]) -> str:
     titles = {f'notebooks/{Path(one.file).stem}': f'{one.number} {one.title}' for one in known}
-    rows = [
-        f'- [{titles[page]}]({page}.ipynb)' if page in titles else f'- [{page}]({page}.md)'
-        for part in parts
-        for page in parts[part]
+    for name in DOCUMENTS:
+        titles[name] = (ROOT / f'{name}.md').read_text('utf-8').splitlines()[0].lstrip('# ')
+    files = [
+        page + ('.ipynb' if '/' in page else '.md') for pages in parts.values() for page in pages
     ]
-    return '\n'.join(['# ROS 2 in notebooks', '', ':::{container} contents', *rows, ':::', ''])
+    rows = [f'- [{titles[file.rpartition(".")[0]]}]({file})' for file in files]
+    return '\n'.join(['# ROS 2 in notebooks', '', '```{container} contents', *rows, '```', ''])
 
 
 def main(arguments: list[str]) -> int:
