@@ -72,7 +72,9 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
     return says;
   }
 
-  const node = element('section', { class: 'replay-run', 'aria-label': record.name || undefined },
+  // No section: reveal.js takes each for a slide.
+  const name = record.name || undefined;
+  const node = element('div', { class: 'replay-run', role: name && 'group', 'aria-label': name },
     row(record.name || 'time', time),
     row('threads', threads), row('groups', groups),
     row('queue', queue, places), row('lost', lost), shown);

@@ -101,7 +101,7 @@ function onKey(event, manager, presenter) {
   const modifiers = ['Control', 'Alt', 'Shift', 'Meta'].filter(key => event.getModifierState(key));
   const key = [...modifiers, event.key].join(' ');
   const black = document.body.classList.contains('deck-black');
-  const replay = notebook.activeCell.node.querySelector('.replay-on');
+  const replay = notebook.activeCell.node.querySelector('.replay-on:not(.level)');
   if (replay && !black && !replay.contains(event.target) && STEPS.includes(key)) {
     event.stopImmediatePropagation();
     event.preventDefault();
