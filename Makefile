@@ -81,7 +81,7 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
 set_up:
-	@tools/set_up.sh
+	@mkdir -p .jupyter && tools/set_up.sh
 
 .PHONY: help lab present test test-tools test-browser hub test-hub handout update notebooks lesson slides site book sources \
 	soak bench lint lock licences clean set_up
