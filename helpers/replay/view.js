@@ -112,11 +112,11 @@ function show(root, record) {
   const button = (name, onclick, label) =>
     element('button', { type: 'button', onclick, 'aria-label': label }, name);
   const play = button('Play', toggle);
-  const faster = button('1×', () => {
+  const faster = button('Speed 1×', () => {
     delay = (delay + 1) % DELAYS.length;
-    faster.textContent = `${DELAYS[0] / DELAYS[delay]}×`;
+    faster.textContent = `Speed ${DELAYS[0] / DELAYS[delay]}×`;
     if (playing) begin();
-  }, 'faster');
+  });
   const loss = button('Next loss', () => {
     const step = nextLoss();
     if (step === undefined) says.textContent = 'No message is lost after this.';

@@ -190,7 +190,7 @@ def test_buttons_slider_and_numbers(exported, prediction):
     assert says.inner_text().startswith('The callback of message 40 ends.')
     shown.get_by_role('button', name='Next loss').click()
     assert says.inner_text() == 'No message is lost after this.'
-    shown.get_by_role('button', name='faster').click()
+    shown.get_by_role('button', name='Speed').click()
     shown.get_by_role('button', name='Play').click()
     page.wait_for_function("() => /arrives/.test(document.querySelector('.replay-says').innerText)")
     shown.get_by_role('button', name='Pause').click()

@@ -27,11 +27,13 @@ pygments_dark_style = 'a11y-high-contrast-dark'
 
 
 # What screen readers and keyboards miss in the pages of Sphinx, myst-nb and furo: the level of a
-# heading in the menu, the words of a fold, and the key focus of code that scrolls.
+# heading in the menu, the words of a fold, and the key focus of what scrolls.
 REPAIRS = [
     ('furo_navigation_tree', 'role="heading"', 'role="heading" aria-level="2"'),
     ('body', '<summary aria-label="Toggle hidden content">', '<summary>'),
     ('body', '<pre>', '<pre tabindex="0">'),
+    ('body', '<div class="cell_output ', '<div tabindex="0" class="cell_output '),
+    ('body', '<div class="table-wrapper ', '<div tabindex="0" class="table-wrapper '),
 ]
 
 
