@@ -67,7 +67,7 @@ def test_the_window_follows_the_deck(deck, window):
             'before => document.querySelector("#cells").innerText !== before', arg=promised
         )
     deck.press('Shift+Space')
-    wait_for_place(window, deck.active(), 'Play it: five students')
+    wait_for_place(window, deck.active(), 'Step through the prediction')
     shown = [window.locator(f'#{name}').inner_text() for name in ('step', 'planned', 'all', 'gone')]
     assert shown == ['5. Explain', '25', '40', '0']
     window.screenshot(path=deck.artefacts / 'notes_window.png')
