@@ -12,8 +12,7 @@ from __future__ import annotations
 import re
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
 from html import escape
 from itertools import chain
 
@@ -23,9 +22,10 @@ from helpers.queue_model import check_count
 from helpers.recording import check_table
 from helpers.replay.events import ARRIVE, END, TAKE, Event, events
 from helpers.replay.picture import LEFT, NARROW, RIGHT, WIDTH, address, picture
-from helpers.replay.script import attribute, source
+from helpers.replay.script import attribute, script, source
 from helpers.values import shown
 
+SCRIPT = 'model.js', 'walk.js', 'element.js', 'view.js'
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
 MOST_MESSAGES = 10_000
 ROWS_IN_WORDS = (
@@ -125,7 +125,7 @@ class Replay:
         html = (
             f'<div class="replay" data-record={attribute(record)}>'
             f'<style>{source("style.css")}</style><p>{escape(str(self))}</p>{figures}'
-            f'<script>{_script()}</script></div>'
+            f'<script>{script(*SCRIPT)}</script></div>'
         )
         return {'text/plain': str(self), 'text/html': html}
 
@@ -184,13 +184,7 @@ def replay(
 
 def side_by_side(runs: Mapping[str, Replay]) -> Replay:
     """Return several replays as one, stepped together in the order of time: `{'before': ...}`."""
-    return Replay(
-        tuple(
-            Run(name, run.messages, run.lost, run.setup, run.events, run.first)
-            for name, one in runs.items()
-            for run in one.runs
-        )
-    )
+    return Replay(tuple(replace(run, name=name) for name, one in runs.items() for run in one.runs))
 
 
 def _part_of(made: list[Event], depth: int, bounds: tuple[int, int]) -> tuple[list[Event], int]:
@@ -228,8 +222,3 @@ def _alternative(run: Run) -> str:
 def _natural(name: str) -> list:
     """Sort key that puts 'thread 2' before 'thread 10'."""
     return [int(part) if part.isdecimal() else part for part in re.split(r'(\d+)', name)]
-
-
-@cache
-def _script() -> str:
-    return f'(() => {{\n{source("model.js")}{source("walk.js")}{source("view.js")}}})();'

@@ -83,9 +83,8 @@ function game({ setup, goal }) {
 
   // Do what was chosen: a new state, and what happened. The state that came in stays as it was.
   function choose(state, move) {
-    const after = model.copy(state);
-    const says = [model.advance(setup, after, move), ...settle(after)].join(' ');
-    return { state: after, says };
+    const { state: after, says } = model.apply(setup, state, move);
+    return { state: after, says: [says, ...settle(after)].join(' ') };
   }
 
   const isOver = state => choices(state).every(({ move }) => refusal(state, move));

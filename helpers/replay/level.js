@@ -4,16 +4,6 @@
 // A level is {goal, options: [{name, values}], variants: [{setup, code, lesson, rclpy}]}: one
 // variant for each combination of the options, the last option changing first.
 function show(root, level) {
-  function element(tag, attributes = {}, ...children) {
-    const made = document.createElement(tag);
-    for (const [name, value] of Object.entries(attributes)) {
-      if (typeof value === 'function') made[name] = value;
-      else if (value !== undefined) made.setAttribute(name, value);
-    }
-    made.append(...children);
-    return made;
-  }
-
   const WORDS = {
     keep: count => (count ? `${count} lost` : 'none lost'),
     lose: count => `the count is ${count}`,
@@ -60,7 +50,7 @@ function show(root, level) {
     if (setup.threads.length * setup.groups.length > 1) {
       row('groups', setup.groups.map(({ name, exclusive }, group) => {
         if (!exclusive) return [`${name}: lets all in`];
-        const holder = state.runs.find(run => run && setup.callbacks[run.callback].group === group);
+        const holder = model.holderOf(setup, state, group);
         return holder ? [`${name}: held by ${model.named(setup, holder)}`, kind(holder)]
           : [`${name}: free`];
       }));

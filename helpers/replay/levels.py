@@ -12,13 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 from html import escape
 from itertools import product
 
-from helpers.replay.script import attribute, source
+from helpers.replay.script import attribute, script, source
 from helpers.values import shown
 
+SCRIPT = 'model.js', 'game.js', 'element.js', 'level.js'
 ONE = 'SingleThreadedExecutor()'
 
 
@@ -69,7 +69,7 @@ class Level:
             f'<div class="replay level" data-level={attribute(record)}>'
             f'<style>{source("style.css")}{source("level.css")}</style><p>{escape(self.task)}</p>'
             '<p class="level-static">To play it, run the cell, or trust the notebook.</p>'
-            f'<script>{_script()}</script></div>'
+            f'<script>{script(*SCRIPT)}</script></div>'
         )
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
@@ -81,11 +81,6 @@ def level(name: str) -> Level:
     if name not in LEVELS:
         raise ValueError(f'There is no level {shown(name)}. There are: {", ".join(LEVELS)}.')
     return LEVELS[name]
-
-
-@cache
-def _script() -> str:
-    return f'(() => {{\n{source("model.js")}{source("game.js")}{source("level.js")}}})();'
 
 
 def _threads(number: int) -> list[str]:
@@ -163,16 +158,14 @@ def _starve() -> Variant:
 def _threads_and_groups(threads: int, group: str) -> Variant:
     reentrant = group == 'Reentrant'
     lessons = {
-        (
-            1,
-            False,
-        ): 'One thread runs one callback at a time. Give it a second thread: is that enough?',
-        (
-            2,
-            False,
-        ): 'The second thread had nothing to do: the group lets one callback in at a time.',
-        (1, True): 'The group lets all in, but there is only one thread.',
-        (2, True): 'Two threads, and a group that lets both in: none is lost. You need both.',
+        'Mutually exclusive': {
+            1: 'One thread runs one callback at a time. Give it a second thread: is that enough?',
+            2: 'The second thread had nothing to do: the group lets one callback in at a time.',
+        },
+        'Reentrant': {
+            1: 'The group lets all in, but there is only one thread.',
+            2: 'Two threads, and a group that lets both in: none is lost. You need both.',
+        },
     }
     return Variant(
         {
@@ -181,7 +174,7 @@ def _threads_and_groups(threads: int, group: str) -> Variant:
             'callbacks': [{'name': 'topic', 'group': 0, 'depth': 1, 'does': [{'work': 1.9}]}],
             'arrivals': _arrivals(0, [0, 1, 2, 3, 4, 5]),
         },
-        lessons[threads, reentrant],
+        lessons[group][threads],
         f'executor = {_executor(threads)}\n'
         f'group = {group.title().replace(" ", "")}CallbackGroup()\n'
         'self.create_subscription(\n'

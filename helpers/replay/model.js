@@ -70,11 +70,14 @@ function queueModel() {
   // All runs that have begun and not ended: they hold their groups.
   const going = state => state.runs.filter(Boolean).concat(state.asleep);
 
-  function holder(setup, state, callback) {
-    const { group } = setup.callbacks[callback];
+  // Who is in a group that lets one in at a time.
+  function holderOf(setup, state, group) {
     if (!setup.groups[group].exclusive) return undefined;
     return going(state).find(run => setup.callbacks[run.callback].group === group);
   }
+
+  const holder = (setup, state, callback) =>
+    holderOf(setup, state, setup.callbacks[callback].group);
 
   // What the clock brings next, where a schedule or a work with a number says so.
   function due(setup, state) {
@@ -371,5 +374,5 @@ function queueModel() {
   const isSame = (one, other) =>
     other && one.do === other.do && one.thread === other.thread && one.seq === other.seq;
 
-  return { start, copy, due, refusal, moves, cause, circle, advance, apply, eager, named };
+  return { start, copy, due, refusal, moves, cause, circle, advance, apply, eager, named, holderOf };
 }

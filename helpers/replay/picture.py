@@ -71,8 +71,8 @@ def picture(
     waits: dict[str, list[str]] = {}
     runs, crosses, pushed = [], [], []
     phases = causes(events, threads, exclusive)
-    seqs = [event.seq for event in events if event.do == ARRIVE]
     arrivals = {event.seq: event.at_s for event in events if event.do == ARRIVE}
+    seqs = list(arrivals)
     for row, event in enumerate(published):
         by = seqs[row + depth] if row + depth < len(seqs) else None
         left = taken.get(event.seq, arrivals.get(by, until_s))
@@ -87,15 +87,11 @@ def picture(
             if by in rows:
                 pushed.append(f'M{x(left)} {y(event.seq)}V{y(by)}')
 
-    def path(lines: list[str], colour: str, line: float, dashes: str = '') -> str:
-        dashed = f' stroke-dasharray="{dashes}"' if dashes else ''
-        return f'<path d="{"".join(lines)}" stroke="{colour}" stroke-width="{line:g}"{dashed}/>'
-
     thin, thick = max(1.5, step * 0.3), max(3.0, step * 0.7)
     seen = {name: look for name, look in CAUSES.items() if name in waits}
-    parts = [path(waits[name], look[0], thin, look[1]) for name, look in seen.items()]
+    parts = [_path(waits[name], look[0], thin, look[1]) for name, look in seen.items()]
     parts += [
-        path(lines, *look)
+        _path(lines, *look)
         for lines, look in (
             (pushed, (LOST, 0.8, '1 2')),
             (runs, (HEARD, thick)),
@@ -108,16 +104,12 @@ def picture(
         legend.append((HEARD, thick, '', 'callback runs'))
     if crosses:
         legend.append((LOST, 0, '', 'pushed out'))
-    texts, at = [], LEFT
-    for colour, line, dashes, words in legend:
-        mark = [f'M{at} 12h22'] if line else [f'M{at + 8} 9l6 6m0-6l-6 6']
-        parts.append(path(mark, colour, line or 1.6, dashes))
-        texts.append(f'<text x="{at + 28}" y="16">{escape(words)}</text>')
-        at += 44 + 7 * len(words)
+    marks, texts = _legend(legend)
+    parts += marks
     bottom = height - BOTTOM
     for tick in MaxNLocator(max(2, width // 110)).tick_values(from_s, until_s):
         if from_s <= tick <= until_s:
-            parts.append(path([f'M{x(tick)} {bottom:g}v5'], INK, 1))
+            parts.append(_path([f'M{x(tick)} {bottom:g}v5'], INK, 1))
             texts.append(
                 f'<text x="{x(tick)}" y="{bottom + 18:g}" text-anchor="middle">{tick:g}</text>'
             )
@@ -129,13 +121,29 @@ def picture(
     ]
     middle = (width + LEFT) // 2
     texts.append(f'<text x="{middle}" y="{bottom + 34:g}" text-anchor="middle">{TIME_LABEL}</text>')
-    parts.append(path([f'M{LEFT} {bottom:g}H{width - RIGHT}'], INK, 1))
+    parts.append(_path([f'M{LEFT} {bottom:g}H{width - RIGHT}'], INK, 1))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:g}" '
         f'width="{width}" height="{height:g}"><rect width="100%" height="100%" fill="#fff"/>'
         f'<g fill="none">{"".join(parts)}</g><g font-family="sans-serif" font-size="12" '
         f'fill="{INK}">{"".join(texts)}</g></svg>'
     )
+
+
+def _path(lines: list[str], colour: str, line: float, dashes: str = '') -> str:
+    dashed = f' stroke-dasharray="{dashes}"' if dashes else ''
+    return f'<path d="{"".join(lines)}" stroke="{colour}" stroke-width="{line:g}"{dashed}/>'
+
+
+def _legend(entries: list[tuple[str, float, str, str]]) -> tuple[list[str], list[str]]:
+    """Return marks and texts of entries: colour, width of a line (0 for a cross), dashes, words."""
+    marks, texts, at = [], [], LEFT
+    for colour, line, dashes, words in entries:
+        mark = [f'M{at} 12h22'] if line else [f'M{at + 8} 9l6 6m0-6l-6 6']
+        marks.append(_path(mark, colour, line or 1.6, dashes))
+        texts.append(f'<text x="{at + 28}" y="16">{escape(words)}</text>')
+        at += 44 + 7 * len(words)
+    return marks, texts
 
 
 def address(svg: str) -> str:

@@ -21,6 +21,12 @@ def source(name: str) -> str:
     return re.sub(r'(?<=[{;,(])\n|\n(?=})', '', code)
 
 
+@cache
+def script(*names: str) -> str:
+    """Return files of this folder as one script that leaves no name on the page."""
+    return f'(() => {{\n{"".join(map(source, names))}}})();'
+
+
 def attribute(value: dict) -> str:
     """Return a value as JSON in an attribute of HTML, with its quotes.
 

@@ -4,16 +4,6 @@
 const MOST_ITEMS = 100; // of a list; what is more is counted
 const DELAYS = [800, 400, 200, 100, 50]; // ms a step, while it plays
 
-function element(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (typeof value === 'function') made[name] = value;
-    else if (value !== undefined) made.setAttribute(name, value);
-  }
-  made.append(...children);
-  return made;
-}
-
 // The lists of one run.
 function panel(run, record, picture, { span: [from, until], plot: [left, right] }) {
   const list = name => element('ul', { 'aria-label': name, role: 'list', class: `replay-${name}` });
@@ -48,12 +38,9 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
       })
       : [['no executor']]);
     fill(groups, setup.groups.map(({ name, exclusive }, group) => {
-      const holders = [...state.runs, ...state.asleep].filter(
-        it => it && setup.callbacks[it.callback].group === group);
       if (!exclusive) return [`${name}: lets all in`];
-      return holders.length
-        ? [`${name}: held by ${seqOf(holders[0])}`, 'replay-busy']
-        : [`${name}: free`];
+      const holder = model.holderOf(setup, state, group);
+      return holder ? [`${name}: held by ${seqOf(holder)}`, 'replay-busy'] : [`${name}: free`];
     }));
     const waiting = setup.callbacks.flatMap((_, callback) =>
       state.queues[callback].map(item => ({ ...item, callback })));
