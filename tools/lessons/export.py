@@ -19,7 +19,7 @@ import nbformat
 from nbconvert.exporters import SlidesExporter
 from nbformat import NotebookNode
 
-from tools.lessons.lesson import FOLDER, GLOSSARY, ROOT, chosen
+from tools.lessons.lesson import FOLDER, GLOSSARY, ROOT, chosen, first_heading
 from tools.lessons.slides import CODE, folded, heading, slide_types
 
 HERE = Path(__file__).resolve().parents[1]
@@ -101,7 +101,7 @@ def export(path: Path, output: Path) -> Path:
         extra_template_basedirs=[str(TEMPLATE.parent)],
     )
     notebook = for_reveal(nbformat.read(path, as_version=4))
-    title = notebook.cells[0].source.splitlines()[0].lstrip('# ')
+    title = first_heading(notebook.cells[0].source)
     resources = {'metadata': {'title': title, 'path': str(path.parent)}}
     html, _ = exporter.from_notebook_node(notebook, resources)
     file = output / path.with_suffix('.html').name

@@ -118,8 +118,8 @@ class Lesson:
         for cell in self.notebook.cells:
             if heading := re.match(r'## (\w+)', cell.source):
                 step = heading[1]
-            if note := re.match(rf'{NOTE}: (\d+) minutes', cell.source):
-                found[step] = found.get(step, 0) + int(note[1])
+            if minutes := minutes_of_note(cell.source):
+                found[step] = found.get(step, 0) + minutes
         return found
 
     def minutes_of(self, steps: tuple[int, int] | None) -> int:
@@ -143,6 +143,17 @@ class Lesson:
         if found := re.search(pattern, text, re.MULTILINE):
             return found
         raise ValueError(f'{self.file} needs a {what}.')
+
+
+def minutes_of_note(source: str) -> int:
+    """Return the minutes that a note for the instructor names; 0 for what is none."""
+    found = re.match(rf'{NOTE}: (\d+) minutes', source)
+    return int(found[1]) if found else 0
+
+
+def first_heading(text: str) -> str:
+    """Return the words of the heading with which a text begins."""
+    return text.splitlines()[0].lstrip('# ')
 
 
 def read(text: str, file: str) -> Lesson:

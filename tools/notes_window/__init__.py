@@ -10,7 +10,6 @@ Where the deck is, presenter.js keeps in a workspace of JupyterLab. The rest sta
 import hmac
 import html
 import os
-import re
 import secrets
 import socket
 import sys
@@ -27,8 +26,9 @@ from tornado import web
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
-from tools.lessons.lesson import NOTE
+from tools.lessons.lesson import first_heading, minutes_of_note
 from tools.lessons.present import FOLDER
+from tools.lessons.slides import heading
 
 HERE = Path(__file__).resolve().parent
 PORTS = range(8900, 8950)
@@ -58,25 +58,21 @@ def state(root: Path, deck: dict) -> dict:
     types = [cell.metadata.get('slideshow', {}).get('slide_type') for cell in cells]
     starts = [i for i, kind in enumerate(types) if kind in ('slide', 'subslide')]
     starts += [len(cells)] * 2  # the end of the last slide, and of the one after it, which is empty
-    steps = [
-        i
-        for i, cell in enumerate(cells)
-        if cell.cell_type == 'markdown' and re.match('##? ', cell.source)
-    ]
+    steps = [i for i, cell in enumerate(cells) if heading(cell, '##? ')]
     slide = sum(start <= at for start in starts)
     on_slide = range(at + 1, starts[slide])
     on_slide = [cells[i] for i in on_slide if types[i] == 'fragment']
     following = [cells[i] for i in range(*starts[slide : slide + 2]) if types[i] != 'skip']
     notes = [i for i, cell in enumerate(cells) if 'notes' in cell.metadata.get('tags', [])]
-    minutes = {i: _minutes(cells[i].source) for i in notes}
+    minutes = {i: minutes_of_note(cells[i].source) for i in notes}
     step = max((i for i in steps if i <= at), default=0)
     end = min((i for i in steps if i > at), default=len(cells))
     before = [i for i in notes if i < end]
     of_step = [i for i in before if i > step] or before[-1:]  # a note may be for two steps
     began = deck['began'].get(deck['current'])
     return {
-        'lesson': cells[0].source.splitlines()[0].lstrip('# '),
-        'step': cells[step].source.splitlines()[0].lstrip('# '),
+        'lesson': first_heading(cells[0].source),
+        'step': first_heading(cells[step].source),
         'slide': slide,
         'slides': len(starts) - 2,
         'notes': ''.join(markdown2html(cells[i].source) for i in of_step),
@@ -92,11 +88,6 @@ def state(root: Path, deck: dict) -> dict:
 def _cells(file: Path, _changed: int) -> list[nbformat.NotebookNode]:
     """Return the cells of a notebook. It is read again where the time of its change is another."""
     return nbformat.read(file, as_version=4).cells
-
-
-def _minutes(note: str) -> int:
-    found = re.match(rf'{NOTE}: (\d+) minutes', note)
-    return int(found[1]) if found else 0
 
 
 def _html(cell: nbformat.NotebookNode) -> str:

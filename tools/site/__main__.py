@@ -26,7 +26,16 @@ from sphinx.cmd.build import build_main
 
 from helpers.replay.levels import level
 from tools.lessons.export import fetch_packages, is_widget
-from tools.lessons.lesson import FOLDER, GLOSSARY, PARTS, ROOT, START, Lesson, lessons
+from tools.lessons.lesson import (
+    FOLDER,
+    GLOSSARY,
+    PARTS,
+    ROOT,
+    START,
+    Lesson,
+    first_heading,
+    lessons,
+)
 from tools.site.book import write as write_book
 
 HERE = Path(__file__).parent
@@ -58,11 +67,10 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
                 if 'text/html' in data:
                     data['text/html'] = _with_files(data['text/html'], figures)
         cells.append(cell)
-    cells[
-        0
-    ].source += (
-        f'\n\n<a class="lesson-file" href="{file}" download>Download this lesson as a notebook</a>'
+    download = (
+        f'<a class="lesson-file" href="{file}" download>Download this lesson as a notebook</a>'
     )
+    cells[0].source += f'\n\n{download}'
     notebook.cells = cells
     notebook.metadata['language_info'] = {'name': 'python', 'pygments_lexer': 'cell'}
     return notebook
@@ -154,7 +162,7 @@ def _first_page() -> str:
 def _printed_contents(parts: dict[str, list[str]], known: list[Lesson]) -> str:
     titles = {f'notebooks/{Path(one.file).stem}': f'{one.number} {one.title}' for one in known}
     for name in DOCUMENTS:
-        titles[name] = (ROOT / f'{name}.md').read_text('utf-8').splitlines()[0].lstrip('# ')
+        titles[name] = first_heading((ROOT / f'{name}.md').read_text('utf-8'))
     files = [
         page + ('.ipynb' if '/' in page else '.md') for pages in parts.values() for page in pages
     ]
