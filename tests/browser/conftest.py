@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -105,6 +105,27 @@ def deck(tabs, instructor_server, request) -> Iterator[LabPage]:
         yield opened
     for path, before in copies.items():
         path.write_bytes(before)
+
+
+@pytest.fixture
+def file_page(chromium) -> Callable:
+    """Return a context manager that opens a tab for a page from a file, without a network.
+
+    At its end no script of the page has failed, but for what `expected` names.
+    """
+
+    @contextmanager
+    def opened(width: int, height: int, expected: tuple[str, ...] = (), **options):
+        size = {'width': width, 'height': height}
+        context = chromium.new_context(viewport=size, offline=True, **options)
+        tab = context.new_page()
+        errors = []
+        tab.on('pageerror', lambda error: errors.append(str(error)))
+        yield tab
+        context.close()
+        assert [e for e in errors if not any(word in e for word in expected)] == []
+
+    return opened
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

@@ -58,23 +58,20 @@ def folder(tmp_path_factory):
 
 
 @pytest.fixture
-def open_deck(chromium, folder):
+def open_deck(file_page, folder):
     """Return a function that opens an exported deck. Nothing but files may be asked for."""
-    context = chromium.new_context(viewport={'width': 1280, 'height': 720}, offline=True)
-    page = context.new_page()
-    asked, failed = [], []
-    page.on('request', lambda request: asked.append(request.url))
-    page.on('requestfailed', lambda request: failed.append(request.url))
-    page.on('pageerror', lambda error: failed.append(str(error)))
+    with file_page(1280, 720) as page:
+        asked, failed = [], []
+        page.on('request', lambda request: asked.append(request.url))
+        page.on('requestfailed', lambda request: failed.append(request.url))
 
-    def open_deck(name):
-        page.goto(folder.joinpath(name).as_uri())
-        page.wait_for_function('() => window.Reveal?.isReady() && MathJax.startup.promise')
-        page.evaluate('() => MathJax.startup.promise')
-        return page
+        def open_deck(name):
+            page.goto(folder.joinpath(name).as_uri())
+            page.wait_for_function('() => window.Reveal?.isReady() && MathJax.startup.promise')
+            page.evaluate('() => MathJax.startup.promise')
+            return page
 
-    yield open_deck
-    context.close()
+        yield open_deck
     assert [url for url in asked if not url.startswith(('file:', 'data:'))] == []
     assert failed == []
 

@@ -12,22 +12,17 @@ PAGE = '<!doctype html><meta name="viewport" content="width=device-width"><div t
 
 
 @pytest.fixture
-def page(chromium, tmp_path):
-    """Return a function that opens levels on a page from a file, without a network."""
-    context = chromium.new_context(viewport={'width': 360, 'height': 720}, offline=True)
-    tab = context.new_page()
-    errors = []
-    tab.on('pageerror', lambda error: errors.append(str(error)))
+def page(file_page, tmp_path):
+    """Return a function that opens levels on a page from a file."""
+    with file_page(360, 720) as tab:
 
-    def open_page(*names):
-        file = tmp_path / 'levels.html'
-        file.write_text(PAGE + ''.join(level(name).html() for name in names), encoding='utf-8')
-        tab.goto(file.as_uri())
-        return tab
+        def open_page(*names):
+            file = tmp_path / 'levels.html'
+            file.write_text(PAGE + ''.join(level(name).html() for name in names), encoding='utf-8')
+            tab.goto(file.as_uri())
+            return tab
 
-    yield open_page
-    context.close()
-    assert errors == []
+        yield open_page
 
 
 def items(root, name):

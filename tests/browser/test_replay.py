@@ -75,25 +75,20 @@ def prediction():
 
 
 @pytest.fixture
-def exported(chromium, tmp_path):
-    """Return a function that opens replays on a page exported by nbconvert, without a network."""
-    context = chromium.new_context(viewport={'width': 1280, 'height': 720}, offline=True)
-    page = context.new_page()
-    errors = []
-    page.on('pageerror', lambda error: errors.append(str(error)))
-
-    def open_page(*shown, query=''):
-        html, _ = HTMLExporter().from_notebook_node(notebook(*shown))
-        file = tmp_path / 'exported.html'
-        file.write_text(html)
-        page.goto(file.as_uri() + query, wait_until='domcontentloaded')
-        page.wait_for_selector('.replay-on')
-        return page
-
-    yield open_page
-    context.close()
+def exported(file_page, tmp_path):
+    """Return a function that opens replays on a page exported by nbconvert."""
     # The page asks for its mathematics and its own loader in vain; replays ask for nothing.
-    assert [e for e in errors if 'require' not in e and 'MathJax' not in e] == []
+    with file_page(1280, 720, expected=('require', 'MathJax')) as page:
+
+        def open_page(*shown, query=''):
+            html, _ = HTMLExporter().from_notebook_node(notebook(*shown))
+            file = tmp_path / 'exported.html'
+            file.write_text(html)
+            page.goto(file.as_uri() + query, wait_until='domcontentloaded')
+            page.wait_for_selector('.replay-on')
+            return page
+
+        yield open_page
 
 
 def states(read, run=0):
@@ -272,20 +267,16 @@ def test_in_jupyterlab(lab, prediction):
         lab.page.keyboard.press(key)
     assert [(c['cell_type'], c['source']) for c in lab.cells()] == before
     assert says.inner_text() == PUSHED_OUT
-    lab.screenshot('replay_lab')
-    lab.page.evaluate(
-        "() => window.jupyterapp.commands.execute('apputils:change-theme',"
-        " { theme: 'JupyterLab Dark' })"
-    )
-    lab.page.wait_for_function("() => document.body.dataset.jpThemeLight === 'false'")
-    assert lab.page.evaluate(CONTRAST) >= 4.5
-    lab.screenshot('replay_dark')
-    lab.page.evaluate(
-        "() => window.jupyterapp.commands.execute('apputils:change-theme',"
-        " { theme: 'JupyterLab Light' })"
-    )
-    lab.page.wait_for_function("() => document.body.dataset.jpThemeLight === 'true'")
-    assert lab.page.evaluate(CONTRAST) >= 4.5
+    for theme, is_light in (('Dark', 'false'), ('Light', 'true')):
+        lab.page.evaluate(
+            "theme => window.jupyterapp.commands.execute('apputils:change-theme', { theme })",
+            f'JupyterLab {theme}',
+        )
+        lab.page.wait_for_function(
+            'is_light => document.body.dataset.jpThemeLight === is_light', arg=is_light
+        )
+        assert lab.page.evaluate(CONTRAST) >= 4.5
+        lab.screenshot(f'replay_{theme.lower()}')
     # A notebook that this server has saved is trusted when it is opened again, if all was run here.
     lab.page.evaluate(f'() => {PANEL}.content.model.sharedModel.deleteCell({saved})')
     lab.page.evaluate(f'() => {PANEL}.context.save()')
