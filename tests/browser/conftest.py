@@ -73,35 +73,40 @@ def tabs(chromium) -> Iterator[BrowserContext]:
         yield context
 
 
-@contextmanager
-def page(tabs: BrowserContext, running: Server, name: str) -> Iterator[LabPage]:
-    """Open a tab. No request may leave this machine."""
-    tab = tabs.new_page()
-    outside = []
-    tab.on('request', lambda r: r.url.startswith(LOCAL) or outside.append(r.url))
-    lab = LabPage(tab, running, ARTEFACTS)
-    try:
-        yield lab
-    finally:
-        lab.screenshot(re.sub(r'\W+', '_', name).strip('_'))
-        lab.close()
-        tab.close()
-    assert outside == []
+@pytest.fixture
+def lab_page(tabs) -> Callable:
+    """Return a context manager that opens a tab of a server. No request may leave this machine."""
+
+    @contextmanager
+    def opened(running: Server, name: str) -> Iterator[LabPage]:
+        tab = tabs.new_page()
+        outside = []
+        tab.on('request', lambda r: r.url.startswith(LOCAL) or outside.append(r.url))
+        lab = LabPage(tab, running, ARTEFACTS)
+        try:
+            yield lab
+        finally:
+            lab.screenshot(re.sub(r'\W+', '_', name).strip('_'))
+            lab.close()
+            tab.close()
+        assert outside == []
+
+    return opened
 
 
 @pytest.fixture
-def lab(tabs, student_server, request) -> Iterator[LabPage]:
+def lab(lab_page, student_server, request) -> Iterator[LabPage]:
     """Yield a student's page."""
-    with page(tabs, student_server, request.node.name) as opened:
+    with lab_page(student_server, request.node.name) as opened:
         yield opened
 
 
 @pytest.fixture
-def deck(tabs, instructor_server, request) -> Iterator[LabPage]:
+def deck(lab_page, instructor_server, request) -> Iterator[LabPage]:
     """Yield an instructor's page. What is changed in the copies does not reach the next test."""
     folder = instructor_server.folder / 'presentation'
     copies = {path: path.read_bytes() for path in folder.glob('*.ipynb')}
-    with page(tabs, instructor_server, request.node.name) as opened:
+    with lab_page(instructor_server, request.node.name) as opened:
         yield opened
     for path, before in copies.items():
         path.write_bytes(before)

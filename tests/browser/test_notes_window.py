@@ -10,8 +10,6 @@ import psutil
 import pytest
 from lab_server import ROOT, server
 
-from conftest import page
-
 LESSON = '02_lose_messages.ipynb'
 CELLS = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4).cells
 SLIDES = [cell.metadata.slideshow['slide_type'] in ('slide', 'subslide') for cell in CELLS]
@@ -118,15 +116,15 @@ def test_without_a_tablet_nobody_else_reaches_the_notes(deck):
     assert listening == '127.0.0.1'
 
 
-def test_a_server_that_was_started_again_shows_the_same_slide(tabs, tmp_path):
+def test_a_server_that_was_started_again_shows_the_same_slide(lab_page, tmp_path):
     arguments = (tmp_path, 'present', 'LESSON=02', 'FRESH=no')
-    with server(*arguments) as running, page(tabs, running, 'before') as deck:
+    with server(*arguments) as running, lab_page(running, 'before') as deck:
         deck.present(LESSON)
         place = [deck.press('PageDown') for _ in range(4)][-1]
         with deck.page.expect_popup() as opened:
             deck.page.keyboard.press('n')
         wait_for_place(opened.value, place)  # it is saved
-    with server(*arguments) as running, page(tabs, running, 'after') as deck:
+    with server(*arguments) as running, lab_page(running, 'after') as deck:
         deck.page.goto(running.address)
         deck.wait_for_notebook(f'presentation/{LESSON}')
         deck.wait_for_slide(place)
