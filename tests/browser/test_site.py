@@ -1,5 +1,6 @@
 """The web site, opened from its folder without a network. `make test-browser` has written it."""
 
+import gzip
 import re
 from html.parser import HTMLParser
 from urllib.parse import unquote, urlparse
@@ -78,6 +79,16 @@ def test_nothing_is_loaded_from_elsewhere(pages):
 
 def test_it_is_small():
     assert sum(path.stat().st_size for path in SITE.rglob('*')) <= 15 * MEGABYTE
+
+
+@pytest.mark.parametrize('name', ['index.html', *LESSONS])
+def test_the_text_is_there_in_a_second_on_a_slow_line(pages, name):
+    # 1.6 Mbit/s is 200 kB a second, and half of it is left for the ways there and back. A web
+    # server packs what it sends. Figures and the Urdu font come after the text.
+    links = [link for link in pages[name].loaded if re.search(r'\.(css|js)(\?|$)', link)]
+    paths = ((SITE / name).parent / urlparse(link).path for link in links)
+    sent = [gzip.compress(path.read_bytes()) for path in (SITE / name, *paths)]
+    assert sum(map(len, sent)) <= 0.1 * MEGABYTE
 
 
 def test_a_lesson_is_downloaded_as_it_is(pages):

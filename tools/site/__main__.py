@@ -19,6 +19,7 @@ from copy import deepcopy
 from pathlib import Path
 
 import nbformat
+from fontTools import subset
 from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell
 from PIL import Image
@@ -128,12 +129,20 @@ def prepare(pages: Path, book: bool) -> None:
         (pages / file).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / file, pages / file)
     shutil.copy(HERE / 'conf.py', pages)
-    for file in (*HERE.glob('*.css'), packages / URDU):
+    for file in HERE.glob('*.css'):
         shutil.copy(file, static)
+    _write_urdu_font(packages / URDU, notebooks, static)
     parts = _parts(known)
     first = _printed_contents(parts, known) if book else _first_page()
     toctrees = (CONTENTS.format(part=part, pages='\n'.join(parts[part])) for part in parts)
     (pages / 'index.md').write_text(first + ''.join(toctrees), encoding='utf-8')
+
+
+def _write_urdu_font(whole: Path, notebooks: Path, folder: Path) -> None:
+    """Write the letters of the font that the pages use: a page that opens loads the file."""
+    text = ''.join(path.read_text(encoding='utf-8') for path in notebooks.glob('*.ipynb'))
+    options = ('--flavor=woff2', '--layout-features=*', f'--output-file={folder / whole.name}')
+    subset.main([str(whole), f'--text={text}', *options])
 
 
 def _linked(pages: Path) -> set[str]:
