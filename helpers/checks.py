@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Callable, Set
 from numbers import Integral, Real
 
-from helpers import progress
+from helpers import classroom, progress
 from helpers.text import wrap
 
 NO_GUESS = 'No guess yet. Write one in the predict cell, run that cell, then run this one again.'
@@ -60,6 +60,7 @@ def compare_prediction(
     verdict = _verdict(guess, outcome, tolerance)
     answer = '' if verdict == 'right' or tolerance else f' The answer is {_written(outcome)}.'
     print(f'  Your guess: {_written(guess)}. Verdict: {verdict}.{answer}')
+    classroom.tell_outcome(question, outcome)
     if because:
         print(f'  {because}')
 
@@ -93,6 +94,7 @@ def check(title: str, *requirements: tuple[str, object | Callable[[], object], s
     _print(f'{title}: {met_ones} of {len(results)}.{cheer}')
     if done:
         progress.record(title)
+    classroom.tell_exercise(title, done)
 
 
 def _print(text: str) -> None:

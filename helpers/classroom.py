@@ -1,0 +1,378 @@
+"""A class that sees itself: guesses, exercises and steps, told to the class that one has joined.
+
+    join_class('192.0.2.5:8765', 'blue-otter-lamp')   once, from what is on the wall
+    my_guess = guess('How many are heard?', 41)       returns 41, and tells the class
+    raise_hand(), lower_hand(), leave_class()
+
+Without a class nothing is sent, shown or waited for. With one, a thread in the background writes
+each event into a file beside the student's progress, then sends it and removes it. So nothing is
+lost while the class does not answer, or when the kernel is restarted. An event has an id of its
+own, by which the class counts it once, and the file keeps the order: no clock does.
+
+On a JupyterHub the hub names the class, and its token says whose server this is.
+"""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import queue
+import re
+import secrets
+import sqlite3
+import sys
+import threading
+import time
+from collections.abc import Set
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import NamedTuple
+
+from helpers import progress
+from helpers.text import wrap
+
+HUB_VARIABLE = 'ROS2_NOTEBOOKS_CLASS'  # on a JupyterHub: the address of its class
+JOINED_FOR_S = 12 * 3600  # a class that was not left is forgotten, so that nothing is sent at home
+ADDRESS = re.compile(r'(https?://)?[\w.-]+(:\d+)?(/[\w./-]*)?')
+ANSWER_LIMIT_S = 5.0
+TRY_AGAIN_S = 2.0
+BATCH = 50
+WAITING = 1000  # events that are kept while the class does not answer; the oldest ones go first
+LARGEST = 2**53  # of numbers, which a browser holds exactly
+TEXT = 200  # letters of a text, at most
+ITEMS = 20  # of a list, a set or a dict, at most
+NOT_JOINED = 'You are in no class: join_class(address, code) joins one.'
+SENT = (
+    'Sent to it: your guesses and what you measured, which exercises you tried and solved, which '
+    'step you are at, and a raised hand. Not sent: your name, your code, its outputs.'
+)
+TABLES = """
+CREATE TABLE IF NOT EXISTS class (url TEXT, token TEXT, until_s REAL);
+CREATE TABLE IF NOT EXISTS waiting (n INTEGER PRIMARY KEY AUTOINCREMENT, kind TEXT, event TEXT);
+"""
+
+
+class Class(NamedTuple):
+    """Where events go, and the token that says who sends them. Left, on a hub: an empty address."""
+
+    url: str
+    token: str
+
+
+# --- What a notebook calls -----------------------------------------------------------------------
+
+
+def guess(question: str, value: object) -> object:
+    """Return the value. Where there is a class, tell it in the background.
+
+    The class counts the last guess of each student, of questions that the lesson has. The value
+    is a number, True or False, a text, or a few of them in a list, a tuple, a set or a dict.
+    """
+    _tell('guess', question=question, value=value)
+    _outbox.say_trouble()
+    return value
+
+
+def join_class(address: str = '', code: str = '', name: str = '') -> None:
+    """Join a class, and say what is sent: `join_class('192.0.2.5:8765', 'blue-otter-lamp')`.
+
+    The address and the code are on the wall. A name is given only by who wants to be called by it.
+    On a JupyterHub `join_class()` joins again after `leave_class()`. What does not work is said in
+    one sentence; nothing is raised.
+    """
+    try:
+        text = _join(address.strip(), code, name)
+    except ValueError as problem:
+        text = str(problem)
+    except (OSError, sqlite3.Error) as problem:
+        text = f'The class cannot be kept in {_file()}: {problem}.'
+    print(*wrap(text), sep='\n')
+
+
+def leave_class() -> None:
+    """Leave the class: it is asked to delete what it was told, and nothing more is sent."""
+    text, known = NOT_JOINED, None
+    if path := _file_of_class():
+        with closing(_open(path)) as db, db:
+            known = _class(db)
+            db.execute('DELETE FROM waiting')
+            db.execute('DELETE FROM class')
+            if HUB_VARIABLE in os.environ:
+                db.execute("INSERT INTO class VALUES ('', '', 0)")
+            else:
+                path.unlink()
+    if known:
+        try:
+            _ask(known, 'leave', {})
+            text = 'You have left the class. What you told it is deleted.'
+        except (OSError, ValueError):
+            text = 'You have left the class. It did not answer: what it was told stays there.'
+    print(text)
+
+
+def raise_hand() -> None:
+    """Tell the class "I am lost", until `lower_hand()`."""
+    _hand(True, 'Your hand is up. lower_hand() takes it down.')
+
+
+def lower_hand() -> None:
+    """Take the hand down again."""
+    _hand(False, 'Your hand is down.')
+
+
+# --- What `helpers.checks` tells -----------------------------------------------------------------
+
+
+def tell_outcome(question: str, value: object) -> None:
+    """Tell the class what was measured after a guess."""
+    _tell('outcome', question=question, value=value)
+
+
+def tell_exercise(title: str, solved: bool) -> None:
+    """Tell the class that an exercise was tried. Titles of other checks are not told."""
+    if found := progress.TITLE.fullmatch(title):
+        _tell('exercise', exercise=int(found[1]), solved=solved)
+
+
+# --- In the background ---------------------------------------------------------------------------
+
+
+class _Outbox:
+    """Keeps events in the student's file and sends them, in a thread that starts with the first."""
+
+    def __init__(self) -> None:
+        self._events: queue.Queue[dict] = queue.Queue(WAITING)
+        self._lock = threading.Lock()
+        self._thread: threading.Thread | None = None
+        self._trouble = self._said = ''
+        atexit.register(self._at_exit)
+
+    def put(self, event: dict) -> None:
+        """Take over an event. It does not wait: one that finds no room is lost."""
+        with suppress(queue.Full):
+            self._events.put_nowait(event)
+        with self._lock:
+            if self._thread is None or not self._thread.is_alive():
+                self._thread = threading.Thread(target=self._run, daemon=True, name='class')
+                self._thread.start()
+
+    def say_trouble(self) -> None:
+        """Print one line where the class has not answered since the last line."""
+        if self._trouble and self._trouble != self._said:
+            print(*wrap(self._trouble), sep='\n')
+        self._said = self._trouble
+
+    def _run(self) -> None:
+        """End where there is no class, or where the file cannot be used; `put` starts again."""
+        try:
+            with closing(_open(_file())) as db:
+                while _class(db) is not None:
+                    waiting = self._deliver(db)
+                    self._keep(db, TRY_AGAIN_S if waiting else None)
+        except (OSError, sqlite3.Error) as problem:
+            self._trouble = f'The class hears nothing, because {_file()} cannot be used: {problem}.'
+        with suppress(queue.Empty):
+            while True:
+                self._events.get_nowait()
+
+    def _at_exit(self) -> None:
+        """Keep what came while the thread waited for an answer: a next kernel sends it."""
+        with suppress(OSError, sqlite3.Error):
+            if not self._events.empty():
+                with closing(_open(_file())) as db:
+                    self._keep(db, 0)
+
+    def _keep(self, db: sqlite3.Connection, limit_s: float | None) -> None:
+        """Wait for events until the limit, if there is one, and move them into the file."""
+        with suppress(queue.Empty):
+            events = [self._events.get(timeout=limit_s)]
+            time.sleep(0.05)  # what the same cell tells next goes with it
+            while not self._events.empty():
+                events.append(self._events.get_nowait())
+            with db:
+                for event in events:
+                    if event['kind'] == 'cell':  # only the last one matters
+                        db.execute("DELETE FROM waiting WHERE kind = 'cell'")
+                    row = event['kind'], json.dumps(event)
+                    db.execute('INSERT INTO waiting (kind, event) VALUES (?, ?)', row)
+                newest = '(SELECT n FROM waiting ORDER BY n DESC LIMIT ?)'
+                db.execute(f'DELETE FROM waiting WHERE n NOT IN {newest}', [WAITING])
+
+    def _deliver(self, db: sqlite3.Connection) -> bool:
+        """Send what is in the file. Return whether something is left for later."""
+        while (known := _class(db)) and (rows := _first(db)):
+            try:
+                _ask(known, 'events', {'events': [json.loads(event) for _, event in rows]})
+            except ValueError as refused:  # the class does not know this seat any more
+                with db:
+                    db.execute('DELETE FROM waiting')
+                    if HUB_VARIABLE not in os.environ:
+                        db.execute('DELETE FROM class WHERE token = ?', [known.token])
+                self._trouble = str(refused)
+                return False
+            except OSError:
+                self._trouble = 'The class does not answer. What you tell is kept until it does.'
+                return True
+            with db:
+                db.executemany('DELETE FROM waiting WHERE n = ?', [(n,) for n, _ in rows])
+            self._trouble = ''
+        return False
+
+
+_outbox = _Outbox()
+
+
+def _tell(kind: str, **what: object) -> None:
+    """Hand an event over, if this is a lesson and there is a class. Nothing is raised."""
+    lesson = _lesson()
+    if not lesson or not _file_of_class():
+        return
+    with suppress(Exception):  # a value that no class can show; no lesson may fail because of it
+        if 'value' in what:
+            what['value'] = _small(what['value'])
+        _outbox.put({'id': secrets.token_hex(8), 'kind': kind, 'lesson': lesson, **what})
+
+
+def _hand(up: bool, text: str) -> None:
+    known = None
+    with suppress(OSError, sqlite3.Error):
+        if path := _file_of_class():
+            with closing(_open(path)) as db:
+                known = _class(db)
+    _tell('hand', up=up)
+    print(text if known else NOT_JOINED)
+    _outbox.say_trouble()
+
+
+def _join(address: str, code: str, name: str) -> str:
+    path = _file()
+    if path is None:
+        return f'There is no class here, because {progress.FILE_VARIABLE} is empty.'
+    hub = os.environ.get(HUB_VARIABLE)
+    if not hub and not (ADDRESS.fullmatch(address) and code):
+        raise ValueError("Copy it from the wall: join_class('192.0.2.5:8765', 'blue-otter-lamp').")
+    url = hub or f'{"" if "://" in address else "http://"}{address.rstrip("/")}'
+    address = address or 'the hub'
+    token = os.environ.get('JUPYTERHUB_API_TOKEN', '') if hub else ''
+    try:
+        answer = _ask(Class(url, token), 'join', {'code': code, 'name': name})
+    except OSError as problem:
+        raise ValueError(
+            f'No class answers at {address} ({problem}). Compare the address with the wall; is '
+            'this computer in the same network?'
+        ) from None
+    with closing(_open(path)) as db, db:
+        db.execute('DELETE FROM waiting')
+        db.execute('DELETE FROM class')
+        if not hub:
+            until_s = time.time() + JOINED_FOR_S
+            db.execute('INSERT INTO class VALUES (?, ?, ?)', (url, answer['token'], until_s))
+    called = f', called {name}' if name else ', without a name'
+    return (
+        f'You are in the class of {address} as number {answer["seat"]}{called}. {SENT} '
+        'leave_class() ends it, raise_hand() says that you are lost.'
+    )
+
+
+def _ask(known: Class, what: str, body: object) -> dict:
+    """Ask the class. Raises OSError where no class answers, ValueError where it refuses."""
+    from urllib import error, request  # only who is in a class waits for this import
+
+    headers = {'Content-Type': 'application/json', 'Authorization': f'token {known.token}'}
+    wanted = request.Request(f'{known.url}/{what}', json.dumps(body).encode(), headers)
+    # A class is in the same network: a proxy to the Internet would not find it.
+    opener = request.build_opener(request.ProxyHandler({}))
+    try:
+        with opener.open(wanted, timeout=ANSWER_LIMIT_S) as answer:
+            return dict(json.load(answer))
+    except error.HTTPError as refused:
+        later = refused.code == 429 and what == 'events'
+        with suppress(KeyError, TypeError, json.JSONDecodeError):
+            reason = str(json.load(refused)['error'])
+            raise (OSError if later else ValueError)(reason) from None
+        raise OSError(f'status {refused.code}') from None
+    except error.URLError as problem:
+        raise OSError(str(problem.reason)) from None
+    except OSError:
+        raise
+    except Exception as problem:  # of http.client, json, and addresses that are none
+        raise OSError(str(problem)) from None
+
+
+def _small(value: object, deep: int = 0) -> object:
+    """Return a value as JSON holds it. Raises TypeError for one that a page could not show."""
+    value = value.tolist() if hasattr(value, 'tolist') else value
+    if isinstance(value, Set):
+        value = sorted(value, key=lambda item: (len(str(item)), str(item)))
+    if (
+        isinstance(value, bool)
+        or (isinstance(value, int | float) and abs(value) < LARGEST)
+        or (isinstance(value, str) and len(value) <= TEXT)
+    ):
+        return value
+    if deep < 2 and isinstance(value, list | tuple | range | dict) and len(value) <= ITEMS:
+        if isinstance(value, dict):
+            return {str(key): _small(item, deep + 1) for key, item in value.items()}
+        return [_small(item, deep + 1) for item in value]
+    raise TypeError
+
+
+# --- What this kernel knows ----------------------------------------------------------------------
+
+
+def _file() -> Path | None:
+    path = progress.file()
+    return path and path.with_name('ros2_notebooks_class.sqlite')
+
+
+def _file_of_class() -> Path | None:
+    """Return the file if there may be a class: who has joined none has no file."""
+    path = _file()
+    return path if path and (path.exists() or HUB_VARIABLE in os.environ) else None
+
+
+def _lesson() -> str:
+    """Return the name of the lesson that this kernel runs, empty where it runs none."""
+    found = re.search(r'(?:^|/)\d\d_(\w+)\.ipynb$', os.environ.get('JPY_SESSION_NAME', ''))
+    return found[1] if found else ''
+
+
+def _open(path: Path) -> sqlite3.Connection:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.touch(mode=0o600)  # the token in it is the student's
+    db = sqlite3.connect(path)
+    try:
+        db.executescript(TABLES)
+    except sqlite3.OperationalError:  # it is locked, or cannot be written
+        raise
+    except sqlite3.DatabaseError:  # it is damaged: one can only join again
+        path.unlink()
+        return _open(path)
+    return db
+
+
+def _class(db: sqlite3.Connection) -> Class | None:
+    row = db.execute('SELECT url, token, until_s FROM class').fetchone()
+    if row and row[2] > time.time():
+        return Class(*row[:2])
+    hub = os.environ.get(HUB_VARIABLE)
+    return Class(hub, os.environ.get('JUPYTERHUB_API_TOKEN', '')) if hub and not row else None
+
+
+def _first(db: sqlite3.Connection) -> list[tuple[int, str]]:
+    return db.execute('SELECT n, event FROM waiting ORDER BY n LIMIT ?', [BATCH]).fetchall()
+
+
+def _follow_cells() -> None:
+    """Tell the class which cell runs; it knows the steps. JupyterLab names the cell to IPython."""
+    if _lesson() and 'IPython' in sys.modules and (shell := sys.modules['IPython'].get_ipython()):
+        shell.events.register('pre_run_cell', _cell_runs)
+
+
+def _cell_runs(info: object) -> None:
+    if cell := getattr(info, 'cell_id', None):
+        _tell('cell', cell=cell)
+
+
+_follow_cells()
