@@ -653,6 +653,22 @@ def test_a_cell_writes_a_file(shell, capsys):
     assert 'Give a path inside the workspace' in capsys.readouterr().err
 
 
+def test_two_cells_write_a_file_in_any_order_and_again(shell, capsys):
+    file = Workspace('test_workspace_other').file('src/a b.py')
+    shell.run_cell('%%write src/a b.py part 2\nlast = 1\n')
+    assert 'Write part 1 of src/a b.py first.' in capsys.readouterr().err
+    assert not file.exists()
+    for part, text in ((1, 'first = 1'), (2, 'last = 1'), (2, 'last = 2'), (1, 'first = 2')):
+        shell.run_cell(f'%%write src/a b.py part {part}\n{text}\n')
+        assert capsys.readouterr().out == f'Wrote part {part} of src/a b.py\n'
+    assert file.read_text() == 'first = 2\n\nlast = 2\n'
+    shell.run_cell('%%write src/a b.py\nwhole = 1\n')
+    shell.run_cell('%%write src/a b.py part 2\nlast = 3\n')
+    assert file.read_text() == 'whole = 1\n'
+    shell.run_cell('%%write\ntext\n')
+    assert 'Give a path inside the workspace' in capsys.readouterr().err
+
+
 def test_an_interrupted_cell_ends_the_processes(shell, built):
     workspace = Workspace('test_workspace_other')
     (workspace.path / 'install').symlink_to(built.path / 'install')

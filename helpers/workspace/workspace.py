@@ -56,6 +56,7 @@ class Workspace:
         self.path = underlay.path / name if underlay else claim(name)
         self._processes: dict[tuple[str, ...], Process] = {}
         self._sourced: dict[str, str] | None = None
+        self._parts: dict[Path, list[str]] = {}  # of the files that several cells write
         if self.path.exists():
             with uninterrupted():  # rmtree makes an OSError of an Interrupt
                 shutil.rmtree(self.path)
@@ -78,9 +79,20 @@ class Workspace:
             )
         return self.path / path
 
-    def write(self, relative_path: str | os.PathLike, text: str) -> None:
-        """Write a file of the workspace, and the folders above it."""
+    def write(self, relative_path: str | os.PathLike, text: str, part: int | None = None) -> None:
+        """Write a file of the workspace, and the folders above it.
+
+        With `part`, 1 or more, only this part of the file is written anew. An empty line stands
+        between the parts. Raises ValueError where the part before it was not written.
+        """
         file = self.file(relative_path)
+        parts = self._parts.pop(file, [])
+        if part is not None:
+            self._parts[file] = parts
+            if not 1 <= part <= len(parts) + 1:
+                raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
+            parts[part - 1 : part] = [text]
+            text = '\n'.join(parts)
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text, encoding='utf-8')
 
@@ -285,17 +297,21 @@ def _command(package: str, executable: str, environment: dict[str, str]) -> list
 
 
 def write(line: str, cell: str) -> None:
-    """`%%write PATH`: write the rest of the cell to a file of the open workspace."""
+    """`%%write PATH`: write the rest of the cell to a file of the open workspace.
+
+    A long file stands in several cells: `%%write PATH part 1`, `%%write PATH part 2`.
+    """
     from IPython.core.error import UsageError
 
     if _open_workspace is None:
         raise UsageError("Open a workspace first: workspace = Workspace('my_lesson').")
-    path = line.strip().strip('\'"')
+    path, part = re.fullmatch(r'(.*?)(?: part (\d+))?', line.strip()).groups()
+    path = path.strip('\'"')
     try:
-        _open_workspace.write(path, cell)
+        _open_workspace.write(path, cell, part and int(part))
     except (ValueError, OSError) as error:
         raise UsageError(str(error)) from error
-    print(f'Wrote {path}')
+    print(f'Wrote part {part} of {path}' if part else f'Wrote {path}')
 
 
 def _after_cell(result) -> None:

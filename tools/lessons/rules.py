@@ -344,7 +344,7 @@ def exercises_are_checked(lesson: Lesson) -> Iterator[str]:
             yield f'{name!r} must be called "### Exercise {count}: ...".'
         kinds = [tag[0] for cell in cells for tag in EXERCISE if tag in tags(cell)]
         inside += len(kinds)
-        if len(kinds) != len(cells) or not re.fullmatch('e+cs+', ''.join(kinds)):
+        if len(kinds) != len(cells) or not re.fullmatch('e+c+s+', ''.join(kinds)):
             yield f'{name!r} needs cells with the tags {", ".join(EXERCISE)}, in this order.'
         check = [cell for cell in cells if 'check' in tags(cell)]
         solution = [cell for cell in cells if 'solution' in tags(cell)]
