@@ -104,7 +104,7 @@ CHANGED = [
     ('practice_is_backed', 'such as step 4', 'such as a step'),
     ('practice_is_backed', 'such as step 4', 'such as step 9'),
     ('practice_is_backed', 'such as step 4.', 'such as step 4.\\n- It is [so](images/b.png).'),
-    ('guesses_are_compared', 'my_guess = 5', 'print(5)'),
+    ('guesses_are_compared', 'my_guess = guess(', 'print('),
     ('guesses_are_compared', "heard?', my_guess,", "heard?', 5,"),
     ('guesses_are_compared', 'compare_prediction(', 'print('),
     ('exercises_are_checked', '### Exercise 1', '### Exercise 2'),

@@ -38,7 +38,7 @@ PATH = re.compile(
     r'(?<![\w.])/(?:home|root|tmp|work|usr|opt|var|mnt|srv|Users|private)\b(?:/\S*)?'
     # What follows `python3/` is a tree that Workspace.print_tree wrote, below the workspace.
     r'|\b[A-Z]:\\\S+|(?<!\S)(?!python3/)\S*(?:site|dist)-packages\S*|'
-    + '|'.join(map(re.escape, sorted(THIS_MACHINE)))
+    + '|'.join(rf'{re.escape(folder)}\b' for folder in sorted(THIS_MACHINE))
 )
 TERM = re.compile(
     r'\| \*\*(?P<term>[^*]+)\*\* \| (?P<meaning>[^|]+) \| <span lang="fr">(?P<fr>[^|]+)</span>'
@@ -321,19 +321,26 @@ def has_what_a_lesson_has(lesson: Lesson) -> Iterator[str]:
 
 
 def guesses_are_compared(lesson: Lesson) -> Iterator[str]:
-    cells = code_cells(lesson)
+    """The class is asked the question with which the guess is compared: no two are the same."""
+    cells, asked = code_cells(lesson), set()
     for count, (name, cell) in enumerate(cells, 1):
         if 'predict' not in tags(cell):
             continue
-        last = last_statement(cell.source)
-        targets = [ast.unparse(target) for target in getattr(last, 'targets', [])]
-        later = [cell.source for _, cell in cells[count:]]
-        if not targets:
-            yield f'{name} must end with the guess, such as `my_guess = 41`.'
-        elif not any(
-            'compare_prediction(' in s and re.search(rf'\b{targets[0]}\b', s) for s in later
-        ):
-            yield f'No later cell gives {targets[0]} of {name} to compare_prediction.'
+        match last_statement(cell.source):
+            case ast.Assign(
+                [ast.Name(guess)],
+                ast.Call(ast.Name('guess'), [ast.Constant(str(question)), _]),
+            ):
+                pass
+            case _:
+                yield f"{name} must end like this: `my_guess = guess('How many are heard?', 41)`."
+                continue
+        if question in asked:
+            yield f'{name} asks what another guess asks: {question!r}.'
+        asked.add(question)
+        compared = rf'compare_prediction\(\s*{re.escape(repr(question))},\s*{guess}\b'
+        if not any(re.search(compared, later.source) for _, later in cells[count:]):
+            yield f'No later cell has compare_prediction({question!r}, {guess}, ...).'
 
 
 def exercises_are_checked(lesson: Lesson) -> Iterator[str]:
