@@ -55,9 +55,14 @@ def test_what_was_typed_is_kept_until_it_is_thrown_away(root, capsys):
 
 
 def test_a_copy_in_which_nothing_happened_follows_its_lesson(root):
+    other = root / 'presentation/01_publish.ipynb'
     made(root, '02')
-    change(root / 'notebooks/02_lose.ipynb', 'newer()')
-    assert code(made(root, '02')).source == 'newer()'
+    for file in ('01_publish.ipynb', '02_lose.ipynb'):
+        change(root / 'notebooks' / file, 'newer()')
+    assert code(made(root, '02')).source == code(other).source == 'newer()'
+    other.unlink()
+    made(root, '02')
+    assert code(other).source == 'newer()'
 
 
 @pytest.mark.parametrize('number', ['', '03', '01 02'])

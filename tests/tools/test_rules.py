@@ -253,6 +253,30 @@ def test_the_numbers_of_the_notebooks():
 
 
 @pytest.mark.parametrize(
+    ('asked', 'found'),
+    [
+        ('Ask for the rule of lesson 01.', ''),
+        ('It is lesson 02.', 'not in two hours'),
+        ('Lesson 03 has the rule.', ''),
+        ('Lesson 04 says more.', 'comes later'),
+    ],
+)
+def test_a_note_names_what_its_timetables_have_shown(asked, found):
+    def built(number, timetables, *cells):
+        text = TEXT.replace('Part: nodes', f'Part: nodes\\nTimetables: {timetables}')
+        return lesson(text, *cells, file=f'{number}_a.ipynb')
+
+    lessons = [
+        built('01', 'the first of two days, two hours'),
+        built('02', 'the first of two days'),
+        built('03', 'the second of two days, two hours', note(asked)),
+    ]
+    sentences = list(rules.notes_name_what_was_shown(lessons))
+    assert len(sentences) == bool(found)
+    assert all(found in sentence for sentence in sentences)
+
+
+@pytest.mark.parametrize(
     ('old', 'new', 'what'),
     [
         ('nœud', '', 'is not term'),

@@ -13,8 +13,10 @@ where the lesson belongs:
 """
 
 import re
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
+from math import ceil
 from pathlib import Path
 
 import nbformat
@@ -24,6 +26,8 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / 'notebooks'
 START, GLOSSARY = '00', '99'  # the notebooks that are no lessons
 PARTS = ('nodes', 'packages', 'robot')
+WORDS_A_MINUTE = 110  # of text that asks something
+MINUTES_A_RUN = 3  # to run an exercise, and to read what its check says
 LANGUAGES = {'fr': 'French', 'ur': 'Urdu', 'vi': 'Vietnamese'}  # of the summaries, beside English
 NOTE = 'For the instructor'
 FOLDED = re.compile(
@@ -121,6 +125,35 @@ class Lesson:
             if minutes := minutes_of_note(cell.source):
                 found[step] = found.get(step, 0) + minutes
         return found
+
+    @cached_property
+    def minutes_alone(self) -> dict[str, int]:
+        """The minutes of `Exercise 1`, ..., `Recap` and `Quiz` for one who works alone.
+
+        They are computed, not measured: the words, and for an exercise MINUTES_A_RUN and a minute
+        for each line of its solution that its starter does not have.
+        """
+        words: Counter[str] = Counter()
+        work: Counter[str] = Counter()
+        part, given = '', set()
+        for cell in self.notebook.cells:
+            tags = cell.metadata.get('tags', [])
+            new = {line.strip() for line in cell.source.splitlines()} - given - {''}
+            if cell.cell_type == 'markdown':
+                headings = re.findall(r'^###? (Exercise \d+|\w+)', cell.source, re.MULTILINE)
+                part = next((one for one in reversed(headings) if one != 'Question'), part)
+                words[part] += len(re.sub(r'<[^>]+>', ' ', cell.source).split())
+            elif 'exercise' in tags:
+                given |= new
+            elif 'solution' in tags:
+                work[part] += sum(not line.startswith(('#', 'check_')) for line in new)
+            if part.startswith('Exercise ') and part not in work:
+                work[part] = MINUTES_A_RUN
+        return {
+            name: ceil(words[name] / WORDS_A_MINUTE) + work[name]
+            for name in words
+            if name in work or name in ('Recap', 'Quiz')
+        }
 
     def minutes_of(self, steps: tuple[int, int] | None) -> int:
         """Return the minutes of some steps, the first and the last one, or of the whole lesson."""

@@ -22,11 +22,11 @@ from tools.lessons.clean import text_of
 from tools.lessons.slides import folded
 
 FOLDER = 'presentation'
-MADE = '.made.json'  # the hash of each copy as it was made
+MADE = '.made.json'  # the hash of each copy as it was made, and of what it was made from
 
 
-def _copy_of(path: Path, outputs: bool) -> str:
-    notebook = nbformat.read(path, as_version=4)
+def _copy_of(source: str, outputs: bool) -> str:
+    notebook = nbformat.reads(source, as_version=4)
     for cell in notebook.cells:
         if folded(cell):
             cell.metadata.jupyter = {'source_hidden': True}
@@ -57,9 +57,13 @@ def present(number: str, root: Path, *, new: bool = False, outputs: bool = False
         touched = copy.is_file() and _hash(copy.read_text(encoding='utf-8')) != made.get(path.name)
         if touched and not (new and path == wanted):
             continue
-        text = _copy_of(path, outputs)
+        source, origin = path.read_text(encoding='utf-8'), f'{path.name}, made from'
+        wanted_from = _hash(f'{outputs} {source}')
+        if copy.is_file() and path != wanted and made.get(origin) == wanted_from:
+            continue
+        text = _copy_of(source, outputs)
         copy.write_text(text, encoding='utf-8')
-        made[path.name] = _hash(text)
+        made[path.name], made[origin] = _hash(text), wanted_from
     record.write_text(json.dumps(made, indent=1))
     return folder / wanted.name
 

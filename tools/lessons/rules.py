@@ -460,6 +460,24 @@ def glossary_fits(glossary: Lesson, lessons: list[Lesson]) -> Iterator[str]:
                     yield (f'{one.file}: {bracket} stands after another word than in the glossary.')
 
 
+def notes_name_what_was_shown(lessons: list[Lesson]) -> Iterator[str]:
+    """A note names lessons that come before its own, in each timetable that holds its own."""
+    known = {one.number: set(map(days_of, one.timetables)) for one in lessons if one.is_lesson}
+    for one in lessons:
+        notes = [cell.source for cell in one.notebook.cells if 'notes' in tags(cell)]
+        for number in re.findall(r'[Ll]essons? (\d\d)', '\n'.join(notes)):
+            missing = known.get(one.number, set()) - known.get(number, set())
+            if number > one.number:
+                yield f'{one.file}: a note names lesson {number}, which comes later.'
+            elif missing:
+                yield f'{one.file}: a note names lesson {number}, which is not in {min(missing)}.'
+
+
+def days_of(timetable: str) -> str:
+    """Return the name of a timetable without its day: `two days` for `the second of two days`."""
+    return timetable.rpartition(' of ')[2]
+
+
 EVERY: list[Rule] = [
     executed_in_order,
     prints_what_stays,
@@ -501,5 +519,6 @@ def problems_of_all(lessons: list[Lesson]) -> list[str]:
     wanted = [f'{count:02d}' for count in range(len(lessons) - 1)] + [GLOSSARY]
     if numbers != wanted:
         found.append(f'The numbers of the notebooks are {numbers}, and should be {wanted}.')
+    found += notes_name_what_was_shown(lessons)
     glossary = [lesson for lesson in lessons if lesson.number == GLOSSARY]
     return found + [sentence for one in glossary for sentence in glossary_fits(one, lessons)]

@@ -147,6 +147,16 @@ def _leave_out(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
     return [['lesson', ''], *rows]
 
 
+def _alone(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
+    parts = sorted({part for one in lessons if one.is_lesson for part in one.minutes_alone})
+    rows = [
+        [one.number, *(str(one.minutes_alone.get(part, '')) for part in parts)]
+        for one in lessons
+        if one.is_lesson
+    ]
+    return [['lesson', *(part.lower() for part in parts)], *rows]
+
+
 def _timetable(name: str, old: str, lessons: list[Lesson]) -> list[list[str]]:
     others: dict[str, list[tuple[str, int]]] = {}  # by the number of the lesson before, or ''
     before = ''
@@ -175,5 +185,6 @@ TABLES: dict[str, Callable[[str, str, list[Lesson]], list[list[str]]]] = {
     'lessons': _readme,
     'map': _map,
     'what to leave out': _leave_out,
+    'minutes': _alone,
     'timetable': _timetable,
 }
