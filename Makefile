@@ -24,6 +24,12 @@ test-browser: ## the real JupyterLab in Chromium, as students and instructors us
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
 	@CHROMIUM="$(CHROMIUM)" $(PYTHON) -m pytest -n 2 --dist worksteal --max-worker-restart 0 -o faulthandler_timeout=600 tests/browser $(PYTEST_ARGS)
 
+image: ## a container image of the lessons, with podman or docker: BASE=, CONTAINER=, IMAGE_ARGS=... change how
+	@tools/container/run.sh image
+
+lab-container: ## the lessons in a container of that image, your notebooks in my_lessons/: PORT=8890, LESSONS=FOLDER
+	@tools/container/run.sh lab
+
 hub: ## a JupyterHub for a class on this machine; HUB_ARGS=... changes how. See teaching.md
 	@tools/hub/set_up.sh
 	@exec .venv/bin/jupyterhub --config tools/hub/jupyterhub_config.py $(HUB_ARGS)
@@ -31,6 +37,9 @@ hub: ## a JupyterHub for a class on this machine; HUB_ARGS=... changes how. See 
 test-hub: ## a class of 12 on a JupyterHub, who run lessons 02 and 03 at the same time; it takes minutes
 	@tools/hub/set_up.sh
 	@$(PYTHON) -m pytest -n 0 -rA -o faulthandler_timeout=1200 tests/hub $(PYTEST_ARGS)
+
+test-container: set_up ## the container, built on a Debian from debootstrap, as root; it takes minutes
+	@$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 tests/container $(PYTEST_ARGS)
 
 handout: set_up ## a student's edition as one archive: SOLUTIONS=no, OFFLINE=yes (PYTHONS="3.11 3.12") add the packages
 	@$(PYTHON) -m tools.lessons.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
@@ -83,8 +92,8 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 set_up:
 	@mkdir -p .jupyter && tools/set_up.sh
 
-.PHONY: help lab present test test-tools test-browser hub test-hub handout update notebooks lesson slides site book sources \
-	soak bench lint lock licences clean set_up
+.PHONY: help lab present test test-tools test-browser image lab-container hub test-hub test-container handout update notebooks \
+	lesson slides site book sources soak bench lint lock licences clean set_up
 
 PYTHON := .venv/bin/python
 

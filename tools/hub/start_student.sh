@@ -1,6 +1,6 @@
 #!/bin/sh
-# JupyterHub starts this as the student: their own copy of the notebooks, with what is newer and with
-# what they have written, then their server.
+# JupyterHub, or a container, starts this as the student: their own copy of the notebooks, with what is
+# newer and with what they have written, then their server.
 set -eu
 root=$(dirname "$0")/../..
 mine=$HOME/ros2_notebooks
@@ -15,4 +15,8 @@ mkdir -m 700 "$JUPYTER_RUNTIME_DIR" 2> /dev/null || [ -O "$JUPYTER_RUNTIME_DIR" 
     exit 1
 }
 export JUPYTER_RUNTIME_DIR
-exec "$root/.venv/bin/jupyterhub-singleuser" "$@"
+[ -z "${JUPYTERHUB_API_TOKEN-}" ] || exec "$root/.venv/bin/jupyterhub-singleuser" "$@"
+# No hub: a container of `make lab-container`.
+exec "$root/.venv/bin/python" -m jupyterlab --no-browser --ip=0.0.0.0 --ServerApp.port_retries=0 \
+    --ServerApp.custom_display_url="http://127.0.0.1:${JUPYTER_PORT:-8888}" \
+    --ServerApp.root_dir="$mine" --LabApp.default_url=/lab/tree/00_start_here.ipynb "$@"

@@ -1,0 +1,111 @@
+"""What tools/container/run.sh says where it cannot go on, with commands that stand for podman."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+USED = ('cat', 'chown', 'cksum', 'cut', 'dirname', 'find', 'grep', 'id', 'mkdir', 'mktemp', 'rm',
+        'sh', 'sort', 'tee', 'tr', 'uname')  # fmt: skip
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Run the script where no other commands are. `podman` is what a stand-in does, in sh."""
+    path = tmp_path / 'path'
+    path.mkdir()
+    for command in USED:
+        (path / command).symlink_to(shutil.which(command))
+
+    def run(what, podman=None, **variables):
+        if podman is not None:
+            command = path / 'podman'
+            command.write_text(f'#!/bin/sh\ncase $1 in version | --version) ;; {podman} esac\n')
+            command.chmod(0o755)
+        environment = {'PATH': str(path), 'LESSONS': str(tmp_path / 'lessons')} | variables
+        return subprocess.run(
+            [ROOT / 'tools/container/run.sh', what],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+
+    return run
+
+
+# The words of podman 4.3, and after them those of docker 28.
+FULL = 'write /var/tmp/buildah: no space left on device'
+PORT = 'bind: address already in use', 'Bind for 127.0.0.1:8888 failed: port is already allocated'
+
+
+@pytest.mark.parametrize('what', ['image', 'lab'])
+def test_no_command(run, what):
+    done = run(what)
+    assert done.returncode == 1
+    assert done.stderr.startswith('There is neither podman nor docker: install one')
+    done = run(what, CONTAINER='nerdctl --namespace x')
+    assert done.stderr.startswith('There is no command nerdctl')
+
+
+def test_a_command_that_does_not_answer(run):
+    done = run('image', CONTAINER=shutil.which('false'))
+    assert done.returncode == 1
+    assert done.stderr.startswith('false does not answer: start it')
+
+
+def test_a_full_disk(run):
+    done = run('image', f'build) echo "{FULL}" >&2; exit 125 ;;')
+    assert done.returncode == 125
+    assert FULL in done.stdout
+    assert done.stderr.startswith('The disk is full: the image needs 5 GB while it is made.')
+
+
+def test_another_failure_speaks_for_itself(run):
+    done = run('image', 'build) echo "no such base" >&2; exit 125 ;;')
+    assert (done.returncode, done.stdout, done.stderr) == (125, 'no such base\n', '')
+
+
+def test_no_image(run):
+    done = run('lab', 'image) exit 125 ;;')
+    assert (done.returncode, done.stderr) == (
+        1,
+        'There is no image yet: run `make image`, then try again.\n',
+    )
+
+
+def test_an_old_image(run):
+    done = run('lab', 'image) echo 123-456 ;;')
+    assert (done.returncode, done.stderr) == (
+        1,
+        'The image is not of these lessons: run `make image`, then try again.\n',
+    )
+
+
+def label(run):
+    """Return what the script writes onto an image that it builds."""
+    done = run('image', 'build) echo "$*" ;;')
+    assert done.returncode == 0, done.stderr
+    return done.stdout.partition('--label lessons=')[2].split()[0]
+
+
+@pytest.mark.parametrize('words', PORT)
+def test_a_port_in_use(run, tmp_path, words):
+    own = label(run)
+    done = run('lab', f'image) echo {own} ;; run) echo "{words}" >&2; exit 126 ;;', PORT='8931')
+    assert done.returncode == 126
+    assert done.stderr.startswith('The port 8931 is already in use: choose another one')
+
+
+def test_the_lessons_and_the_port_of_a_run(run, tmp_path):
+    own = label(run)
+    done = run('lab', f'image) echo {own} ;; run) echo "$*" ;;', PORT='8931')
+    assert done.returncode == 0, done.stderr
+    said = done.stdout
+    assert '--publish 127.0.0.1:8931:8931' in said
+    assert f'--volume {tmp_path / "lessons"}:/home/student' in said
+    assert '--user 0:' not in said
+    assert os.path.isdir(tmp_path / 'lessons')
