@@ -22,7 +22,7 @@ c.ConfigurableHTTPProxy.command = (
 )
 c.Authenticator.allow_all = True
 
-c.Spawner.cmd = [str(ROOT / 'tools/hub/start_student.sh')]
+c.Spawner.cmd = [str(ROOT / 'tools/container/start_student.sh')]
 c.Spawner.notebook_dir = '~/ros2_notebooks'
 c.Spawner.default_url = '/lab/tree/00_start_here.ipynb'
 # All log in at once, and each server needs seconds of a core.

@@ -4,7 +4,7 @@
 set -eu
 root=$(dirname "$0")/../..
 mine=$HOME/ros2_notebooks
-mkdir -p "$mine"
+mkdir -p "$mine" "${TMPDIR:-/tmp}"
 # Without newer lessons, too, a student can work.
 (cd "$root" && exec .venv/bin/python -m tools.lessons.update notebooks --to "$mine") || true
 
