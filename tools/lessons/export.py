@@ -53,7 +53,9 @@ def fetch_packages(folder: Path = PACKAGES) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for name in ('package.json', 'package-lock.json'):
         shutil.copy(TEMPLATE / name, folder)
-    command = [npm, 'ci', '--ignore-scripts', '--no-audit', '--no-fund', '--silent']
+    # Without a network npm would try again and again: what it has is enough, or it says so soon.
+    network = ['--prefer-offline', '--fetch-retries=1', '--fetch-retry-mintimeout=1000']
+    command = [npm, 'ci', '--ignore-scripts', '--no-audit', '--no-fund', '--silent', *network]
     if subprocess.run(command, cwd=folder, stdin=subprocess.DEVNULL).returncode:
         raise ValueError('npm could not fetch reveal.js and MathJax: is there a network?')
     done.write_bytes(lock)

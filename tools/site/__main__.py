@@ -110,9 +110,17 @@ def _with_files(text: str, figures: Path) -> str:
 
 
 def prepare(pages: Path, book: bool) -> None:
-    """Write what Sphinx reads into a folder. Raises ValueError where npm is missing or fails."""
+    """Write what Sphinx reads into a folder.
+
+    Raises ValueError where npm is missing or fails, and for a lesson that has not been run.
+    """
     packages = fetch_packages()
     known = lessons()
+    for lesson in known:
+        if any(c.cell_type == 'code' and not c.execution_count for c in lesson.notebook.cells):
+            raise ValueError(
+                f'{lesson.file} has not been run: `make notebooks LESSON={lesson.number}`.'
+            )
     shutil.rmtree(pages, ignore_errors=True)
     static, notebooks = pages / 'static', pages / 'notebooks'
     downloads, figures = pages / 'downloads' / 'notebooks', static / 'figures'
