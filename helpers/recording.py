@@ -10,10 +10,13 @@ from array import array
 from collections.abc import Callable
 
 import pandas as pd
+from rclpy.callback_groups import ReentrantCallbackGroup
 
 from helpers.values import check_columns, column_of_numbers
 
 COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']
+CALL_COLUMNS = ['client', 'service', 'caller', 'run', 'style', 'sent_s', 'answered_s', 'answer']
+CALL_COLUMNS += ['resumed_by']
 
 
 def number_of(message) -> int:
@@ -165,16 +168,24 @@ class Recording:
 class CallbackRecording:
     """Records every run of some callbacks, from now on.
 
-    `CallbackRecording(tick=node.timer, look=node.service)` watches timers, services and
-    subscriptions, each under a name. They are plain rclpy objects, and stay what they are. `watch`
-    is for what has no `callback` of its own, such as an action server.
+    `CallbackRecording(tick=node.timer, look=node.service)` watches timers, services, subscriptions
+    and clients, each under a name. They are plain rclpy objects, and stay what they are. Of a
+    client, a run is the moment when an executor takes an answer. `watch` is for what has no
+    `callback` of its own, such as an action server.
     """
 
     def __init__(self, **watched) -> None:
         # For each name its runs: [started, finished, thread id]; finished is NaN while it runs.
+        # That of a coroutine that has finished ends with the id of the thread that finished it.
         self.runs: dict[str, list[list]] = {name: [] for name in watched}
+        self._watched = watched
+        self._calls: list[dict] = []
+        self._answers: list[tuple[object, list]] = []  # the future, and the run of the client
         for name, thing in watched.items():
-            thing.callback = self.watch(name, thing.callback)
+            if hasattr(thing, 'call_async'):
+                self._watch_client(name, thing)
+            else:
+                thing.callback = self.watch(name, thing.callback)
 
     def watch(self, name: str, callback: Callable) -> Callable:
         """Return the callback, which is recorded under this name from now on."""
@@ -186,9 +197,50 @@ class CallbackRecording:
             return row
 
         def finish(row: list) -> None:
+            if inspect.iscoroutinefunction(callback):
+                row.append(threading.get_ident())
             row[1] = time.monotonic()
 
         return _surround(callback, start, finish)
+
+    def _watch_client(self, name: str, client) -> None:
+        call, call_async, pending = client.call, client.call_async, client.get_pending_request
+        waits = threading.local()
+
+        @functools.wraps(call)
+        def recorded_call(*arguments, **options):
+            waits.here = True
+            try:
+                return call(*arguments, **options)
+            finally:
+                waits.here = False
+
+        @functools.wraps(call_async)
+        def recorded_call_async(request):
+            waiting = getattr(waits, 'here', False)
+            made = {'client': name, 'caller': self._running(), 'waits': waiting}
+            made |= {'sent': time.monotonic(), 'future': None}
+            self._calls.append(made)
+            made['future'] = call_async(request)
+            return made['future']
+
+        @functools.wraps(pending)
+        def recorded_pending(sequence_number):
+            future = pending(sequence_number)
+            now = time.monotonic()
+            row = [now, now, threading.get_ident()]
+            self.runs[name].append(row)
+            self._answers.append((future, row))
+            return future
+
+        client.call, client.call_async = recorded_call, recorded_call_async
+        client.get_pending_request = recorded_pending
+
+    def _running(self) -> list | None:
+        """Return the run that this thread is in, of a callback that is watched."""
+        here = threading.get_ident()
+        rows = [row for runs in self.runs.values() for row in runs if row[1] != row[1]]
+        return max((row for row in rows if row[2] == here), key=lambda row: row[0], default=None)
 
     def finished(self, name: str) -> int:
         """Return how many runs have finished."""
@@ -197,7 +249,7 @@ class CallbackRecording:
     def inside(self, inner: str, outer: str) -> int:
         """Return how many runs of `inner` started while a run of `outer` was going on."""
         return sum(
-            any(started <= run[0] < finished for started, finished, _ in self.runs[outer])
+            any(started <= run[0] < finished for started, finished, *_ in self.runs[outer])
             for run in self.runs[inner]
         )
 
@@ -207,20 +259,78 @@ class CallbackRecording:
         `seq` counts from 0, the times are seconds since the first start of all, and a callback has
         `published_s` equal to `started_s`. The threads have the same names in all tables.
         """
-        every = sorted((row for runs in self.runs.values() for row in runs), key=lambda row: row[0])
-        names = dict.fromkeys(row[2] for row in every)
-        names = {ident: f'thread {i}' for i, ident in enumerate(names, 1)}
-        zero = every[0][0] if every else 0.0
+        zero, names = self._zero_and_threads()
         return {
             name: pd.DataFrame(
                 [
-                    [seq, started - zero, started - zero, finished - zero, names[ident]]
-                    for seq, (started, finished, ident) in enumerate(runs)
+                    [seq, run[0] - zero, run[0] - zero, run[1] - zero, names[run[2]]]
+                    for seq, run in enumerate(list(runs))
                 ],
                 columns=COLUMNS,
             )
             for name, runs in self.runs.items()
         }
+
+    def _zero_and_threads(self) -> tuple[float, dict[int, str]]:
+        """Return when the first run of all started, and the names of the threads by their ids."""
+        every = sorted((row for runs in self.runs.values() for row in runs), key=lambda row: row[0])
+        idents = dict.fromkeys(ident for row in every for ident in row[2:])
+        names = {ident: f'thread {i}' for i, ident in enumerate(idents, 1)}
+        return (every[0][0] if every else 0.0), names
+
+    def calls(self) -> pd.DataFrame:
+        """Return one row for each request that a client which is watched has sent.
+
+        Columns: `client` and `service` (names; the service is None where it is not watched),
+        `caller` and `run` (the callback that sent it, and which of its runs; None where none is
+        watched), `style` ('call', 'await' where a coroutine sent it, or 'send'), `sent_s` and
+        `answered_s` (seconds, as in `tables`; NaN where no answer was taken), `answer` (which of
+        the client's runs took it), `resumed_by` (the thread that finished the coroutine, or None).
+        """
+        zero, names = self._zero_and_threads()
+        services = {
+            thing.srv_name: name
+            for name, thing in self._watched.items()
+            if type(thing).__name__ == 'Service'
+        }
+        place = {
+            id(row): (name, seq) for name, runs in self.runs.items() for seq, row in enumerate(runs)
+        }
+        answers = {id(future): row for future, row in list(self._answers)}
+        rows = []
+        for made in list(self._calls):
+            answer, run = answers.get(id(made['future'])), made['caller']
+            caller, seq = place.get(id(run), (None, None))
+            awaits = caller and inspect.iscoroutinefunction(self._watched[caller].callback)
+            rows.append(
+                {
+                    'client': made['client'],
+                    'service': services.get(self._watched[made['client']].srv_name),
+                    'caller': caller,
+                    'run': seq,
+                    'style': 'call' if made['waits'] else 'await' if awaits else 'send',
+                    'sent_s': made['sent'] - zero,
+                    'answered_s': answer[0] - zero if answer else float('nan'),
+                    'answer': place[id(answer)][1] if answer else None,
+                    'resumed_by': names[run[3]] if run and len(run) > 3 else None,
+                }
+            )
+        return pd.DataFrame(rows, columns=CALL_COLUMNS)
+
+    def groups(self) -> pd.DataFrame:
+        """Return for each name, in its row, what it is and its callback group.
+
+        Columns: `kind` ('Timer', 'Service', 'Client', 'Subscription'), `group` (the first name that
+        is in the same group), `exclusive` (bool).
+        """
+        first: dict[int, str] = {}
+        rows = {}
+        for name, thing in self._watched.items():
+            group = thing.callback_group
+            first.setdefault(id(group), name)
+            exclusive = not isinstance(group, ReentrantCallbackGroup)
+            rows[name] = type(thing).__name__, first[id(group)], exclusive
+        return pd.DataFrame.from_dict(rows, 'index', columns=['kind', 'group', 'exclusive'])
 
 
 def _surround(callback: Callable, start: Callable, finish: Callable) -> Callable:

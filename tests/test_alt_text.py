@@ -100,28 +100,6 @@ def test_losses_and_overlaps_in_words():
     assert 'None is pushed out.' in said(plots.queue_length, run(), 3)
 
 
-@pytest.mark.parametrize(
-    ('thread_free', 'group_free', 'words'),
-    [
-        (True, True, "a thread, which is free, and the client's group, which is free. no circle."),
-        (
-            False,
-            True,
-            "a thread, which tick holds, and the client's group, which is free. one circle.",
-        ),
-        (
-            False,
-            False,
-            "a thread, which tick holds, and the client's group, which tick holds. two circles.",
-        ),
-    ],
-)
-def test_who_waits_in_words(thread_free, group_free, words):
-    text = said(plots.who_waits, 'tick', 'the answer', thread_free, group_free, 'Who?')
-    assert 'tick waits for the answer. Needed are a thread, which' in text
-    assert text.endswith(words.replace('. ', '. The arrows close '))
-
-
 def test_graphs_are_told_arrow_by_arrow():
     columns = ['node', 'role', 'topic', 'type', 'qos']
     ends = [

@@ -9,12 +9,14 @@ from html import unescape
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from std_msgs.msg import Int32
 from support.javascript import FOLDER, Script
 from support.nodes import LIMIT_S, spin
+from test_msgs.action import Fibonacci
 
 from helpers.replay.levels import LEVELS, level
 from helpers.replay.script import source
@@ -23,8 +25,9 @@ from tools.lessons.lesson import lessons
 
 GLUE = """
 // Play with numbers that say which choice is tried, and go round in them.
-function play(setup, goal, numbers) {
-  const it = game({ setup, goal });
+function play(level, numbers) {
+  const it = game(level);
+  const { setup } = level;
   let state = it.start();
   const tried = [];
   for (let i = 0; i < 200 && !it.isOver(state); i += 1) {
@@ -33,8 +36,9 @@ function play(setup, goal, numbers) {
     const before = JSON.stringify(state);
     const refused = it.refusal(state, move);
     // A queue is known by its callback: the model takes its oldest.
-    const rules = model.refusal(setup, state, move);
-    const isOldest = move.do !== 'take' || move.seq === state.queues[move.callback][0].seq;
+    const takes = move.do === 'take';
+    const rules = model.refusal(setup, state, takes ? { ...move, seq: undefined } : move);
+    const isOldest = !takes || move.seq === state.queues[move.callback][0].seq;
     tried.push({ ...move, refused, rules, isOldest });
     if (!refused) state = it.choose(state, move).state;
     else if (before !== JSON.stringify(state)) throw new Error('a refusal changed the state');
@@ -43,8 +47,9 @@ function play(setup, goal, numbers) {
 }
 
 // The lowest score of all orders of the model's own moves, without the choices of game.js.
-function least(setup, goal) {
-  const { score } = game({ setup, goal });
+function least(level) {
+  const { score, start } = game(level);
+  const { setup } = level;
   const seen = new Set();
   let found = Infinity;
   function visit(state) {
@@ -55,7 +60,7 @@ function least(setup, goal) {
     if (!allowed.length) found = Math.min(found, score(state));
     allowed.forEach(move => visit(model.apply(setup, state, move).state));
   }
-  visit(model.start(setup));
+  visit(start());
   return found;
 }
 
@@ -72,12 +77,18 @@ VARIANTS = [
     for name, one in LEVELS.items()
     for values, variant in one.variants().items()
 ]
+OF_ACTIONS = [one for one in VARIANTS if one.values[0] == 'stop']
 OF_TOPICS = [one for one in VARIANTS if one.values[0] == 'keep']
 
 
 @pytest.fixture(scope='module')
 def script():
     return Script('game.js', GLUE)
+
+
+def played_as(goal, variant):
+    """What game.js gets of a variant."""
+    return {'goal': goal, 'setup': variant.setup, 'begun': variant.begun}
 
 
 # The rules
@@ -87,7 +98,7 @@ def script():
 @settings(max_examples=10)
 @given(numbers=st.lists(st.integers(0, 6), min_size=30, max_size=30))
 def test_what_is_not_refused_is_allowed_by_the_model(script, goal, variant, numbers):
-    played = script.call('play', variant.setup, goal, numbers)
+    played = script.call('play', played_as(goal, variant), numbers)
     for tried in played['tried']:
         assert bool(tried['refused']) == (bool(tried['rules']) or not tried['isOldest'])
         assert not tried['rules'] or tried['refused'] == tried['rules']
@@ -97,13 +108,13 @@ def test_what_is_not_refused_is_allowed_by_the_model(script, goal, variant, numb
 
 @pytest.mark.parametrize(('goal', 'variant'), VARIANTS)
 def test_the_best_is_the_best_of_all_walks(script, goal, variant):
-    played = script.call('play', variant.setup, goal, [0])
-    assert played['best'] == script.call('least', variant.setup, goal)
+    played = script.call('play', played_as(goal, variant), [0])
+    assert played['best'] == script.call('least', played_as(goal, variant))
 
 
 def best(script, name, *values):
     one = level(name)
-    return script.call('play', one.variants()[values].setup, one.goal, [0])['best']
+    return script.call('play', played_as(one.goal, one.variants()[values]), [0])['best']
 
 
 def test_what_the_levels_teach_is_so(script):
@@ -114,12 +125,14 @@ def test_what_the_levels_teach_is_so(script):
     assert [best(script, 'threads', *c) for c in ((1, one), (2, one), (1, both))] == [2, 2, 2]
     assert best(script, 'threads', 2, both) == 0
     assert [best(script, 'counter', lock) for lock in ('without', 'with')] == [1, 2]
+    jobs = [(1, 'looks'), (1, 'does not look'), (2, 'does not look'), (2, 'looks')]
+    assert [best(script, 'cancel', *job) for job in jobs] == [3, 3, 3, 2]
 
 
 def test_the_first_level_is_short(script):
     one = level('save')
     (variant,) = one.variants().values()
-    played = script.call('play', variant.setup, one.goal, [0])
+    played = script.call('play', played_as(one.goal, variant), [0])
     allowed = [tried for tried in played['tried'] if not tried['refused']]
     assert len(allowed) <= 12
 
@@ -127,7 +140,7 @@ def test_the_first_level_is_short(script):
 def test_a_queue_gives_its_oldest_first(script):
     (variant,) = level('save').variants().values()
     # Picture 0 is left to wait; with 1 beside it, the newer one is tried.
-    played = script.call('play', variant.setup, 'keep', [0, 2, 1, 0])
+    played = script.call('play', played_as('keep', variant), [0, 2, 1, 0])
     assert [tried['refused'] for tried in played['tried'][:3]] == [
         '',
         'A queue gives its oldest first, and picture 0 is older.',
@@ -227,6 +240,66 @@ def test_who_gets_an_answer_is_what_rclpy_did():
     answers = re.findall('yes|no', table.partition('\n')[2].replace('one', ''))[::3]
     said = [variant.rclpy for variant in level('deadlock').variants().values()]
     assert ['no' if unfinished else 'yes' for unfinished in said] == answers
+
+
+def cancelled_job(setup):
+    """Let a real action server do the job of a setup, and cancel it. Return the places visited.
+
+    The clock is the setup's: each place is visited when its time has come, and before that the
+    executor does all that it can.
+    """
+    job = setup['callbacks'][0]['does']
+    gates = [threading.Event() for _ in job]
+    at_place, visited = [], []
+
+    def execute(goal_handle):
+        for place, visit in enumerate(job):
+            if 'unless' in visit and goal_handle.is_cancel_requested:
+                goal_handle.canceled()
+                return Fibonacci.Result()
+            at_place.append(place)
+            assert gates[place].wait(LIMIT_S)
+            visited.append(place)
+        goal_handle.succeed()
+        return Fibonacci.Result()
+
+    with ros_session() as session:
+        robot, operator = Node('robot'), Node('operator')
+        ActionServer(
+            robot, Fibonacci, 'job', execute, cancel_callback=lambda _: CancelResponse.ACCEPT
+        )
+        client = ActionClient(operator, Fibonacci, 'job')
+        executor = spin(session, robot, threads=len(setup['threads']))
+        own = spin(session, operator)
+
+        def ask(call, *arguments):
+            task = own.create_task(call, *arguments)
+            session.wait_until(task.done, LIMIT_S)
+            return task.result()
+
+        session.wait_until(client.server_is_ready, LIMIT_S)
+        goal = ask(client.send_goal_async, Fibonacci.Goal())
+        session.wait_until(lambda: goal.done() and at_place, LIMIT_S)
+        result = ask(goal.result().get_result_async)
+        now = 0
+        cancel = None
+        for place, visit in enumerate(job):
+            now += visit['work']
+            if cancel is None and now > setup['arrivals'][1]['at']:
+                cancel = ask(goal.result().cancel_goal_async)
+                session.wait_until_quiet(executor)
+            gates[place].set()
+            session.wait_until(
+                lambda place=place: len(at_place) > place + 1 or result.done(), LIMIT_S
+            )
+            if result.done():
+                break
+    return len(visited)
+
+
+@pytest.mark.parametrize(('goal', 'variant'), OF_ACTIONS)
+def test_the_robot_stopped_where_the_level_says(goal, variant):
+    assert cancelled_job(variant.setup) == variant.rclpy
 
 
 # The page

@@ -445,22 +445,6 @@ def test_topic_graph_has_boxes_and_arrows():
     assert len(arrows_of(ax)) == 2
 
 
-@pytest.mark.parametrize('thread_free', [True, False])
-@pytest.mark.parametrize('group_free', [True, False])
-def test_who_waits_closes_a_circle_where_something_is_held(thread_free, group_free):
-    ax = plots.who_waits('timer', 'the answer', thread_free, group_free, 'Who waits?')
-    words, arrows = words_of(ax), arrows_of(ax)
-    assert f'a thread\n{"free" if thread_free else "held"}' in words
-    assert f"the client's group\n{'free' if group_free else 'held'}" in words
-    held = 2 - thread_free - group_free
-    assert words.count('is held by') == held
-    assert words.count('needs') == 2
-    thick = [arrow for arrow in arrows if arrow.get_linestyle() != '--']
-    assert len(arrows) == 3 + held
-    assert len(thick) == (1 + 2 * held if held else 0)  # `waits for`, and two a thing that is held
-    assert ax.get_title('left') == 'Who waits?'
-
-
 def test_interface_tree():
     ax = plots.interface_tree(TREE)
     fields = ['Shot', 'header', 'frame_id', 'data']

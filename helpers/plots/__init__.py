@@ -8,7 +8,7 @@ legend counts, and no meaning hangs on a colour alone. Each picture is described
 from helpers.alt_text import describe
 from helpers.plots.comparisons import bars, sweep
 from helpers.plots.drives import error, frame_tree, innovation, path, paths
-from helpers.plots.graphs import interface_tree, topic_graph, who_waits
+from helpers.plots.graphs import interface_tree, topic_graph
 from helpers.plots.runs import before_and_after, latency, queue_length, sequence_gaps, timeline
 
 __all__ = [
@@ -27,5 +27,4 @@ __all__ = [
     'sweep',
     'timeline',
     'topic_graph',
-    'who_waits',
 ]

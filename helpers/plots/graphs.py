@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.text import Text
 
 from helpers.alt_text import describe
 from helpers.plots.style import (
@@ -16,7 +15,6 @@ from helpers.plots.style import (
     GROUP_COLOURS,
     INK,
     LARGE,
-    LOST,
     PALE,
     PUBLISHED,
     SMALL,
@@ -66,47 +64,6 @@ def topic_graph(endpoints: pd.DataFrame, title: str) -> Axes:
             words.append(f'{end.node} {does} {end.topic} ({end.type}), {end.qos}.')
     describe(ax, ' '.join(words))
     return ax
-
-
-def who_waits(callback: str, answer: str, thread_free: bool, group_free: bool, title: str) -> Axes:
-    """Draw who waits for whom: a callback for an answer, the answer for a thread and a group.
-
-    What is not free is held by the callback. Then the arrows close a circle, which is drawn thick.
-    """
-    closed = not (thread_free and group_free)
-    ax = canvas(title, height=4.2)
-    ax.set(xlim=(0, 10), ylim=(-3.2, 3.2))
-
-    waiting = box(ax, 1.3, 0, callback, 'square,pad=0.7', GROUP_COLOURS[0])
-    awaited = box(ax, 8.7, 0, answer, 'square,pad=0.7', GROUP_COLOURS[1])
-    _arrow(ax, waiting, awaited, 'waits for', closed)
-    needs = []
-    for y, name, free in ((2.3, 'a thread', thread_free), (-2.3, "the client's group", group_free)):
-        state = 'free' if free else 'held'
-        needed = box(ax, 5, y, f'{name}\n{state}', 'round,pad=0.6,rounding_size=1.0')
-        _arrow(ax, awaited, needed, 'needs', not free)
-        if not free:
-            _arrow(ax, needed, waiting, 'is held by', True)
-        needs.append(f'{name}, which {"is free" if free else f"{callback} holds"}')
-    circles = ('no circle', 'one circle', 'two circles')[(not thread_free) + (not group_free)]
-    describe(
-        ax,
-        f'Boxes joined by arrows. {callback} waits for {answer}. Needed are '
-        f'{", and ".join(needs)}. The arrows close {circles}.',
-    )
-    return ax
-
-
-def _arrow(ax: Axes, tail: Text, head: Text, text: str, thick: bool) -> None:
-    """Draw an arrow from one box to another, with a text on it."""
-    look = {'lw': 3, 'color': LOST} if thick else {'lw': 1.6, 'color': INK, 'ls': '--'}
-    look |= {'arrowstyle': '-|>', 'mutation_scale': 20, 'shrinkA': 3, 'shrinkB': 3}
-    look |= {'patchA': tail.get_bbox_patch(), 'patchB': head.get_bbox_patch()}
-    (x0, y0), (x1, y1) = tail.get_position(), head.get_position()
-    ax.annotate('', xy=(x1, y1), xytext=(x0, y0), arrowprops=look)
-    background = {'facecolor': 'white', 'edgecolor': 'none', 'pad': 2}
-    middle = (x0 + x1) / 2, (y0 + y1) / 2
-    ax.text(*middle, text, ha='center', va='center', fontsize=SMALL, bbox=background)
 
 
 def interface_tree(tree: pd.DataFrame) -> Axes:

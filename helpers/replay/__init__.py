@@ -13,6 +13,7 @@ import re
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from html import escape
 from itertools import chain
 
@@ -21,11 +22,23 @@ import pandas as pd
 from helpers.queue_model import check_count
 from helpers.recording import check_table
 from helpers.replay.events import ARRIVE, END, TAKE, Event, events
-from helpers.replay.picture import LEFT, NARROW, RIGHT, WIDTH, address, picture
+from helpers.replay.model import stories
+from helpers.replay.picture import (
+    LEFT,
+    LETTER,
+    MOST_ROWS,
+    NARROW,
+    RIGHT,
+    WIDTH,
+    address,
+    picture,
+)
 from helpers.replay.script import attribute, script, source
 from helpers.values import shown
 
 SCRIPT = 'model.js', 'walk.js', 'element.js', 'view.js'
+SCRIPT_OF_CALLS = 'circle.js', *SCRIPT
+KINDS = ARRIVE, TAKE, END, 'go', 'resume'  # as walk.js numbers them
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
 MOST_MESSAGES = 10_000
 ROWS_IN_WORDS = (
@@ -39,60 +52,55 @@ CROSSES_IN_WORDS = (
 
 @dataclass(frozen=True)
 class Run:
-    """A run as it is replayed. `first` is how many events come before the part that is shown."""
+    """A run as it is replayed. `first` is how many moves come before the part that is shown.
+
+    `summary` is what is true of the run each time that it is made. A move is [microseconds, its
+    kind, two numbers], as walk.js reads it.
+    """
 
     name: str
-    messages: int
+    summary: str
     lost: bool
     setup: dict
-    events: list[Event]
+    moves: list[list[int]]
     first: int = 0
-
-    @property
-    def summary(self) -> str:
-        """What is true of the run each time that it is made."""
-        callbacks, groups, threads = (self.setup[k] for k in ('callbacks', 'groups', 'threads'))
-        count = len(threads)
-        said = f'{count} threads' if count > 1 else 'one thread' if count else 'no executor'
-        if count > 1:
-            said += f', a {groups[0]["name"]} group'
-        lost = 'Some were lost' if self.lost else 'None was lost'
-        if not any(event.do == TAKE for event in self.events):
-            lost = 'None was heard'
-        return f'{self.messages} messages, depth {callbacks[0]["depth"]}, {said}. {lost}.'
+    time_label: str = 'time since the first publish (s)'
+    after_s: float = 0.0
 
     @property
     def span_s(self) -> tuple[float, float]:
-        """From when to when it is shown: to a little after its last event."""
-        start = self.events[self.first].at_s if self.first else 0.0
-        end = self.events[-1].at_s
-        return start, end + (0.02 * (end - start) or 1.0)
+        """From when to when it is shown: to a little after its last event, at least `after_s`."""
+        start = self.moves[self.first][0] / 1e6 if self.first else 0.0
+        end = self.moves[-1][0] / 1e6
+        return start, end + (max(0.02 * (end - start), self.after_s) or 1.0)
 
-    def picture(self, span_s: tuple[float, float], width: int = WIDTH) -> str:
-        """Return the run as an SVG, in a span of seconds and `width` pixels wide."""
-        group, threads = self.setup['groups'][0], self.setup['threads']
-        depth = self.setup['callbacks'][0]['depth']
-        return picture(self.events, depth, len(threads), group['exclusive'], span_s, width)
+    @cached_property
+    def messages(self) -> list[dict]:
+        """What became of the first messages, as stories.js tells it."""
+        return stories(self.record(), MOST_ROWS)['messages']
+
+    @property
+    def names(self) -> list[str]:
+        """What stands in front of each row of the picture."""
+        callbacks = self.setup['callbacks']
+        if len(callbacks) == 1:
+            return [f'{one["seq"]}' for one in self.messages]
+        return [f'{callbacks[one["callback"]]["name"]} {one["seq"]}' for one in self.messages]
+
+    def picture(self, span_s: tuple[float, float], width: int, left: int) -> str:
+        """Return the run as an SVG, in a span of seconds. Sizes are pixels."""
+        return picture(self.messages, self.names, span_s, width, left, self.time_label)
 
     def record(self) -> dict:
-        """Return what the script needs: the setup, and the moves of model.js in short."""
-        place = {name: index for index, name in enumerate(self.setup['threads'])}
-        kinds = (ARRIVE, TAKE, END)
-        moves = [
-            [
-                round(1e6 * e.at_s),
-                kinds.index(e.do),
-                0,
-                e.seq if e.do == ARRIVE else place[e.thread],
-            ]
-            for e in self.events
-        ]
-        return {
-            'name': self.name,
-            'setup': self.setup,
-            'moves': moves,
-            'first': self.first,
-        }
+        """Return what the script needs."""
+        return {name: getattr(self, name) for name in ('name', 'setup', 'moves', 'first')}
+
+    @property
+    def alternative(self) -> str:
+        """The picture in words."""
+        name = f'{self.name}: ' if self.name else ''
+        words = ROWS_IN_WORDS + (CROSSES_IN_WORDS if self.lost else '')
+        return f'{name}{self.summary} {words}'
 
 
 @dataclass(frozen=True)
@@ -110,22 +118,24 @@ class Replay:
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         width = WIDTH if len(self.runs) == 1 else NARROW
+        left = max(LEFT, *(round(LETTER * len(name)) for run in self.runs for name in run.names))
         starts, ends = zip(*(run.span_s for run in self.runs), strict=True)
         span_s = min(starts), max(ends)  # pictures beside each other share their time
         figures = ''.join(
-            f'<figure><img alt="{escape(_alternative(run))}" '
-            f'src="{address(run.picture(span_s, width))}"></figure>'
+            f'<figure><img alt="{escape(run.alternative)}" '
+            f'src="{address(run.picture(span_s, width, left))}"></figure>'
             for run in self.runs
         )
         record = {
             'span': span_s,
-            'plot': [round(LEFT / width, 4), round(1 - RIGHT / width, 4)],
+            'plot': [round(left / width, 4), round(1 - RIGHT / width, 4)],
             'runs': [run.record() for run in self.runs],
         }
+        calls = any(has_calls(run.setup) for run in self.runs)
         html = (
             f'<div class="replay" data-record={attribute(record)}>'
             f'<style>{source("style.css")}</style><p>{escape(str(self))}</p>{figures}'
-            f'<script>{script(*SCRIPT)}</script></div>'
+            f'<script>{script(*(SCRIPT_OF_CALLS if calls else SCRIPT))}</script></div>'
         )
         return {'text/plain': str(self), 'text/html': html}
 
@@ -155,16 +165,8 @@ def replay(
     if group not in (EXCLUSIVE, REENTRANT):
         raise ValueError(f'group must be {EXCLUSIVE!r} or {REENTRANT!r}, not {shown(group)}.')
     heard = table[table['started_s'].notna()]
-    names = sorted(heard['thread'].dropna().unique(), key=_natural)
-    if len(names) > threads:
-        raise ValueError(f'Callbacks ran in {len(names)} threads, more than threads={threads}.')
-    more = (f'thread {number}' for number in range(1, 2 * threads + 1))
-    while len(names) < threads and len(heard):
-        names += [found] if (found := next(more)) not in names else []
-    made = events(table, depth, threads if group == REENTRANT else 1)
-    first = 0
-    if part is not None:
-        made, first = _part_of(made, depth, part)
+    found = set(heard['thread'].dropna())
+    names = fill_up(found, threads) if len(heard) else []
     shown_here = table['seq'].between(*part) if part else table['seq'].notna()
     if not shown_here.any():
         raise ValueError(f'There is no message from {part[0]} to {part[1]}.')
@@ -173,13 +175,28 @@ def replay(
             f'{shown_here.sum():,} messages are too many to step through. Ask for a part of '
             f'{MOST_MESSAGES:,} at most: part=(0, {MOST_MESSAGES - 1}).'
         )
+    made = events(table, depth, threads if group == REENTRANT else 1)
+    first = 0
+    if part is not None:
+        made, first = _part_of(made, depth, part)
     setup = {
-        'threads': sorted(names, key=_natural),
+        'threads': names,
         'groups': [{'name': group, 'exclusive': group == EXCLUSIVE}],
         'callbacks': [{'name': 'subscription', 'group': 0, 'depth': depth}],
     }
+    moves = [
+        [round(1e6 * at_s), KINDS.index(do), 0, seq if do == ARRIVE else names.index(thread)]
+        for at_s, do, seq, thread in made
+    ]
     lost = bool(table.loc[shown_here, 'started_s'].isna().any())
-    return Replay((Run(name, int(shown_here.sum()), lost, setup, made, first),))
+    said = f'{len(names)} threads' if len(names) > 1 else 'one thread' if names else 'no executor'
+    if len(names) > 1:
+        said += f', a {group} group'
+    end = 'Some were lost' if lost else 'None was lost'
+    if not any(event.do == TAKE for event in made):
+        end = 'None was heard'
+    summary = f'{shown_here.sum()} messages, depth {depth}, {said}. {end}.'
+    return Replay((Run(name, summary, lost, setup, moves, first),))
 
 
 def side_by_side(runs: Mapping[str, Replay]) -> Replay:
@@ -214,9 +231,21 @@ def _part_of(made: list[Event], depth: int, bounds: tuple[int, int]) -> tuple[li
     return before + found, len(before)
 
 
-def _alternative(run: Run) -> str:
-    name = f'{run.name}: ' if run.name else ''
-    return f'{name}{run.summary} {ROWS_IN_WORDS}{CROSSES_IN_WORDS if run.lost else ""}'
+def fill_up(found: set[str], threads: int) -> list[str]:
+    """Return the names of threads in their order, with more names until there are `threads`.
+
+    Raises ValueError where there are more.
+    """
+    if len(found) > threads:
+        raise ValueError(f'Callbacks ran in {len(found)} threads, more than threads={threads}.')
+    more = (f'thread {number}' for number in range(1, 2 * threads + 1))
+    free = [name for name in more if name not in found]
+    return sorted([*found, *free[: threads - len(found)]], key=_natural)
+
+
+def has_calls(setup: dict) -> bool:
+    """Return whether a callback of a setup of model.js asks a service."""
+    return any('does' in callback for callback in setup['callbacks'])
 
 
 def _natural(name: str) -> list:

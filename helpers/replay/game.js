@@ -4,8 +4,9 @@
 const model = queueModel();
 
 // A game of one setup. `goal` is 'keep' (lose no message), 'lose' (let the number count be too
-// small) or 'answer' (let all callbacks end). A state is one of model.js.
-function game({ setup, goal }) {
+// small), 'answer' (let all callbacks end) or 'stop' (keep the number places small). A state is one
+// of model.js. `begun`, moves, are done before the learner's first.
+function game({ setup, goal, begun = [] }) {
   const { callbacks, arrivals = [] } = setup;
   const stepOf = run => (callbacks[run.callback].does ?? [{ work: undefined }])[run.step];
   const canStep = run => run && !run.waits && run.until === undefined;
@@ -13,12 +14,13 @@ function game({ setup, goal }) {
   const SCORES = {
     keep: state => state.lost.length,
     lose: state => state.values.count ?? 0,
-    answer: state => state.runs.concat(state.asleep).filter(Boolean).length,
+    answer: state => model.going(state).length,
+    stop: state => state.values.places ?? 0,
   };
   // The less the better, in each kind of level.
   const score = SCORES[goal];
 
-  const VERBS = { read: 'read', write: 'write', lock: 'take', unlock: 'give back', call: 'ask' };
+  const VERBS = { read: 'read', write: 'write', lock: 'take', unlock: 'give back', set: 'accept', call: 'ask' };
 
   function stepText(run) {
     const [[verb, what]] = Object.entries(stepOf(run));
@@ -43,16 +45,7 @@ function game({ setup, goal }) {
     return found;
   }
 
-  // '' where the choice is allowed, else the sentence of the rule that forbids it.
-  function refusal(state, move) {
-    const refused = model.refusal(setup, state, move);
-    if (refused || move.do !== 'take') return refused;
-    const { callback, seq } = move;
-    const [oldest] = state.queues[callback];
-    if (oldest.seq === seq) return '';
-    const older = model.named(setup, { callback, seq: oldest.seq });
-    return `A queue gives its oldest first, and ${older} is older.`;
-  }
+  const refusal = (state, move) => model.refusal(setup, state, move);
 
   // What happens without a choice: what is due now, and the end of what has no more to do.
   function automatic(state) {
@@ -78,6 +71,7 @@ function game({ setup, goal }) {
   function start() {
     const state = model.start(setup);
     settle(state);
+    begun.forEach(move => model.advance(setup, state, move));
     return state;
   }
 

@@ -1,13 +1,14 @@
 // A level as a page shows it: lists that can be read, buttons, keys. What may be tried is decided in
 // game.js. Nothing is global: many levels stand on a page.
 
-// A level is {goal, options: [{name, values}], variants: [{setup, code, lesson, rclpy}]}: one
+// A level is {goal, options: [{name, values}], variants: [{setup, begun, code, lesson, rclpy}]}: one
 // variant for each combination of the options, the last option changing first.
 function show(root, level) {
   const WORDS = {
     keep: count => (count ? `${count} lost` : 'none lost'),
     lose: count => `the count is ${count}`,
     answer: count => (count ? 'the answer never comes' : 'the answer comes'),
+    stop: count => `${count} places visited`,
   };
   const words = WORDS[level.goal];
 
@@ -34,9 +35,9 @@ function show(root, level) {
 
   function draw() {
     const over = now.isOver(state);
-    const circle = over ? model.circle(setup, state) : [];
+    const circle = over ? circleOf(setup, state) : [];
     const stuck = run => circle.some(({ run: id }) => id === run.id);
-    const kind = run => (stuck(run) ? 'level-stuck' : 'replay-busy');
+    const kind = run => (stuck(run) ? 'replay-stuck' : 'replay-busy');
     const about = callback => seq => setup.callbacks.length > 1
       ? model.named(setup, { callback, seq }) : `${seq}`;
     lists.textContent = '';
@@ -66,7 +67,8 @@ function show(root, level) {
     if (level.goal === 'keep')
       row('lost', state.lost.map(({ callback, seq }) => [about(callback)(seq)]));
     if (level.goal === 'lose') row('count', [[`${state.values.count ?? 0}`]]);
-    circle.forEach(({ says: why }) => lists.append(element('p', { class: 'level-circle' }, why)));
+    if (level.goal === 'stop') row('places', [[`${state.values.places ?? 0}`]]);
+    circle.forEach(({ says: why }) => lists.append(element('p', { class: 'replay-circle' }, why)));
 
     const index = [...ready.children].findIndex(item => item.contains(document.activeElement));
     ready.textContent = '';
@@ -106,7 +108,7 @@ function show(root, level) {
       (sum, { values }, i) => sum * values.length + selects[i].selectedIndex, 0);
     variant = level.variants[place];
     setup = variant.setup;
-    now = game({ setup, goal: level.goal });
+    now = game({ ...variant, goal: level.goal });
     state = now.start();
     code.textContent = variant.code;
     code.hidden = !variant.code;

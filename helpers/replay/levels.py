@@ -4,8 +4,9 @@ A level is an output of a cell, as a replay is: a script that needs neither a ke
 network. Where a page does not run it, the task stays as a text. What may happen is decided in
 model.js, what may be tried and how well it went in game.js; level.js shows it.
 
-What rclpy did is a fact of a real run: `rclpy` of a variant is how many messages were lost, or how
-many callbacks never ended. tests/test_levels.py makes each of these runs again.
+What rclpy did is a fact of a real run: `rclpy` of a variant is how many messages were lost, how
+many callbacks never ended, or how many places were visited. tests/test_levels.py makes each of
+these runs again.
 """
 
 from __future__ import annotations
@@ -18,26 +19,31 @@ from itertools import product
 from helpers.replay.script import attribute, script, source
 from helpers.values import shown
 
-SCRIPT = 'model.js', 'game.js', 'element.js', 'level.js'
+SCRIPT = 'model.js', 'game.js', 'circle.js', 'element.js', 'level.js'
 ONE = 'SingleThreadedExecutor()'
 
 
 @dataclass(frozen=True)
 class Variant:
-    """What the options of a level make: a setup of model.js, its lines of rclpy, what it shows."""
+    """What the options of a level make: a setup of model.js, its lines of rclpy, what it shows.
+
+    `begun` are moves of model.js that are done when the level begins.
+    """
 
     setup: dict
     lesson: str
     code: str = ''
     rclpy: int | None = None
+    begun: tuple[dict, ...] = ()
 
 
 @dataclass(frozen=True)
 class Level:
     """A level. The last line of a cell shows it.
 
-    `goal` is 'keep' (lose no message), 'lose' (let the number `count` be too small) or 'answer'
-    (let all callbacks end). `variant` makes a variant of a value of each option.
+    `goal` is 'keep' (lose no message), 'lose' (let the number `count` be too small), 'answer' (let
+    all callbacks end) or 'stop' (keep the number `places` small). `variant` makes a variant of a
+    value of each option.
     """
 
     task: str
@@ -239,6 +245,46 @@ def _deadlock(threads: int, groups: str) -> Variant:
     )
 
 
+def _cancel(threads: int, job: str) -> Variant:
+    looks = job == 'looks'
+    visit = {'work': 1, 'adds': 'places'} | ({'unless': 'the cancel'} if looks else {})
+    look = """    if goal_handle.is_cancel_requested:
+        goal_handle.canceled()
+        return Fibonacci.Result()
+"""
+    if threads == 1:
+        lesson = (
+            'Too late: the job holds the only thread until it ends. No order changes that, and '
+            'it does not help that the job looks. Try two threads.'
+            if looks
+            else 'Too late: the job holds the only thread until it ends. Try two threads.'
+        )
+    elif looks:
+        lesson = 'The second thread took the cancel while the job ran, and the job looked.'
+    else:
+        lesson = 'The cancel was heard, and nobody looked: to hear is not to obey.'
+    return Variant(
+        {
+            'threads': _threads(threads),
+            'groups': [
+                {'name': 'no group', 'exclusive': False},
+                {'name': "the action's group", 'exclusive': True},
+            ],
+            'callbacks': [
+                {'name': 'job', 'word': 'goal', 'group': 0, 'depth': 10, 'does': [visit] * 3},
+                {'name': 'action', 'word': 'cancel', 'group': 1, 'depth': 10}
+                | {'does': [{'set': 'the cancel'}]},
+            ],
+            'arrivals': _arrivals(0, [0]) + _arrivals(1, [1.5]),
+        },
+        lesson,
+        f'executor = {_executor(threads)}\n\n'
+        f'for place in range(3):\n{look if looks else ""}    self.visit(place)',
+        2 if threads == 2 and looks else 3,
+        ({'do': 'take', 'callback': 0, 'thread': 0},),
+    )
+
+
 LEVELS = {
     'save': Level(
         'A camera sends a picture every second. Your program needs 3.5 seconds for each, one after '
@@ -283,5 +329,13 @@ LEVELS = {
         'answer',
         _deadlock,
         {'threads': (1, 2), 'groups': ('one group', 'two groups', 'Reentrant')},
+    ),
+    'cancel': Level(
+        'You are the executor of a robot. Its job has begun: visit three places, a second each. '
+        'After 1.5 s somebody cancels. Let the robot visit as few places as you can. Choose the '
+        'threads, and whether the job looks for a cancel in front of each place.',
+        'stop',
+        _cancel,
+        {'threads': (1, 2), 'job': ('looks', 'does not look')},
     ),
 }

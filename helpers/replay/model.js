@@ -7,9 +7,11 @@
 //   groups     [{name, exclusive}]
 //   callbacks  [{name, group, depth, does, word}]: `group` is an index, `depth` that of the queue,
 //              `word` what waits in it ('message', 'tick', 'request', 'answer'), `does` its steps:
-//                {work: seconds}; without a number it ends when the record says so
+//                {work: seconds}; without a number it ends when the record says so. `adds`, the
+//                name of a number, is one more after it; `unless`, see `set`
 //                {read: name}, {write: name}     reads a number; writes what was read plus one
 //                {lock: name}, {unlock: name}
+//                {set: name}          from now on, a work with `unless` of this name does not begin
 //                {call: callback, client: callback}     waits, and holds thread and group
 //                {await: callback, client: callback}    waits, gives the thread back, not the group
 //                {send: callback, client: callback}     goes on; the client takes the answer
@@ -19,7 +21,8 @@
 //
 // A move is {do, at, ...}; `at` is left out for "now":
 //   {do: 'arrive', callback, seq}   a message comes; a full queue loses its oldest
-//   {do: 'take', callback, thread}  a thread takes the oldest message and starts the callback
+//   {do: 'take', callback, thread}  a thread takes the oldest message and starts the callback; `seq`
+//                                   may say which one is meant
 //   {do: 'go', thread}              the callback on the thread does its next step
 //   {do: 'end', thread}             the callback ends, and an answer goes where it was asked for
 //   {do: 'resume', run, thread}     a thread goes on with a callback whose awaited answer has come
@@ -116,7 +119,10 @@ function queueModel() {
         const asleep = state.asleep.find(({ id }) => id === move.run);
         return asleep?.waits === 'thread' ? '' : 'Its answer has not come.';
       }
-      if (!state.queues[move.callback].length) return 'Nothing waits there.';
+      const [oldest] = state.queues[move.callback];
+      if (!oldest) return 'Nothing waits there.';
+      if (oldest.seq !== (move.seq ?? oldest.seq))
+        return `A queue gives its oldest first, and ${named(setup, { ...move, ...oldest })} is older.`;
       const held = holder(setup, state, move.callback);
       if (held)
         return `${capital(named(setup, held))} holds ${groupOf(setup, move.callback).name}: `
@@ -167,57 +173,6 @@ function queueModel() {
   function blocked(setup, state, run) {
     const { lock } = step(setup, run) ?? {};
     return lock !== undefined && state.locks[lock] !== undefined;
-  }
-
-  // Who can never go on: runs that wait in a circle. A sentence each says for what.
-  function circle(setup, state) {
-    const runs = going(state);
-    const free = new Set();
-    const can = run => !run || free.has(run.id);
-    const isOpen = callback => can(holder(setup, state, callback));
-    const hasThread = () => state.runs.some(can);
-    const canGo = run => {
-      if (run.waits === 'thread') return hasThread();
-      if (run.waits === 'answer') {
-        const { client, ...asks } = step(setup, run);
-        const service = asks.call ?? asks.await;
-        const asked = item => item.from?.run === run.id;
-        const working = runs.find(asked);
-        if (working?.callback === client) return can(working);
-        if (!hasThread() || !isOpen(client)) return false;
-        if (state.queues[client].some(asked)) return true;
-        return working ? can(working) : state.queues[service].some(asked) && isOpen(service);
-      }
-      return !blocked(setup, state, run)
-        || can(runOf(state, state.locks[step(setup, run).lock]));
-    };
-    for (let grown = true; grown; ) {
-      const before = free.size;
-      runs.filter(run => canGo(run)).forEach(run => free.add(run.id));
-      grown = free.size > before;
-    }
-    return runs.filter(run => !free.has(run.id)).map(run => ({
-      run: run.id,
-      callback: run.callback,
-      says: waitsFor(setup, state, run),
-    }));
-  }
-
-  function waitsFor(setup, state, run) {
-    const who = capital(named(setup, run));
-    if (run.waits !== 'answer')
-      return `${who} waits for the lock that `
-        + `${named(setup, runOf(state, state.locks[step(setup, run).lock]))} has.`;
-    const { client, ...asks } = step(setup, run);
-    const service = asks.call ?? asks.await;
-    const there = state.queues[client].some(item => item.from?.run === run.id);
-    const needed = there ? client : service;
-    const what = there ? 'The answer is there' : `The request waits for ${setup.callbacks[service].name}`;
-    const held = holder(setup, state, needed) ?? (there ? undefined : holder(setup, state, client));
-    if (!state.runs.includes(null)) return `${who} waits for an answer. ${what}, but no thread is free.`;
-    if (!held) return `${who} waits for an answer that never comes.`;
-    return `${who} waits for an answer. ${what}, but ${named(setup, held)} holds `
-      + `${groupOf(setup, held.callback).name}.`;
   }
 
   // Moves
@@ -289,10 +244,20 @@ function queueModel() {
     return exclusive && setup.threads.length > 1 ? `${says} Nobody else may run in ${name} now.` : says;
   }
 
+  // Return what is to be said of it: '' where it is the step that comes next.
   function nextStep(setup, state, run) {
     run.step += 1;
-    const now = step(setup, run);
-    run.until = now?.work === undefined ? undefined : state.now + now.work;
+    const { work, unless } = step(setup, run) ?? {};
+    const stops = Boolean(state.values[unless]);
+    if (stops) run.step = stepsOf(setup, run).length;
+    run.until = stops || work === undefined ? undefined : state.now + work;
+    return stops ? ` It looks, sees ${unless}, and stops.` : '';
+  }
+
+  // Of a work that is done.
+  function add(setup, state, run) {
+    const { adds } = step(setup, run) ?? {};
+    if (adds) state.values[adds] = (state.values[adds] ?? 0) + 1;
   }
 
   function go(setup, state, thread) {
@@ -300,6 +265,7 @@ function queueModel() {
     const who = capital(named(setup, run));
     const now = step(setup, run);
     let says = `${who} goes on.`;
+    add(setup, state, run);
     if (now.read !== undefined) {
       run.seen = state.values[now.read] ?? 0;
       says = `${who} reads ${now.read}: ${run.seen}.`;
@@ -314,11 +280,13 @@ function queueModel() {
     } else if (now.unlock !== undefined) {
       delete state.locks[now.unlock];
       says = `${who} gives ${now.unlock} back.`;
+    } else if (now.set !== undefined) {
+      state.values[now.set] = 1;
+      says = `${who} is heard: who looks, sees ${now.set} now.`;
     } else if (now.client !== undefined) {
       return ask(setup, state, run, now);
     }
-    nextStep(setup, state, run);
-    return says;
+    return says + nextStep(setup, state, run);
   }
 
   function ask(setup, state, run, now) {
@@ -339,6 +307,7 @@ function queueModel() {
 
   function end(setup, state, thread) {
     const run = state.runs[thread];
+    add(setup, state, run);
     state.runs[thread] = null;
     const ends = `The callback of ${named(setup, run)} ends. ${capital(setup.threads[thread])} is free.`;
     const { from } = run;
@@ -374,5 +343,8 @@ function queueModel() {
   const isSame = (one, other) =>
     other && one.do === other.do && one.thread === other.thread && one.seq === other.seq;
 
-  return { start, copy, due, refusal, moves, cause, circle, advance, apply, eager, named, holderOf };
+  return {
+    start, copy, due, refusal, moves, cause, advance, apply, eager,
+    named, capital, step, going, holderOf, holder, groupOf, blocked, runOf,
+  };
 }

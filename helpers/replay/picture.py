@@ -5,108 +5,93 @@ It is SVG, a tenth of the size of a PNG, and stands in a notebook as an image do
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from html import escape
 from urllib.parse import quote
 
 from matplotlib.ticker import MaxNLocator
 
 from helpers.plots.style import GREY, GROUP_COLOURS, HEARD, INK, LOST, PALE, PUBLISHED
-from helpers.replay.events import ARRIVE, END, TAKE, Event
 
 WIDTH, NARROW = 760, 440  # pixels; the narrow ones stand side by side
-LEFT, RIGHT, TOP, BOTTOM = 46, 14, 30, 40
+LEFT, RIGHT, TOP, BOTTOM = 46, 14, 14, 40
+LINE, MARK = 16, 28  # of the legend: a line's height, and how far its words are from its mark
+LETTER = 6.6  # about as wide as one of a name
 MOST_ROWS = 120
-TIME_LABEL = 'time since the first publish (s)'
 SAFE = "!$'()*+,-./:;=?@_~ "  # may stand in the address of an image, in double quotes
-# Why a message waits, as model.js calls it: colour, dashes, and how the legend says it.
-CAUSES = {
+# Why a message waits, and a callback, as model.js calls it: colour, dashes, and the legend's words.
+WAITS = {
     '': (PALE, '', 'waits, a thread is free'),
     'thread busy': (PUBLISHED, '', 'waits, thread busy'),
     'group busy': (GROUP_COLOURS[1], '6 2', 'waits, group busy'),
     'no executor': (GREY, '2 2', 'waits, no executor'),
+    'answer': (LOST, '4 2', 'waits, for one that waits'),
+    'lock': (GROUP_COLOURS[2], '2 2', 'waits, for a lock'),
+}
+RUNS = {
+    '': (HEARD, '', 'callback runs'),
+    'answer': (PALE, '', 'callback waits for an answer'),
+    'lock': (PALE, '2 1', 'callback waits for a lock'),
 }
 
 
-def causes(events: Sequence[Event], threads: int, exclusive: bool) -> list[tuple[float, str]]:
-    """Return from when on (seconds) a message that waits has which cause, one of CAUSES."""
-    running, found = 0, [(0.0, '' if threads else 'no executor')]
-    for event in events:
-        running += {ARRIVE: 0, TAKE: 1, END: -1}[event.do]
-        if not threads:
-            cause = 'no executor'
-        elif running == threads:
-            cause = 'thread busy'
-        else:
-            cause = 'group busy' if exclusive and running else ''
-        if cause != found[-1][1]:
-            found.append((event.at_s, cause))
-    return found
-
-
 def picture(
-    events: Sequence[Event],
-    depth: int,
-    threads: int,
-    exclusive: bool,
+    messages: Sequence[dict],
+    names: Sequence[str],
     span_s: tuple[float, float],
-    width: int = WIDTH,
+    width: int,
+    left: int,
+    time_label: str,
 ) -> str:
-    """Return an SVG of the first MOST_ROWS messages, in a span of seconds, `width` pixels wide."""
+    """Return an SVG of messages, as stories.js tells of them, in a span of seconds.
+
+    It is `width` pixels wide; `left` of them are for the names, one for each message.
+    """
     from_s, until_s = span_s
-    published = [event for event in events if event.do == ARRIVE][:MOST_ROWS]
-    rows = {event.seq: row for row, event in enumerate(published)}
-    taken = {event.seq: event.at_s for event in events if event.do == TAKE}
-    ended = {event.seq: event.at_s for event in events if event.do == END}
+    rows = {(one['callback'], one['seq']): row for row, one in enumerate(messages)}
     step = max(4.0, min(14.0, 260 / max(len(rows), 1)))
-    height = TOP + step * len(rows) + BOTTOM
-    scale = (width - LEFT - RIGHT) / (until_s - from_s)
+    bottom = step * len(rows)
+    scale = (width - left - RIGHT) / (until_s - from_s)
 
     def x(at_s: float) -> str:
-        return f'{LEFT + scale * (max(at_s, from_s) - from_s):.1f}'.removesuffix('.0')
+        return f'{left + scale * (max(at_s, from_s) - from_s):.1f}'.removesuffix('.0')
 
-    def y(seq: int) -> str:
-        return f'{TOP + step * (rows[seq] + 0.5):.1f}'.removesuffix('.0')
+    def y(row: int) -> str:
+        return f'{step * (row + 0.5):.1f}'.removesuffix('.0')
 
-    waits: dict[str, list[str]] = {}
-    runs, crosses, pushed = [], [], []
-    phases = causes(events, threads, exclusive)
-    arrivals = {event.seq: event.at_s for event in events if event.do == ARRIVE}
-    seqs = list(arrivals)
-    for row, event in enumerate(published):
-        by = seqs[row + depth] if row + depth < len(seqs) else None
-        left = taken.get(event.seq, arrivals.get(by, until_s))
-        for (start, cause), (end, _) in zip(phases, [*phases[1:], (until_s, '')], strict=True):
-            begin, stop = max(start, event.at_s), min(end, left)
+    def lines(row: int, phases: list, end_s: float) -> Iterator[tuple[str, str]]:
+        """Yield of each phase its cause, and its line."""
+        for (start, cause), (end, _) in zip(phases, [*phases[1:], (end_s, '')], strict=False):
+            begin, stop = max(start, from_s), min(end, end_s)
             if begin < stop:
-                waits.setdefault(cause, []).append(f'M{x(begin)} {y(event.seq)}H{x(stop)}')
-        if event.seq in taken:
-            runs.append(f'M{x(left)} {y(event.seq)}H{x(ended.get(event.seq, until_s))}')
-        elif by is not None:
-            crosses.append(f'M{x(left)} {y(event.seq)}m-3-3l6 6m0-6l-6 6')
-            if by in rows:
-                pushed.append(f'M{x(left)} {y(event.seq)}V{y(by)}')
+                yield cause, f'M{x(begin)} {y(row)}H{x(stop)}'
+
+    waits, runs = defaultdict(list), defaultdict(list)
+    crosses, pushed = [], []
+    for row, one in enumerate(messages):
+        left_s = one.get('left', until_s)
+        for cause, line in lines(row, one['waits'], left_s):
+            waits[cause].append(line)
+        for cause, line in lines(row, one['runs'], one.get('ended', until_s)):
+            runs[cause].append(line)
+        if 'by' in one:
+            crosses.append(f'M{x(left_s)} {y(row)}m-3-3l6 6m0-6l-6 6')
+            if (by := rows.get((one['callback'], one['by']))) is not None:
+                pushed.append(f'M{x(left_s)} {y(row)}V{y(by)}')
 
     thin, thick = max(1.5, step * 0.3), max(3.0, step * 0.7)
-    seen = {name: look for name, look in CAUSES.items() if name in waits}
-    parts = [_path(waits[name], look[0], thin, look[1]) for name, look in seen.items()]
-    parts += [
-        _path(lines, *look)
-        for lines, look in (
-            (pushed, (LOST, 0.8, '1 2')),
-            (runs, (HEARD, thick)),
-            (crosses, (LOST, 1.6)),
-        )
-        if lines
-    ]
-    legend = [(look[0], thin, look[1], look[2]) for look in seen.values()]
-    if runs:
-        legend.append((HEARD, thick, '', 'callback runs'))
+    parts, texts, legend = [], [], []
+    for found, looks, line in ((waits, WAITS, thin), (runs, RUNS, thick)):
+        for cause, (colour, dashes, words) in looks.items():
+            if cause in found:
+                parts.append(_path(found[cause], colour, line, dashes))
+                legend.append((colour, line, dashes, words))
+    if pushed:
+        parts.append(_path(pushed, LOST, 0.8, '1 2'))
     if crosses:
+        parts.append(_path(crosses, LOST, 1.6))
         legend.append((LOST, 0, '', 'pushed out'))
-    marks, texts = _legend(legend)
-    parts += marks
-    bottom = height - BOTTOM
     for tick in MaxNLocator(max(2, width // 110)).tick_values(from_s, until_s):
         if from_s <= tick <= until_s:
             parts.append(_path([f'M{x(tick)} {bottom:g}v5'], INK, 1))
@@ -115,18 +100,20 @@ def picture(
             )
     every = next(n for n in (1, 2, 5, 10, 20, 50, 100) if n * step >= 13)
     texts += [
-        f'<text x="{LEFT - 6}" y="{float(y(seq)) + 4:g}" text-anchor="end">{seq}</text>'
-        for seq, row in rows.items()
+        f'<text x="{left - 6}" y="{float(y(row)) + 4:g}" text-anchor="end">{escape(name)}</text>'
+        for row, name in enumerate(names)
         if row % every == 0
     ]
-    middle = (width + LEFT) // 2
-    texts.append(f'<text x="{middle}" y="{bottom + 34:g}" text-anchor="middle">{TIME_LABEL}</text>')
-    parts.append(_path([f'M{LEFT} {bottom:g}H{width - RIGHT}'], INK, 1))
+    middle = (width + left) // 2
+    texts.append(f'<text x="{middle}" y="{bottom + 34:g}" text-anchor="middle">{time_label}</text>')
+    parts.append(_path([f'M{left} {bottom:g}H{width - RIGHT}'], INK, 1))
+    above, top = _legend(legend, width)
+    height = top + bottom + BOTTOM
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:g}" '
-        f'width="{width}" height="{height:g}"><rect width="100%" height="100%" fill="#fff"/>'
-        f'<g fill="none">{"".join(parts)}</g><g font-family="sans-serif" font-size="12" '
-        f'fill="{INK}">{"".join(texts)}</g></svg>'
+        f'width="{width}" height="{height:g}" font-family="sans-serif" font-size="12" '
+        f'fill="{INK}"><rect width="100%" height="100%" fill="#fff"/>{"".join(above)}'
+        f'<g transform="translate(0 {top})">{"".join(parts)}{"".join(texts)}</g></svg>'
     )
 
 
@@ -135,15 +122,21 @@ def _path(lines: list[str], colour: str, line: float, dashes: str = '') -> str:
     return f'<path d="{"".join(lines)}" stroke="{colour}" stroke-width="{line:g}"{dashed}/>'
 
 
-def _legend(entries: list[tuple[str, float, str, str]]) -> tuple[list[str], list[str]]:
-    """Return marks and texts of entries: colour, width of a line (0 for a cross), dashes, words."""
-    marks, texts, at = [], [], LEFT
+def _legend(entries: list[tuple[str, float, str, str]], width: int) -> tuple[list[str], int]:
+    """Return marks and texts of entries, and the height that they take.
+
+    An entry is its colour, the width of its line (0 for a cross), its dashes, its words.
+    """
+    parts, at, y = [], RIGHT, LINE
     for colour, line, dashes, words in entries:
-        mark = [f'M{at} 12h22'] if line else [f'M{at + 8} 9l6 6m0-6l-6 6']
-        marks.append(_path(mark, colour, line or 1.6, dashes))
-        texts.append(f'<text x="{at + 28}" y="16">{escape(words)}</text>')
-        at += 44 + 7 * len(words)
-    return marks, texts
+        needed = MARK + LETTER * len(words)
+        if at > RIGHT and at + needed > width:
+            at, y = RIGHT, y + LINE
+        mark = f'M{at:g} {y - 4}h22' if line else f'M{at + 8:g} {y - 7}l6 6m0-6l-6 6'
+        parts.append(_path([mark], colour, line or 1.6, dashes))
+        parts.append(f'<text x="{at + MARK:g}" y="{y}">{escape(words)}</text>')
+        at += needed + RIGHT
+    return parts, y + TOP
 
 
 def address(svg: str) -> str:

@@ -4,6 +4,9 @@
 const MOST_ITEMS = 100; // of a list; what is more is counted
 const DELAYS = [800, 400, 200, 100, 50]; // ms a step, while it plays
 
+// Does a callback ask a service? Then nothing is lost, and callbacks may wait in a circle.
+const asks = ({ setup }) => setup.callbacks.some(({ does }) => does);
+
 // The lists of one run.
 function panel(run, record, picture, { span: [from, until], plot: [left, right] }) {
   const list = name => element('ul', { 'aria-label': name, role: 'list', class: `replay-${name}` });
@@ -15,6 +18,8 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
   const cursor = element('span', { class: 'replay-cursor', 'aria-hidden': 'true' });
   const shown = element('div', { class: 'replay-picture' }, picture, cursor);
   const { setup } = record;
+  const calls = asks(record);
+  const circle = element('ul', { 'aria-label': 'circle', role: 'list' });
   const { depth } = setup.callbacks[0];
 
   function fill(target, items) {
@@ -30,17 +35,20 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
 
   function draw(position) {
     const { state, says } = run.seek(position);
+    const stuck = calls ? circleOf(setup, state) : [];
+    const kind = ({ id }) => (stuck.some(({ run: one }) => one === id) ? 'replay-stuck' : 'replay-busy');
+    fill(circle, stuck.map(({ says: why }) => [why, 'replay-circle']));
     fill(threads, setup.threads.length
       ? setup.threads.map((name, i) => {
         const it = state.runs[i];
         if (!it) return [`${name}: free`];
-        return [`${name}: ${seqOf(it)}${it.waits ? ', waits' : ''}`, 'replay-busy'];
+        return [`${name}: ${seqOf(it)}${it.waits ? ', waits' : ''}`, kind(it)];
       })
       : [['no executor']]);
     fill(groups, setup.groups.map(({ name, exclusive }, group) => {
       if (!exclusive) return [`${name}: lets all in`];
       const holder = model.holderOf(setup, state, group);
-      return holder ? [`${name}: held by ${seqOf(holder)}`, 'replay-busy'] : [`${name}: free`];
+      return holder ? [`${name}: held by ${seqOf(holder)}`, kind(holder)] : [`${name}: free`];
     }));
     const waiting = setup.callbacks.flatMap((_, callback) =>
       state.queues[callback].map(item => ({ ...item, callback })));
@@ -64,7 +72,7 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
   const node = element('div', { class: 'replay-run', role: name && 'group', 'aria-label': name },
     row(record.name || 'time', time),
     row('threads', threads), row('groups', groups),
-    row('queue', queue, places), row('lost', lost), shown);
+    row('queue', queue, places), row(...(calls ? ['circle', circle] : ['lost', lost])), shown);
   return { node, draw };
 }
 
@@ -85,6 +93,7 @@ function show(root, record) {
     for (let i = 0; i < runs.length; i += 1) counts[i].push(next[i]);
   }
   const last = order.length;
+  const calls = record.runs.some(asks);
   let position = 0;
   let playing = null;
   let delay = 0;
@@ -210,8 +219,8 @@ function show(root, record) {
   root.querySelectorAll('figure').forEach(figure => figure.remove());
   root.querySelector('.replay-on > p').after(
     says,
-    element('div', { class: 'replay-controls' }, back, forth, play, faster, slider, loss,
-      element('label', {}, 'Message ', number)),
+    element('div', { class: 'replay-controls' }, back, forth, play, faster, slider,
+      ...(calls ? [] : [loss, element('label', {}, 'Message ', number)])),
     element('div', { class: 'replay-runs' }, ...panels.map(({ node }) => node)),
   );
   go(0);

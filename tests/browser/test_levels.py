@@ -81,7 +81,7 @@ def test_a_deadlock_lights_up_and_other_groups_end_it(page, artefacts):
     assert 'You: the answer never comes. The best possible: the answer never comes.' in (
         says.inner_text()
     )
-    assert root.locator('.level-stuck').count() == 2
+    assert root.locator('.replay-stuck').count() == 2
     assert 'MultiThreadedExecutor(num_threads=2)' in root.locator('pre').inner_text()
     page.screenshot(path=artefacts / 'level_deadlock.png', full_page=True)
     groups.select_option('two groups')
@@ -89,7 +89,7 @@ def test_a_deadlock_lights_up_and_other_groups_end_it(page, artefacts):
         root.focus()
         page.keyboard.press(key)
     assert 'You: the answer comes.' in says.inner_text()
-    assert root.locator('.level-stuck').count() == 0
+    assert root.locator('.replay-stuck').count() == 0
 
 
 def test_on_a_phone(page):

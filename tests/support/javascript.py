@@ -44,7 +44,7 @@ function play(setup, prefer = []) {
     const rank = move => (prefer.includes(move.do) ? prefer.indexOf(move.do) : prefer.length);
     const move = prefer.length
       ? allowed.sort((one, other) => rank(one) - rank(other))[0] : model.eager(setup, state);
-    if (!move) return { state, done, circle: model.circle(setup, state) };
+    if (!move) return { state, done, circle: circleOf(setup, state) };
     const before = JSON.stringify(state);
     const { state: after, says } = model.apply(setup, state, move);
     if (JSON.stringify(state) !== before) throw new Error('apply changed the state it got');
@@ -61,11 +61,11 @@ const last = (setup, moves) => after(setup, moves).says;
 
 
 class Script:
-    """model.js and another file, and GLUE. `call` gives and takes what JSON can say."""
+    """model.js, a file that makes `model` of it, circle.js, GLUE. `call` exchanges JSON."""
 
     def __init__(self, other: str = 'walk.js', glue: str = GLUE) -> None:
         self._context = quickjs.Context()
-        for name in ('model.js', other):
+        for name in ('model.js', other, 'circle.js'):
             self._context.eval((FOLDER / name).read_text())
         self._context.eval(glue)
 

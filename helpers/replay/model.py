@@ -1,0 +1,19 @@
+"""The rules of model.js, for Python: what became of each message of a run, and why it waited."""
+
+from __future__ import annotations
+
+import json
+
+import quickjs
+
+from helpers.replay.script import source
+
+SCRIPT = 'model.js', 'walk.js', 'circle.js', 'stories.js'
+
+
+def stories(record: dict, most: int) -> dict:
+    """Return what became of the first `most` messages of a record, as stories.js says it."""
+    context = quickjs.Context()
+    for name in SCRIPT:
+        context.eval(source(name))
+    return json.loads(context.eval(f'JSON.stringify(stories({json.dumps(record)}, {most}))'))

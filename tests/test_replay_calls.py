@@ -1,0 +1,220 @@
+"""Calls of services, recorded with the real rclpy and replayed: who waits for whom."""
+
+import math
+import re
+import threading
+from urllib.parse import unquote
+
+import pytest
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+from support.javascript import Script
+from support.nodes import LIMIT_S, Answerer, Asker, spin
+
+from helpers.recording import CallbackRecording
+from helpers.replay import side_by_side
+from helpers.replay.calls import replay_calls
+from helpers.session import ros_session
+
+GLUE = """
+// Of each step of a record what a page shows.
+function steps(record) {
+  const { setup } = record;
+  const run = walk(record);
+  return run.times.map((_, step) => {
+    const { state, says } = run.seek(step + 1);
+    return {
+      says,
+      threads: state.runs.map(it => it && setup.callbacks[it.callback].name),
+      held: setup.groups.map((_, group) => Boolean(model.holderOf(setup, state, group))),
+      queues: state.queues.map(queue => queue.length),
+      circle: circleOf(setup, state).map(({ says: why }) => why),
+    };
+  });
+}
+"""
+
+
+@pytest.fixture(scope='module')
+def script():
+    return Script(glue=GLUE)
+
+
+STYLES = {'call': 'call', 'await': 'wait', 'send': 'call_back'}  # methods of Asker
+
+
+def record(threads, groups, style):
+    """Let a node ask until nothing can happen any more. Return the replay, and the answer."""
+    with ros_session() as session:
+        asker, answerer = Asker(STYLES[style], groups), Answerer()
+        recording = watch(asker, answerer)
+        executor = spin(session, asker, answerer, threads=threads)
+        session.wait_until(asker.timer.is_canceled, LIMIT_S)
+        session.wait_until_quiet(executor)
+        return replay_calls(recording, threads), recording.calls(), asker.answer
+
+
+def watch(asker, answerer):
+    return CallbackRecording(tick=asker.timer, look=answerer.service, client=asker.client)
+
+
+@pytest.mark.parametrize('style', STYLES)
+@pytest.mark.parametrize('groups', [1, 2])
+@pytest.mark.parametrize('threads', [1, 2, 4])
+def test_what_rclpy_did_is_a_walk_and_waits_where_rclpy_waits(script, threads, groups, style):
+    for _ in range(4):
+        shown, calls, answer = record(threads, groups, style)
+        assert [(c.style, c.caller, c.service) for c in calls.itertuples()] == [
+            (style, 'tick', 'look')
+        ]
+        steps = script.call('steps', shown.runs[0].record())
+        # Nothing else than what was recorded ran, and in no more threads than there are.
+        assert all(len(step['threads']) == threads for step in steps)
+        stuck = answer is None
+        assert bool(steps[-1]['circle']) == stuck
+        assert any(steps[-1]['held']) == stuck
+        assert calls['answered_s'].isna().all() == stuck
+        assert ('for an answer' in str(shown)) == stuck
+        assert ('Nobody waits for ever.' in str(shown)) != stuck
+
+
+def test_the_circle_closes_when_the_question_is_asked(script):
+    shown, *_ = record(2, 1, 'call')
+    assert str(shown) == (
+        'Replay: 2 threads. Tick 0 of tick waits for an answer. '
+        'The answer is there, but tick 0 of tick holds the group of tick.'
+    )
+    steps = script.call('steps', shown.runs[0].record())
+    asked = next(i for i, step in enumerate(steps) if 'asks look' in step['says'])
+    assert [bool(step['circle']) for step in steps] == [i >= asked for i in range(len(steps))]
+    assert steps[asked]['circle'] == [
+        'Tick 0 of tick waits for an answer. '
+        'It will need the group of tick, but tick 0 of tick holds that.'
+    ]
+    assert steps[-1]['queues'] == [0, 0, 1]
+
+
+def test_await_gives_the_thread_back_and_not_the_group(script):
+    shown, *_ = record(1, 1, 'await')
+    last = script.call('steps', shown.runs[0].record())[-1]
+    assert last['threads'] == [None]
+    assert last['held'] == [True, False]
+
+
+def test_a_chain_of_services_waits_for_a_thread(script):
+    with ros_session() as session:
+        pilot, planner, camera = Node('pilot'), Node('planner'), Node('camera')
+        groups = [MutuallyExclusiveCallbackGroup() for _ in range(2)]
+        plan_client = pilot.create_client(Trigger, 'plan', callback_group=groups[0])
+        look_client = planner.create_client(Trigger, 'look', callback_group=groups[1])
+
+        def tick():
+            timer.cancel()
+            plan_client.call(Trigger.Request())
+
+        def plan(request, response):
+            return look_client.call(Trigger.Request())
+
+        timer = pilot.create_timer(0.01, tick)
+        services = (
+            planner.create_service(Trigger, 'plan', plan),
+            camera.create_service(Trigger, 'look', lambda request, response: response),
+        )
+        recording = CallbackRecording(
+            tick=timer, plan=services[0], look=services[1], planned=plan_client, seen=look_client
+        )
+        executor = spin(session, pilot, planner, camera, threads=2)
+        session.wait_until(lambda: recording.runs['plan'], LIMIT_S)
+        session.wait_until_quiet(executor)
+        shown = replay_calls(recording, 2)
+    assert str(shown) == (
+        'Replay: 2 threads. Tick 0 of tick waits for an answer. '
+        'Request 0 of plan must give it, and waits itself. '
+        'Request 0 of plan waits for an answer. The request waits for look, but no thread is free.'
+    )
+
+
+def test_the_picture_shows_who_waits_for_an_answer():
+    shown, *_ = record(2, 1, 'call')
+    page = shown._repr_mimebundle_()['text/html']
+    drawn = unquote(re.search(r'src="data:image/svg\+xml,([^"]*)"', page)[1])
+    assert 'callback waits for an answer' in drawn
+    assert 'waits, for one that waits' in drawn
+    assert all(f'>{name} 0<' in drawn for name in ('tick', 'look', 'client'))
+    assert 'function circleOf' in page
+    assert len(page) <= 30_000
+
+
+def test_two_runs_side_by_side():
+    runs = {name: record(2, groups, 'call')[0] for groups, name in ((1, 'one'), (2, 'two'))}
+    assert str(side_by_side(runs)).endswith('two: 2 threads. Nobody waits for ever.')
+
+
+# Bad input
+
+
+def test_nothing_ran():
+    with ros_session():
+        recording = watch(Asker(), Answerer())
+        with pytest.raises(ValueError, match=r'^No callback has run yet: there is nothing to step'):
+            replay_calls(recording)
+
+
+def test_a_call_that_gave_up():
+    with ros_session() as session:
+        node = Node('node')
+        client = node.create_client(Trigger, 'look')
+        timer = node.create_timer(0.005, lambda: client.call(Trigger.Request(), timeout_sec=0.01))
+        service = Answerer().service
+        recording = CallbackRecording(tick=timer, look=service, client=client)
+        spin(session, node)
+        session.wait_until(lambda: recording.finished('tick'), LIMIT_S)
+        with pytest.raises(ValueError, match=r'^tick ended without its answer: a replay shows'):
+            replay_calls(recording)
+
+
+def test_runs_that_called_differently():
+    asked = threading.Event()
+    with ros_session() as session:
+        node = Node('driver')
+        client = node.create_client(Trigger, 'look')
+        service = Node('camera').create_service(Trigger, 'look', lambda request, response: response)
+
+        def tick():
+            if not asked.is_set():
+                client.call_async(Trigger.Request())
+                asked.set()
+
+        timer = node.create_timer(0.01, tick)
+        recording = CallbackRecording(tick=timer, look=service, client=client)
+        spin(session, node)
+        session.wait_until(lambda: recording.finished('tick') >= 2, LIMIT_S)
+        with pytest.raises(ValueError, match=r'^The runs of tick called differently: record one'):
+            replay_calls(recording)
+
+
+def test_more_threads_than_were_said():
+    with ros_session() as session:
+        asker, answerer = Asker(groups=2), Answerer()
+        recording = watch(asker, answerer)
+        spin(session, asker, answerer, threads=2)
+        session.wait_until(lambda: asker.answer, LIMIT_S)
+        with pytest.raises(ValueError, match=r'^Callbacks ran in 2 threads, more than threads=1'):
+            replay_calls(recording, 1)
+
+
+def test_a_call_from_outside_is_a_request_that_comes():
+    with ros_session() as session:
+        node = Node('node')
+        client = node.create_client(Trigger, 'look')
+        service = node.create_service(Trigger, 'look', lambda request, response: response)
+        recording = CallbackRecording(look=service, client=client)
+        spin(session, node)
+        client.call(Trigger.Request(), LIMIT_S)
+        calls = recording.calls()
+        shown = replay_calls(recording)
+    assert calls['caller'].isna().all()
+    assert calls['answered_s'].notna().all()
+    assert not math.isnan(calls['sent_s'][0])
+    assert str(shown) == 'Replay: One thread. Nobody waits for ever.'
