@@ -13,6 +13,10 @@ present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02;
 		$(if $(filter yes,$(NEW)),"$(JUPYTER_CONFIG_DIR)"/lab/workspaces/deck-*) && \
 	$(call open_lab,true,/lab/workspaces/present/tree/$$deck)
 
+class: set_up ## see the guesses of a class as they come: LAN=yes lets students join over the network; PORT=8765, BROWSER=no
+	@exec $(PYTHON) -m tools.class_server --root "$(ROOT)" $(if $(filter yes,$(LAN)),--lan) $(if $(PORT),--port "$(PORT)") \
+		$(if $(filter no,$(BROWSER)),--no-browser) $(CLASS_ARGS)
+
 test: set_up lint ## lint, tests of the helpers, every notebook compared with its saved outputs
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(PYTEST_ARGS)
 
@@ -92,7 +96,7 @@ clean: ## remove the environment, JupyterLab's state, caches and what lessons bu
 set_up:
 	@mkdir -p .jupyter && tools/set_up.sh
 
-.PHONY: help lab present test test-tools test-browser image lab-container hub test-hub test-container handout update notebooks \
+.PHONY: help lab present class test test-tools test-browser image lab-container hub test-hub test-container handout update notebooks \
 	lesson slides site book sources soak bench lint lock licences clean set_up
 
 PYTHON := .venv/bin/python

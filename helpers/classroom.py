@@ -17,13 +17,13 @@ from __future__ import annotations
 import atexit
 import json
 import os
-import queue
 import re
 import secrets
 import sqlite3
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Set
 from contextlib import closing, suppress
 from pathlib import Path
@@ -37,19 +37,23 @@ JOINED_FOR_S = 12 * 3600  # a class that was not left is forgotten, so that noth
 ADDRESS = re.compile(r'(https?://)?[\w.-]+(:\d+)?(/[\w./-]*)?')
 ANSWER_LIMIT_S = 5.0
 TRY_AGAIN_S = 2.0
+TOGETHER_S = 0.05  # what a cell tells in this time is one message
 BATCH = 50
 WAITING = 1000  # events that are kept while the class does not answer; the oldest ones go first
 LARGEST = 2**53  # of numbers, which a browser holds exactly
 TEXT = 200  # letters of a text, at most
 ITEMS = 20  # of a list, a set or a dict, at most
+UNUSABLE = 'The class hears nothing, because {} cannot be used ({}): remove it, then join again.'
 NOT_JOINED = 'You are in no class: join_class(address, code) joins one.'
 SENT = (
-    'Sent to it: your guesses and what you measured, which exercises you tried and solved, which '
-    'step you are at, and a raised hand. Not sent: your name, your code, its outputs.'
+    'Sent to it: your guesses and what you measured, which exercises you tried and solved, at '
+    'which step you are, and a raised hand. Not sent: your code and its outputs.'
 )
 TABLES = """
 CREATE TABLE IF NOT EXISTS class (url TEXT, token TEXT, until_s REAL);
-CREATE TABLE IF NOT EXISTS waiting (n INTEGER PRIMARY KEY AUTOINCREMENT, kind TEXT, event TEXT);
+CREATE TABLE IF NOT EXISTS waiting (
+    n INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT UNIQUE, kind TEXT, event TEXT
+);
 """
 
 
@@ -86,7 +90,7 @@ def join_class(address: str = '', code: str = '', name: str = '') -> None:
     except ValueError as problem:
         text = str(problem)
     except (OSError, sqlite3.Error) as problem:
-        text = f'The class cannot be kept in {_file()}: {problem}.'
+        text = UNUSABLE.format(_file(), problem)
     print(*wrap(text), sep='\n')
 
 
@@ -94,14 +98,14 @@ def leave_class() -> None:
     """Leave the class: it is asked to delete what it was told, and nothing more is sent."""
     text, known = NOT_JOINED, None
     if path := _file_of_class():
-        with closing(_open(path)) as db, db:
+        with suppress(sqlite3.Error), closing(_open(path)) as db, db:
             known = _class(db)
             db.execute('DELETE FROM waiting')
             db.execute('DELETE FROM class')
             if HUB_VARIABLE in os.environ:
                 db.execute("INSERT INTO class VALUES ('', '', 0)")
-            else:
-                path.unlink()
+        if HUB_VARIABLE not in os.environ:
+            path.unlink()
     if known:
         try:
             _ask(known, 'leave', {})
@@ -142,7 +146,8 @@ class _Outbox:
     """Keeps events in the student's file and sends them, in a thread that starts with the first."""
 
     def __init__(self) -> None:
-        self._events: queue.Queue[dict] = queue.Queue(WAITING)
+        self._events: deque[dict] = deque()  # until they are in the file
+        self._came = threading.Event()
         self._lock = threading.Lock()
         self._thread: threading.Thread | None = None
         self._trouble = self._said = ''
@@ -150,8 +155,9 @@ class _Outbox:
 
     def put(self, event: dict) -> None:
         """Take over an event. It does not wait: one that finds no room is lost."""
-        with suppress(queue.Full):
-            self._events.put_nowait(event)
+        if len(self._events) < WAITING:
+            self._events.append(event)
+        self._came.set()
         with self._lock:
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._run, daemon=True, name='class')
@@ -168,36 +174,36 @@ class _Outbox:
         try:
             with closing(_open(_file())) as db:
                 while _class(db) is not None:
+                    self._came.clear()
+                    self._keep(db)
+                    time.sleep(TOGETHER_S)
+                    self._keep(db)
                     waiting = self._deliver(db)
-                    self._keep(db, TRY_AGAIN_S if waiting else None)
+                    self._came.wait(TRY_AGAIN_S if waiting else None)
         except (OSError, sqlite3.Error) as problem:
-            self._trouble = f'The class hears nothing, because {_file()} cannot be used: {problem}.'
-        with suppress(queue.Empty):
-            while True:
-                self._events.get_nowait()
+            self._trouble = UNUSABLE.format(_file(), problem)
+        self._events.clear()
 
     def _at_exit(self) -> None:
         """Keep what came while the thread waited for an answer: a next kernel sends it."""
         with suppress(OSError, sqlite3.Error):
-            if not self._events.empty():
+            if self._events:
                 with closing(_open(_file())) as db:
-                    self._keep(db, 0)
+                    self._keep(db)
 
-    def _keep(self, db: sqlite3.Connection, limit_s: float | None) -> None:
-        """Wait for events until the limit, if there is one, and move them into the file."""
-        with suppress(queue.Empty):
-            events = [self._events.get(timeout=limit_s)]
-            time.sleep(0.05)  # what the same cell tells next goes with it
-            while not self._events.empty():
-                events.append(self._events.get_nowait())
-            with db:
-                for event in events:
-                    if event['kind'] == 'cell':  # only the last one matters
-                        db.execute("DELETE FROM waiting WHERE kind = 'cell'")
-                    row = event['kind'], json.dumps(event)
-                    db.execute('INSERT INTO waiting (kind, event) VALUES (?, ?)', row)
-                newest = '(SELECT n FROM waiting ORDER BY n DESC LIMIT ?)'
-                db.execute(f'DELETE FROM waiting WHERE n NOT IN {newest}', [WAITING])
+    def _keep(self, db: sqlite3.Connection) -> None:
+        """Move events into the file. Two threads may move the same: an id stands there once."""
+        events = list(self._events)
+        with db:
+            for event in events:
+                if event['kind'] == 'cell':  # only the last one matters
+                    db.execute("DELETE FROM waiting WHERE kind = 'cell'")
+                row = event['id'], event['kind'], json.dumps(event)
+                db.execute('INSERT OR IGNORE INTO waiting (id, kind, event) VALUES (?, ?, ?)', row)
+            newest = '(SELECT n FROM waiting ORDER BY n DESC LIMIT ?)'
+            db.execute(f'DELETE FROM waiting WHERE n NOT IN {newest}', [WAITING])
+        for _ in events:
+            self._events.popleft()
 
     def _deliver(self, db: sqlite3.Connection) -> bool:
         """Send what is in the file. Return whether something is left for later."""
@@ -268,9 +274,9 @@ def _join(address: str, code: str, name: str) -> str:
         if not hub:
             until_s = time.time() + JOINED_FOR_S
             db.execute('INSERT INTO class VALUES (?, ?, ?)', (url, answer['token'], until_s))
-    called = f', called {name}' if name else ', without a name'
+    called = f', called {name}. {SENT}' if name else f'. {SENT} Nor your name.'
     return (
-        f'You are in the class of {address} as number {answer["seat"]}{called}. {SENT} '
+        f'You are in the class of {address} on seat {answer["seat"]}{called} '
         'leave_class() ends it, raise_hand() says that you are lost.'
     )
 
@@ -342,13 +348,7 @@ def _open(path: Path) -> sqlite3.Connection:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.touch(mode=0o600)  # the token in it is the student's
     db = sqlite3.connect(path)
-    try:
-        db.executescript(TABLES)
-    except sqlite3.OperationalError:  # it is locked, or cannot be written
-        raise
-    except sqlite3.DatabaseError:  # it is damaged: one can only join again
-        path.unlink()
-        return _open(path)
+    db.executescript(TABLES)
     return db
 
 

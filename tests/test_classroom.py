@@ -1,20 +1,35 @@
 """What a lesson tells a class, and what it does without one."""
 
+import contextlib
+import csv
+import json
 import socket
 
 import pytest
+from support.classes import LATER, OTHER, QUESTION, STEP, running_class, student
+from support.processes import running
 
 from helpers import checks, classroom, progress
 
-LESSON = '/home/student/notebooks/02_lose_messages.ipynb'
-VALUES = [41, 0.2, True, 'the way is free', 'ABC', {'C', 'D'}, [0, 1, 2], ('a', 1), {'A': 1}]
+VALUES = [41, 0.2, True, 'the way is free', {'D', 'C'}, [0, 1, 2], ('a', 1), {'A': 1}]
+GUESSES = """
+import time
+for value in range({}, {}):
+    guess({!r}, value)
+    time.sleep(0.01)
+"""
+BEGIN = 'import sys\nfrom helpers import checks, classroom\nfrom helpers.classroom import *\n'
+TOLD = [41, 0.2, True, 'the way is free', ['C', 'D'], [0, 1, 2], ['a', 1], {'A': 1}]
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """Keep progress here, in the kernel of a lesson."""
-    monkeypatch.setenv(progress.FILE_VARIABLE, str(tmp_path / 'progress.txt'))
-    monkeypatch.setenv('JPY_SESSION_NAME', LESSON)
+    for name, value in student(tmp_path).items():
+        if value is None:
+            monkeypatch.delenv(name, raising=False)
+        else:
+            monkeypatch.setenv(name, value)
     return tmp_path
 
 
@@ -24,6 +39,50 @@ def nobody():
     with socket.socket() as taken:  # bound, and not listening
         taken.bind(('127.0.0.1', 0))
         yield f'127.0.0.1:{taken.getsockname()[1]}'
+
+
+@pytest.fixture(scope='module')
+def one_class(tmp_path_factory):
+    with running_class(tmp_path_factory.mktemp('class')) as one:
+        one.go(1)
+        yield one
+
+
+@pytest.fixture
+def opened(one_class):
+    """Yield a class that was told nothing."""
+    one_class.do('forget')
+    return one_class
+
+
+@contextlib.contextmanager
+def kernel(folder, script, begin=BEGIN, **environment):
+    """Run a script as cells of a lesson; yield what it prints. The kernel lives in the block."""
+    end = '\nprint("END", flush=True)\nsys.stdin.read()'
+    with running(begin + script + end, **student(folder) | environment) as process:
+        lines = []
+        for line in process.stdout:
+            if line == 'END\n':
+                break
+            lines.append(line)
+        else:
+            pytest.fail(process.stderr.read())
+        yield ' '.join(''.join(lines).split())
+        process.communicate()
+
+
+def in_kernel(folder, script, **environment):
+    """Run a script in a kernel that ends then as at a restart, and return what it printed."""
+    with kernel(folder, script, **environment) as said:
+        pass
+    return said
+
+
+def join(opened, name=''):
+    return f'classroom.join_class({opened.address!r}, {opened.code!r}, {name!r})\n'
+
+
+# --- Without a class -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize('value', [*VALUES, None, ..., object(), float('nan'), 'x' * 9999])
@@ -61,13 +120,12 @@ def test_an_address_where_nobody_answers(folder, capsys, nobody):
     assert list(folder.iterdir()) == []
 
 
-def test_a_file_that_is_damaged_fails_no_lesson(folder, capsys):
-    folder.joinpath('ros2_notebooks_class.sqlite').write_text('This is no database. ' * 99)
-    assert classroom.guess('How many?', 41) == 41
-    checks.compare_prediction('How many?', 41, 41)
-    capsys.readouterr()
-    classroom.raise_hand()
-    assert capsys.readouterr().out == f'{classroom.NOT_JOINED}\n'
+def test_a_file_that_is_damaged_fails_no_lesson(tmp_path):
+    tmp_path.joinpath('ros2_notebooks_class.sqlite').write_text('This is no database. ' * 99)
+    said = in_kernel(tmp_path, GUESSES.format(0, 50, QUESTION) + 'leave_class()')
+    assert said.startswith('The class hears nothing, because ')
+    assert said.endswith(f'remove it, then join again. {classroom.NOT_JOINED}')
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_where_no_progress_is_kept_there_is_no_class(folder, capsys, monkeypatch, nobody):
@@ -75,3 +133,119 @@ def test_where_no_progress_is_kept_there_is_no_class(folder, capsys, monkeypatch
     classroom.join_class(nobody, 'blue-otter-lamp')
     assert classroom.guess('How many?', 41) == 41
     assert capsys.readouterr().out.startswith('There is no class here, because')
+
+
+# --- In a class ----------------------------------------------------------------------------------
+
+
+def test_all_kinds_of_guesses_are_told_and_no_other(opened, tmp_path):
+    others = '..., None, object(), "x" * 9999, [[[[1]]]], float("inf"), 2**99'
+    script = f"""
+for value in ({others}, *{VALUES!r}):
+    assert guess({OTHER!r}, value) is value
+guess({QUESTION!r}, 'the last one')
+"""
+    with kernel(tmp_path, join(opened) + script):
+        opened.wait_for(lambda view: view['guesses'][0]['answered'])
+    rows = list(csv.reader(opened.csv()))
+    assert [json.loads(row[-1]) for row in rows[1:-1]] == TOLD
+
+
+def test_what_a_student_does_reaches_the_page_and_nothing_else_does(opened, tmp_path):
+    script = f"""
+my_secret = guess({QUESTION!r}, 7)
+my_secret = guess({QUESTION!r}, 9)
+checks.compare_prediction({QUESTION!r}, my_secret, 14)
+checks.check('Exercise 1 of lesson 02', ('it is so', True, ''))
+checks.check('Exercise 1 of lesson 02', ('it is so', False, ''))
+checks.check('Solution of exercise 1', ('it is so', True, ''))
+raise_hand()
+"""
+    with kernel(tmp_path, join(opened, 'Ada') + script) as said:
+        view = opened.wait_for(lambda view: view['hands'])
+    assert f'You are in the class of {opened.address} on seat' in said
+    assert 'called Ada. Sent to it: your guesses' in said
+    assert 'Your hand is up.' in said
+    assert [hand['name'] for hand in view['hands']] == ['Ada']
+    [exercise] = view['exercises']
+    assert (exercise['solved'], exercise['tried']) == (1, 0)
+    assert opened.bars() == {'9': 1}
+    assert opened.view()['guesses'][0]['measured'] == ['14']
+    rows = [line.split(',')[5:] for line in opened.csv()[1:]]
+    assert rows == [
+        ['guess', QUESTION, '7'],
+        ['guess', QUESTION, '9'],
+        ['outcome', QUESTION, '14'],
+        ['exercise', '1', 'true'],
+        ['exercise', '1', 'false'],
+        ['hand', '', 'true'],
+    ]
+
+
+def test_the_next_notebook_is_in_the_class_until_the_student_leaves(opened, tmp_path):
+    in_kernel(tmp_path, join(opened))
+    elsewhere = {'JPY_SESSION_NAME': '/home/ada/notes.ipynb'}
+    in_kernel(tmp_path, f'guess({QUESTION!r}, 2)', **elsewhere)
+    with kernel(tmp_path, f'guess({QUESTION!r}, 1)'):
+        opened.wait_for(lambda view: view['guesses'][0]['answered'])
+    assert [line[-1] for line in opened.csv()[1:]] == ['1']
+    assert in_kernel(tmp_path, 'leave_class()').endswith('What you told it is deleted.')
+    in_kernel(tmp_path, f'guess({QUESTION!r}, 3)')
+    assert opened.csv()[1:] == []
+    assert in_kernel(tmp_path, 'leave_class()') == classroom.NOT_JOINED
+
+
+def test_the_steps_of_the_cells_that_run(opened, tmp_path):
+    script = f"""
+shell.run_cell('from helpers.classroom import *', cell_id={STEP!r})
+shell.run_cell('1', cell_id='my own')
+shell.run_cell('1', cell_id={LATER!r})
+"""
+    in_kernel(tmp_path, join(opened))
+    begin = 'import sys\nfrom IPython.core.interactiveshell import InteractiveShell\n'
+    begin += 'shell = InteractiveShell.instance()\n'
+    with kernel(tmp_path, script, begin=begin):
+        view = opened.wait_for(lambda view: any(step['here'] for step in view['steps']))
+    assert {step['title']: step['here'] for step in view['steps']}['2. Look'] == 1
+    assert len(opened.csv()) == 2
+
+
+def test_a_code_that_is_wrong(opened, tmp_path):
+    said = in_kernel(tmp_path, f'join_class({opened.address!r}, "blue-otter-lamp")')
+    assert said == 'This is not the code of the class. Compare it with the wall.'
+    loose = opened.code.replace('-', ' ').upper()
+    assert 'on seat' in in_kernel(tmp_path, f'join_class("http://{opened.address}/", {loose!r})')
+
+
+# --- When the class does not answer --------------------------------------------------------------
+
+
+def test_what_is_told_while_the_server_is_gone_is_counted_once(tmp_path):
+    """The server is killed in the middle; kernels end and begin; a clock is a year behind."""
+    behind = 'import time\nreal = time.time\ntime.time = lambda: real() - 3e7\n'
+    first, second, third = (GUESSES.format(n, n + 100, QUESTION) for n in (0, 100, 200))
+    ada = tmp_path / 'ada'
+    with running_class(tmp_path / 'class') as opened:
+        assert 'does not answer' not in in_kernel(ada, join(opened) + first)
+        begin = f'{behind}{BEGIN}print("open", flush=True)\n'
+        with running(begin + second, **student(ada)) as process:
+            assert process.stdout.readline() == 'open\n'
+            opened.kill()
+            process.communicate()
+        with kernel(ada, third) as said:
+            assert said == 'The class does not answer. What you tell is kept until it does.'
+            opened.start()
+            assert 'goes on' in opened.said
+            opened.go(1)
+            opened.wait_for(lambda view: opened.bars() == {'299': 1})
+        values = [int(line.rpartition(',')[2]) for line in opened.csv()[1:]]
+        assert values == list(range(300))
+
+        # The class is over. Who does not know it yet is told by the next one.
+        assert opened.stop().endswith('The class is over. What it was told is deleted.\n')
+        assert not list(tmp_path.glob('class/jupyter/class/*'))
+        opened.start()
+        said = in_kernel(ada, GUESSES.format(0, 100, QUESTION))
+        assert said == 'The class that you joined is over. To tell a new one, join it.'
+        assert opened.csv()[1:] == []
+    assert in_kernel(ada, 'raise_hand()') == classroom.NOT_JOINED

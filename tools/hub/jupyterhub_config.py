@@ -6,6 +6,8 @@ Everybody who has an account on this machine may log in, with its password.
 import sys
 from pathlib import Path
 
+from helpers.classroom import HUB_VARIABLE
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 STATE = ROOT / '.jupyter/hub'
 FIRST_PORT = 20000
@@ -43,3 +45,17 @@ def choose_port(spawner) -> None:
 
 
 c.Spawner.pre_spawn_hook = choose_port
+
+# The class that sees itself. The kernels of the students tell it; its page is for administrators.
+CLASS_URL = 'http://127.0.0.1:8764'
+c.JupyterHub.services = [
+    {
+        'name': 'class',
+        'url': CLASS_URL,
+        'command': [sys.executable, '-m', 'tools.hub.class_service'],
+        'cwd': str(ROOT),
+        'environment': {'CLASS_FOLDER': str(STATE)},
+        'oauth_no_confirm': True,
+    }
+]
+c.Spawner.environment = {HUB_VARIABLE: f'{CLASS_URL}/services/class'}

@@ -18,7 +18,9 @@ from functools import lru_cache
 from pathlib import Path
 
 import nbformat
-import psutil
+from jupyter_core.paths import jupyter_config_dir
+from jupyter_server.base.handlers import JupyterHandler
+from jupyter_server.utils import url_path_join
 from jupyterlab.commands import get_workspaces_dir
 from jupyterlab_server.workspaces_handler import WorkspacesManager
 from nbconvert.filters import markdown2html
@@ -26,9 +28,9 @@ from tornado import web
 from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
-from tools.lessons.lesson import first_heading, minutes_of_note
+from tools.addresses import in_networks
+from tools.lessons.notes import of_step
 from tools.lessons.present import FOLDER
-from tools.lessons.slides import heading
 
 HERE = Path(__file__).resolve().parent
 PORTS = range(8900, 8950)
@@ -58,28 +60,16 @@ def state(root: Path, deck: dict) -> dict:
     types = [cell.metadata.get('slideshow', {}).get('slide_type') for cell in cells]
     starts = [i for i, kind in enumerate(types) if kind in ('slide', 'subslide')]
     starts += [len(cells)] * 2  # the end of the last slide, and of the one after it, which is empty
-    steps = [i for i, cell in enumerate(cells) if heading(cell, '##? ')]
     slide = sum(start <= at for start in starts)
     on_slide = range(at + 1, starts[slide])
     on_slide = [cells[i] for i in on_slide if types[i] == 'fragment']
     following = [cells[i] for i in range(*starts[slide : slide + 2]) if types[i] != 'skip']
-    notes = [i for i, cell in enumerate(cells) if 'notes' in cell.metadata.get('tags', [])]
-    minutes = {i: minutes_of_note(cells[i].source) for i in notes}
-    step = max((i for i in steps if i <= at), default=0)
-    end = min((i for i in steps if i > at), default=len(cells))
-    before = [i for i in notes if i < end]
-    of_step = [i for i in before if i > step] or before[-1:]  # a note may be for two steps
     began = deck['began'].get(deck['current'])
-    return {
-        'lesson': first_heading(cells[0].source),
-        'step': first_heading(cells[step].source),
+    return of_step(cells, at) | {
         'slide': slide,
         'slides': len(starts) - 2,
-        'notes': ''.join(markdown2html(cells[i].source) for i in of_step),
         'next': 'On this slide' if on_slide else 'Next slide',
         'cells': ''.join(map(_html, on_slide or following)),
-        'planned': sum(minutes[i] for i in before),
-        'all': sum(minutes.values()),
         'gone': int(time.time() - began) // 60 if began else 0,
     }
 
@@ -120,6 +110,17 @@ class Window(web.RequestHandler):
             raise web.HTTPError(404)
 
 
+class PageOfClass(JupyterHandler):
+    """Tells the slides the address of the page of the class; nothing where `make class` is not."""
+
+    @web.authenticated
+    def get(self) -> None:
+        """Answer with the address."""
+        file = Path(jupyter_config_dir(), 'class', 'page')
+        self.set_header('Content-Type', 'text/plain')
+        self.finish(file.read_text() if file.is_file() else '')
+
+
 def serve(root: Path, address: str) -> tuple[int, str]:
     """Serve the window on an address of this machine; return the port and the secret."""
     secret = secrets.token_hex(6)
@@ -141,14 +142,11 @@ def _load_jupyter_server_extension(server) -> None:
     """
     tablet = os.environ.get('TABLET') == 'yes'
     port, secret = serve(Path(server.root_dir), '0.0.0.0' if tablet else '127.0.0.1')
-    addresses = [
-        one.address
-        for interface in psutil.net_if_addrs().values()
-        for one in interface
-        if one.family == socket.AF_INET and tablet and not one.address.startswith('127.')
-    ]
+    others = in_networks() if tablet else []
     page_config = server.web_app.settings.setdefault('page_config_data', {})
     page_config['notesWindow'] = f':{port}/{secret}/'  # for presenter.js
-    lines = [f'http://{address}:{port}/{secret}/' for address in ['localhost', *addresses]]
+    path = url_path_join(server.web_app.settings['base_url'], 'class')
+    server.web_app.add_handlers('.*', [(path, PageOfClass)])
+    lines = [f'http://{address}:{port}/{secret}/' for address in ['localhost', *others]]
     # After all that JupyterLab prints at its start.
     server.io_loop.add_callback(print, 'Your notes:', *lines, sep='\n    ', file=sys.stderr)

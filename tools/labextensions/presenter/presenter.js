@@ -1,6 +1,7 @@
 // What `make present` adds to jupyterlab-slideshow 0.3.4: editing stays editing, keys that change
 // the notebook do nothing, a clicker walks and steps through replays, and the deck stands where it
-// was after a reload. It also keeps that place for the instructor's window, tools/notes_window.
+// was after a reload. It also keeps that place for the instructor's window, tools/notes_window, and
+// shows the guesses of the class, tools/class_server, below the cell that asks for them.
 //
 // JupyterLab loads this file as it is. It has the form of a prebuilt extension, so that neither
 // webpack nor npm is needed.
@@ -36,7 +37,14 @@ function activate(app, manager) {
   void app.started.then(() => {
     const presenter = manager._presenters.find(one => one.id === 'notebooks');
     keepEditing(presenter);
-    keepPlace(presenter, app.serviceManager.workspaces);
+    keepPlace(presenter, app.serviceManager);
+    window.addEventListener('message', ({ source, data }) => {
+      const frame = document.getElementById('deck-guesses');
+      if (source !== frame?.contentWindow) return;
+      frame.style.height = `${Number(data)}px`;
+      // A click on "Show" took the focus: the keys of the deck want it back.
+      if (document.activeElement === frame) manager.activeWidget.content.activeCell.node.focus();
+    });
     // A replay takes its keys first. At its ends it lets the walking ones go on to the deck.
     const inReplay = event => event.target.closest?.('.replay-on');
     const walk = event => onKey(event, manager, presenter);
@@ -57,7 +65,7 @@ function keepEditing(presenter) {
   };
 }
 
-function keepPlace(presenter, workspaces) {
+function keepPlace(presenter, { workspaces, serverSettings }) {
   const start = presenter.start;
   const empty = { places: {}, began: {} }; // by the notebook's path; `began` in seconds
   const fetched = workspaces.fetch(STATE).then(({ data }) => ({ ...empty, ...data }), () => empty);
@@ -75,6 +83,7 @@ function keepPlace(presenter, workspaces) {
       else if (!(now - deck.began[path] < LESSON_S)) deck.began[path] = now;
       const state = { data: deck, metadata: { id: STATE } };
       saved = saved.then(() => workspaces.save(STATE, state)).catch(console.warn);
+      void showGuesses(notebook, serverSettings.baseUrl);
     };
     if (!known.has(panel)) {
       known.add(panel);
@@ -83,6 +92,21 @@ function keepPlace(presenter, workspaces) {
     }
     keep(panel.content);
   };
+}
+
+async function showGuesses(notebook, baseUrl) {
+  document.getElementById('deck-guesses')?.remove();
+  const cell = notebook.activeCell;
+  if (!cell?.model.getMetadata('tags')?.includes('predict')) return;
+  const page = await fetch(`${baseUrl}class`).then(answer => answer.text());
+  const reached = page && (await fetch(page, { mode: 'no-cors' }).catch(() => null));
+  if (!reached || notebook.activeCell !== cell) return;
+  const frame = document.createElement('iframe');
+  frame.id = 'deck-guesses';
+  frame.title = 'Guesses of the class';
+  frame.src = `${page}#cell=${cell.model.id}`;
+  document.getElementById('deck-guesses')?.remove(); // of a second call
+  cell.node.append(frame);
 }
 
 function onKey(event, manager, presenter) {

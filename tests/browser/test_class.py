@@ -1,0 +1,152 @@
+"""A class of three pages of JupyterLab, the instructor's page, and the slides with the guesses."""
+
+import os
+import re
+import signal
+import subprocess
+from contextlib import contextmanager
+
+import nbformat
+import pytest
+from lab_server import ROOT, server
+
+LESSON = '02_lose_messages.ipynb'
+NAMES = {'ada': 41, 'bob': 14, 'cyd': 14}
+CELLS = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4).cells
+[GUESS] = [i for i, cell in enumerate(CELLS) if 'my_guess = guess(' in cell.source]
+QUESTION = re.search(r"guess\('(.*)', ", CELLS[GUESS].source)[1]
+STARTED = re.compile(r"(join_class\('.*', '.*'\))[\s\S]*?(http://localhost:\d+/\w+/)[\s\S]*Ctrl\+C")
+
+
+@contextmanager
+def held_class(folder):
+    """Run `make class`; yield its process, the line for the wall and the address of the page."""
+    command = ['make', 'class', 'PORT=0', 'BROWSER=no', f'ROOT={folder}']
+    command += [f'JUPYTER_CONFIG_DIR={folder / "JUPYTER_CONFIG_DIR"}']
+    process = subprocess.Popen(
+        ['setpriv', '--pdeathsig', 'INT', *command],
+        cwd=ROOT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    said = ''
+    for line in process.stdout:
+        said += line
+        if found := STARTED.search(said):
+            break
+    else:
+        pytest.fail(said)
+    try:
+        yield process, *found.groups()
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGINT)
+        process.wait(60)
+
+
+def write_lesson_of(folder, name, join):
+    """Write a lesson whose first cell makes its kernel a student of its own, who joins."""
+    notebook = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4)
+    cells = [cell for cell in notebook.cells if cell is notebook.cells[GUESS]]
+    own = f'{folder / name / "progress.txt"}'
+    cells[0].source = f'my_guess = guess({QUESTION!r}, {NAMES[name]})'
+    sources = [
+        f"import os\nos.environ['ROS2_NOTEBOOKS_PROGRESS'] = {own!r}\n"
+        f'from helpers.classroom import *\nfrom helpers.checks import *\n{join}',
+        f'compare_prediction({QUESTION!r}, my_guess, 14)',
+        "check('Exercise 1 of lesson 02', ('it is so', True, ''))\nraise_hand()",
+    ]
+    made = [nbformat.v4.new_code_cell(source) for source in sources]
+    notebook.cells = [made[0], *cells, *made[1:]]
+    (folder / name).mkdir()
+    nbformat.write(notebook, folder / name / LESSON)
+
+
+def test_from_join_to_forget_everything(lab_page, tabs, student_server, artefacts):
+    folder = student_server.folder
+    with held_class(folder) as (process, join, address):
+        page = tabs.new_page()
+        asked = []
+        page.on('request', lambda request: asked.append(request.url))
+        page.goto(address)
+        page.on('dialog', lambda dialog: dialog.accept())
+        for number, name in enumerate(NAMES, 1):
+            write_lesson_of(folder, name, join)
+            with lab_page(student_server, f'class_{name}') as lab:
+                lab.goto(f'lab/tree/{name}/{LESSON}')
+                lab.wait_for_notebook(f'{name}/{LESSON}')
+                said = ' '.join(lab.run(0).split())
+                assert f'on seat {number}. Sent to it: your guesses' in said
+                assert lab.run(1) == ''
+                page.get_by_text(f'{number} of {number} have answered').wait_for()
+                if name != 'cyd':
+                    assert 'Verdict' in lab.run(2)
+                if name == 'ada':
+                    assert lab.run(3).endswith('Your hand is up. lower_hand() takes it down.\n')
+                    page.get_by_text('Seat 1').wait_for()
+        assert page.locator('#seats').inner_text() == '3'
+        assert page.locator('[aria-current] b').inner_text() == '3'
+        assert page.locator('#exercises td').first.inner_text() == '1'
+        assert page.locator('.bars').count() == 0
+        page.get_by_role('button', name='Show').first.click()
+        page.locator('.bars').wait_for()
+        rows = [row.split() for row in page.locator('.bars li').all_inner_texts()]
+        assert rows == [['✓', '14', '2'], ['41', '1']]
+        page.screenshot(path=artefacts / 'class_page.png')
+        page.get_by_text('For the wall').click()
+        page.locator('.wall').wait_for()
+        assert not page.locator('#notes').is_visible()
+        assert join in page.locator('#joins').inner_text()
+        page.screenshot(path=artefacts / 'class_wall.png')
+        page.go_back()
+        page.get_by_role('button', name='Done').click()
+        page.get_by_text('Seat 1').wait_for(state='detached')
+        with page.expect_download() as csv:
+            page.get_by_text('Save as CSV').click()
+        assert csv.value.path().read_text().count('\n') > 8
+        page.get_by_role('button', name='Forget everything').click()
+        page.get_by_text('0 of 3 have answered').first.wait_for()
+        assert page.locator('.bars').count() == 0
+        page.get_by_role('button', name='End the class').click()
+        page.get_by_text('The class is over.').wait_for()
+        assert process.wait(60) == 0
+        assert [url for url in asked if not url.startswith((address, 'data:'))] == []
+        page.close()
+
+
+def test_a_slide_with_a_guess_shows_how_many_have_answered_and_the_bars(
+    lab_page, tmp_path, artefacts
+):
+    with server(tmp_path, 'present', 'LESSON=02') as running, held_class(tmp_path) as (_, join, _):
+        address, code = re.search(r"'(.*)', '(.*)'", join).groups()
+        tell = f"""
+import os, time
+from helpers.classroom import *
+join_class({address!r}, {code!r})
+guess({QUESTION!r}, 14)
+time.sleep(2)
+"""
+        student = {
+            'ROS2_NOTEBOOKS_PROGRESS': str(tmp_path / 'progress.txt'),
+            'JPY_SESSION_NAME': LESSON,
+        }
+        python = ROOT / '.venv/bin/python'
+        subprocess.run([python, '-c', tell], env=os.environ | student, check=True, cwd=ROOT)
+        with lab_page(running, 'class_deck') as deck:
+            deck.present(LESSON)
+            while deck.active() < GUESS:
+                deck.press('Space')
+            frame = deck.page.frame_locator('#deck-guesses')
+            frame.get_by_text('1 of 1 have answered').wait_for()
+            deck.screenshot('class_deck_hidden')
+            frame.get_by_role('button', name='Show').click()
+            frame.locator('.bars').wait_for()
+            deck.page.wait_for_function(
+                "() => document.activeElement.id !== 'deck-guesses'"
+                " && document.querySelector('#deck-guesses').clientHeight > 100"
+            )
+            deck.screenshot('class_deck_shown')
+            assert deck.press('Space') > GUESS
+            assert deck.page.locator('#deck-guesses').count() == 0

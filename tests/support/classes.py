@@ -1,0 +1,202 @@
+"""A class that a test opens: the real server, its page as data, and students that are processes."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import json
+import multiprocessing
+import os
+import re
+import signal
+import sys
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from pathlib import Path
+
+import nbformat
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
+
+from helpers.classroom import HUB_VARIABLE
+from helpers.progress import FILE_VARIABLE
+from support.nodes import LIMIT_S
+from tools.class_server.__main__ import main
+
+LESSON = '02_lose_messages.ipynb'
+NAME = 'lose_messages'
+QUESTION = 'How many are heard?'
+OTHER = 'Which ones?'
+STEP, LATER = 'step-1', 'step-2'  # ids of cells
+FORK = multiprocessing.get_context('fork')
+OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+
+
+def write_lesson(root: Path) -> None:
+    """Write a lesson with two steps, two guesses and an exercise below `root`."""
+    cells = [
+        new_markdown_cell('# 02 Lose messages', id='title'),
+        new_markdown_cell('## 1. Count', id='heading'),
+        new_raw_cell(
+            'For the instructor: 4 minutes. Ask **before** the run.',
+            id='note',
+            metadata={'tags': ['notes']},
+        ),
+        new_code_cell(f'my_guess = guess({QUESTION!r}, 41)', id=STEP),
+        new_code_cell(f'%matplotlib inline\nmy_ones = guess({OTHER!r}, [1])', id='magic'),
+        new_markdown_cell('## 2. Look', id='heading-2'),
+        new_code_cell('1 + 1', id=LATER),
+        new_code_cell('this is no Python', id='broken'),
+        new_markdown_cell('### Exercise 1: Try', id='exercise'),
+    ]
+    (root / 'notebooks').mkdir(parents=True, exist_ok=True)
+    nbformat.write(new_notebook(cells=cells), root / 'notebooks' / LESSON)
+
+
+def event(kind: str = 'guess', number: int = 0, **what: object) -> dict:
+    """Return an event as a student's computer sends it."""
+    if kind == 'guess':
+        what = {'question': QUESTION, 'value': 41} | what
+    return {'id': f'{number:016x}', 'kind': kind, 'lesson': NAME} | what
+
+
+class RunningClass:
+    """A class in a process of its own, whose file is in `folder`."""
+
+    def __init__(self, folder: Path, *arguments: str) -> None:
+        self.folder = folder
+        self.port = 0
+        self._arguments = arguments
+        if not (folder / 'notebooks').is_dir():
+            write_lesson(folder)
+
+    def start(self) -> None:
+        """Start the server, and wait until it says how to join.
+
+        It is a fork of this process: a new Python would import for seconds.
+        """
+        reader, writer = os.pipe()
+        self._stdout = os.fdopen(reader)
+        arguments = ['--root', self.folder, '--port', self.port, '--no-browser', *self._arguments]
+        self.process = FORK.Process(
+            target=_hold, args=(writer, self.folder / 'jupyter', *map(str, arguments)), daemon=True
+        )
+        self.process.start()
+        os.close(writer)
+        self.said = ''
+        for line in self._stdout:
+            self.said += line
+            if line.startswith('Ctrl+C'):
+                break
+        else:
+            raise RuntimeError(f'The class did not start: {self.said}')
+        [self.address, self.code] = re.search(r"join_class\('(.*)', '(.*)'\)", self.said).groups()
+        self.page = re.search(r'http://localhost:(\d+)/\w+/', self.said)[0]
+        self.port = int(self.page.split(':')[2].split('/')[0])
+        self.url = f'http://127.0.0.1:{self.port}'
+
+    def kill(self) -> None:
+        """End the server as a crash does."""
+        self.process.kill()
+        self.wait()
+
+    def stop(self) -> str:
+        """End the class with Ctrl+C, and return what it said."""
+        os.kill(self.process.pid, signal.SIGINT)
+        return self.wait()
+
+    def wait(self) -> str:
+        """Wait for the end of the server, and return what it said."""
+        self.process.join(LIMIT_S)
+        with self._stdout:
+            return self._stdout.read()
+
+    # What a student's computer says
+
+    def post(self, path: str, body: object, token: str = '') -> tuple[int, dict]:
+        """Send a message, bytes or what becomes JSON, and return the answer."""
+        data = body if isinstance(body, bytes) else json.dumps(body).encode()
+        headers = {'Authorization': f'token {token}'}
+        request = urllib.request.Request(f'{self.url}/{path}', data, headers)
+        try:
+            with OPENER.open(request, timeout=LIMIT_S) as answer:
+                return answer.status, json.load(answer)
+        except urllib.error.HTTPError as refused:
+            return refused.code, json.load(refused)
+
+    def join(self, **what: str) -> str:
+        """Take a seat, and return its token."""
+        status, answer = self.post('join', {'code': self.code} | what)
+        assert status == 200, answer
+        return answer['token']
+
+    def tell(self, token: str, *events: dict) -> str:
+        """Tell events, and return why some were refused."""
+        status, answer = self.post('events', {'events': events}, token)
+        assert status == 200, answer
+        return answer['refused']
+
+    # What the instructor does and sees
+
+    def do(self, what: str, **body: object) -> int:
+        """Press a button of the page."""
+        return self.post(f'{self.page.rstrip("/").rpartition("/")[2]}/{what}', body)[0]
+
+    def go(self, step: int) -> None:
+        """Show a step of the lesson."""
+        assert self.do('go', lesson=NAME, step=step) == 200
+
+    def view(self) -> dict:
+        """Return what the page shows now."""
+        with OPENER.open(f'{self.page}live', timeout=LIMIT_S) as live:
+            return json.loads(live.readline().removeprefix(b'data: '))
+
+    def bars(self, question: str = QUESTION) -> dict[str, int]:
+        """Return the bars of a question after "show"."""
+        self.do('show', question=question)
+        [found] = [one for one in self.view()['guesses'] if one['question'] == question]
+        return {bar['label']: bar['count'] for bar in found['bars']}
+
+    def csv(self) -> list[str]:
+        """Return the lines of the CSV, the heading first."""
+        with OPENER.open(f'{self.page}class.csv', timeout=LIMIT_S) as answer:
+            return answer.read().decode().splitlines()
+
+    def wait_for(self, condition) -> dict:
+        """Wait until the page shows what fulfils a condition, and return it."""
+        end = time.monotonic() + LIMIT_S
+        while not condition(view := self.view()):
+            assert time.monotonic() < end, view
+            time.sleep(0.05)
+        return view
+
+
+def _hold(stdout: int, config: Path, *arguments: str) -> None:
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: it ends with the tests
+    os.environ['JUPYTER_CONFIG_DIR'] = str(config)
+    os.dup2(stdout, 1)
+    os.closerange(3, 4096)  # pipes to other processes, which would not see their ends
+    sys.stdout = os.fdopen(1, 'w', buffering=1)
+    sys.exit(main(arguments))
+
+
+@contextlib.contextmanager
+def running_class(folder: Path, *arguments: str) -> Iterator[RunningClass]:
+    """Hold a class for a block."""
+    opened = RunningClass(folder, *arguments)
+    opened.start()
+    try:
+        yield opened
+    finally:
+        opened.kill()
+
+
+def student(folder: Path, lesson: str = LESSON) -> dict[str, str | None]:
+    """Return the environment of the kernel of a student, who keeps progress in a folder."""
+    folder.mkdir(exist_ok=True)
+    return {
+        FILE_VARIABLE: str(folder / 'progress.txt'),
+        'JPY_SESSION_NAME': str(folder / lesson),
+        HUB_VARIABLE: None,
+    }

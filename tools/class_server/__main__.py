@@ -1,0 +1,101 @@
+"""Open a class, until Ctrl+C. After a crash, the next start goes on with it.
+
+python -m tools.class_server --lan --port 8765
+"""
+
+import argparse
+import asyncio
+import signal
+import socket
+import sys
+import webbrowser
+from contextlib import suppress
+from pathlib import Path
+
+from jupyter_core.paths import jupyter_config_dir
+from tornado.netutil import bind_sockets
+
+from tools.addresses import in_networks
+from tools.class_server.lessons import Known
+from tools.class_server.store import Class
+from tools.class_server.web import Room, application, follow_class, serve
+from tools.lessons.lesson import GLOSSARY, ROOT, lessons
+
+FILE = 'class.sqlite'
+PAGE = 'page'  # the file in which the server of `make present` finds the address of the page
+
+
+def known_lessons(root: Path = ROOT) -> list[Known]:
+    """Return what is known of the lessons below a folder."""
+    return [Known(one) for one in lessons(root / 'notebooks') if one.number != GLOSSARY]
+
+
+async def hold(store: Class, options: argparse.Namespace) -> None:
+    """Hold the class, until its end."""
+    over = asyncio.Event()
+    asyncio.get_running_loop().add_signal_handler(signal.SIGINT, over.set)
+    room = Room(store, stop=over.set)
+    address = '0.0.0.0' if options.lan else '127.0.0.1'
+    tls = options.ssl_cert and {'certfile': options.ssl_cert, 'keyfile': options.ssl_key}
+    sockets = bind_sockets(options.port, address, socket.AF_INET)
+    server = serve(application(room), sockets, tls or None)
+    port = sockets[0].getsockname()[1]
+    scheme = 'https' if tls else 'http'
+    page = f'{scheme}://localhost:{port}/{store.secret}/'
+    wall = [f'{"https://" if tls else ""}{one}:{port}' for one in in_networks()]
+    joins = [
+        f"join_class('{one}', '{store.code}')"
+        for one in (options.lan and wall or [f'{"https://" if tls else ""}127.0.0.1:{port}'])
+    ]
+    room.joins = joins
+    print('For the wall:', *joins, sep='\n    ')
+    print('Your page:', page, sep='\n    ')
+    if not options.lan:
+        print('Only this machine can join. LAN=yes lets the networks of this machine in.')
+    if store.went_on:
+        print('The class that was broken off goes on, with what it was told.')
+    print('Ctrl+C ends the class and deletes what it was told. Save the CSV before.', flush=True)
+    address_file = store.file.with_name(PAGE)
+    address_file.write_text(page)
+    if options.browser:
+        webbrowser.open(page)
+    following = asyncio.create_task(follow_class(room))
+    try:
+        await over.wait()
+    finally:
+        following.cancel()
+        address_file.unlink(missing_ok=True)
+        server.stop()
+        await server.close_all_connections()
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the tool; return its exit status."""
+    parser = argparse.ArgumentParser(prog='make class', description='Open a class.')
+    parser.add_argument('--lan', action='store_true', help='let the networks of this machine in')
+    parser.add_argument('--port', type=int, default=8765)
+    parser.add_argument('--root', type=Path, default=ROOT, help='of the lessons')
+    parser.add_argument('--no-browser', dest='browser', action='store_false')
+    parser.add_argument('--ssl-cert', help='a certificate, as that of the hub')
+    parser.add_argument('--ssl-key')
+    options = parser.parse_args(arguments)
+    store = Class(Path(jupyter_config_dir(), 'class', FILE), known_lessons(options.root))
+    try:
+        asyncio.run(hold(store, options))
+    except OSError as error:
+        store.close()
+        print(
+            f'Port {options.port} cannot be used ({error.strerror}). Is another class open? ',
+            end='',
+            file=sys.stderr,
+        )
+        print(f'Name another one: make class PORT={options.port + 1}', file=sys.stderr)
+        return 1
+    store.end()
+    print('The class is over. What it was told is deleted.')
+    return 0
+
+
+if __name__ == '__main__':
+    with suppress(KeyboardInterrupt):  # before the class was open
+        sys.exit(main())

@@ -1,0 +1,25 @@
+"""What the instructor's notes of a lesson say: of a step, and how many minutes they plan."""
+
+from nbconvert.filters import markdown2html
+from nbformat import NotebookNode
+
+from tools.lessons.lesson import first_heading, minutes_of_note
+from tools.lessons.slides import heading
+
+
+def of_step(cells: list[NotebookNode], at: int) -> dict:
+    """Return the notes of the step of cell `at`, and the minutes planned to its end and in all."""
+    steps = [i for i, cell in enumerate(cells) if heading(cell, '##? ')]
+    notes = [i for i, cell in enumerate(cells) if 'notes' in cell.metadata.get('tags', [])]
+    minutes = {i: minutes_of_note(cells[i].source) for i in notes}
+    step = max((i for i in steps if i <= at), default=0)
+    end = min((i for i in steps if i > at), default=len(cells))
+    before = [i for i in notes if i < end]
+    for_it = [i for i in before if i > step] or before[-1:]  # a note may be for two steps
+    return {
+        'lesson': first_heading(cells[0].source),
+        'step': first_heading(cells[step].source),
+        'notes': ''.join(markdown2html(cells[i].source) for i in for_it),
+        'planned': sum(minutes[i] for i in before),
+        'all': sum(minutes.values()),
+    }
