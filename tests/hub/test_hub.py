@@ -6,6 +6,7 @@ to the kernels over their websockets.
 
 import asyncio
 import contextlib
+import csv
 import json
 import os
 import re
@@ -32,6 +33,9 @@ from nbval.plugin import IPyNbFile, NbCellError
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
 
+from tools.class_server.lessons import Known
+from tools.lessons.lesson import read
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 CLAIMS = {  # of the lessons that the students run, by the lesson's name
     'lose_messages': 'All is as a KEEP_LAST queue must do it: True',
@@ -56,12 +60,17 @@ c.ConfigurableHTTPProxy.api_url = 'http://127.0.0.1:{proxy_port}'
 c.ConfigurableHTTPProxy.pid_file = str(folder / 'proxy.pid')
 c.JupyterHub.db_url = f'sqlite:///{{folder}}/hub.sqlite'
 c.JupyterHub.cookie_secret_file = str(folder / 'cookie_secret')
-c.JupyterHub.services = [dict(name='test', api_token={token!r})]
+c.Authenticator.admin_users = {{'teacher'}}
+c.JupyterHub.services[0]['url'] = 'http://127.0.0.1:{class_port}'
+c.JupyterHub.services[0]['environment']['CLASS_FOLDER'] = str(folder)
+c.JupyterHub.services.append(dict(name='test', api_token={token!r}))
 c.JupyterHub.load_roles = [
     dict(name='test', services=['test'], scopes=['admin:users', 'admin:servers', 'tokens'])
 ]
 c.Spawner.args.append('--allow-root')
-c.Spawner.environment = dict(TMPDIR=str(folder))
+c.Spawner.environment = dict(
+    TMPDIR=str(folder), ROS2_NOTEBOOKS_CLASS='http://127.0.0.1:{class_port}/services/class'
+)
 """
 
 
@@ -83,7 +92,7 @@ class Hub:
         self.folder = folder
         self.log = folder / 'hub.log'
         self.token = secrets.token_hex(16)
-        port, hub_port, proxy_port = free_ports(3)
+        port, hub_port, proxy_port, class_port = free_ports(4)
         self.url = f'http://127.0.0.1:{port}'
         config = folder / 'config.py'
         config.write_text(
@@ -92,6 +101,7 @@ class Hub:
                 folder=str(folder),
                 hub_port=hub_port,
                 proxy_port=proxy_port,
+                class_port=class_port,
                 token=self.token,
             )
         )
@@ -119,6 +129,21 @@ class Hub:
             )
         )
         return json.loads(answer.body) if answer.body else None
+
+    async def text(self, path: str, token: str) -> str:
+        headers = {'Authorization': f'token {token}'}
+        answer = await AsyncHTTPClient().fetch(
+            self.url + path, headers=headers, follow_redirects=False
+        )
+        return answer.body.decode()
+
+    async def status(self, path: str, token: str) -> int:
+        """Return the status with which something is refused; 200 where it is not."""
+        try:
+            await self.text(path, token)
+        except HTTPClientError as refused:
+            return refused.code
+        return 200
 
     async def until_ready(self) -> None:
         async with asyncio.timeout(START_S):
@@ -311,6 +336,8 @@ class ClassHour:
     segments: set[str] = field(default_factory=set)
     segments_left: set[str] = field(default_factory=set)
     late: list[str] = field(default_factory=list)
+    told: list[list[str]] = field(default_factory=list)
+    refused: list[int] = field(default_factory=list)
     processes_left: list[str] = field(default_factory=list)
 
 
@@ -432,6 +459,15 @@ async def one_too_many(hub: Hub) -> list[str]:
     return said
 
 
+async def told_to_the_class(hub: Hub) -> list[list[str]]:
+    """Return the rows of the CSV that an administrator gets from the page of the class."""
+    with contextlib.suppress(HTTPClientError):  # 409: there is one from the configuration
+        await hub.ask('/hub/api/users/teacher', 'POST')
+    teacher = (await hub.ask('/hub/api/users/teacher/tokens', 'POST', {}))['token']
+    text = await hub.text('/services/class/class.csv', teacher)
+    return list(csv.reader(text.splitlines()))
+
+
 async def teach(hub: Hub) -> ClassHour:
     hour = ClassHour()
     students = [Student(hub, name) for name in STUDENTS]
@@ -449,6 +485,11 @@ async def teach(hub: Hub) -> ClassHour:
     hour.lessons_s = time.monotonic() - start
     for student in students:
         hour.strangers += (await student.kernels[LESSONS[0].name].text(STRANGERS)).split()
+
+    hour.told = await told_to_the_class(hub)
+    for token in (students[0].token, 'no token'):
+        for path in ('', 'live', 'class.csv'):
+            hour.refused.append(await hub.status(f'/services/class/{path}', token))
 
     hour.memory_mb = {student.name: student.memory_mb() for student in students}
     await everybody_talks(students, hour)
@@ -545,6 +586,24 @@ def test_every_student_sees_what_is_saved(hour, request):
         f'\n{len(STUDENTS)} students: logged in after {hour.log_in_s:.0f} s, two lessons each in '
         f'{hour.lessons_s:.0f} s, the longest cell {longest:.0f} s'
     )
+
+
+def test_every_student_is_in_the_class_and_only_administrators_see_it(hour):
+    asked = {
+        (known.lesson.name, question)
+        for path in LESSONS
+        for known in [Known(read(path.read_text(), path.name))]
+        for question in known.guesses
+    }
+    told = {}
+    for _, _, seat, name, lesson, kind, what, _ in hour.told[1:]:
+        assert name == '""'
+        told.setdefault(seat, set())
+        if kind == 'guess':
+            told[seat].add((lesson, what))
+    assert len(told) == len(STUDENTS)
+    assert all(guessed == asked for guessed in told.values())
+    assert set(hour.refused) <= {302, 403}
 
 
 def test_a_difference_would_be_seen(hour, request):

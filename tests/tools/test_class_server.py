@@ -12,7 +12,7 @@ import urllib.error
 import urllib.request
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.classes import (
     LATER,
@@ -249,6 +249,7 @@ def test_attacks_on_the_form_of_an_event(store):
     assert store.view(NAME, 1)['guesses'][0]['answered'] == 0
 
 
+@settings(max_examples=50)  # dear ones: of any form, as deep as they come
 @given(messages=st.lists(JSON | st.fixed_dictionaries({}, optional=dict.fromkeys(FIELDS, JSON))))
 def test_what_has_another_form_is_refused_with_a_sentence(one_class_store, messages):
     if messages:

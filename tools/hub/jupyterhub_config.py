@@ -56,6 +56,7 @@ c.JupyterHub.services = [
         'cwd': str(ROOT),
         'environment': {'CLASS_FOLDER': str(STATE)},
         'oauth_no_confirm': True,
+        'timeout': 180,  # the hub ends where a service takes longer to start
     }
 ]
 c.Spawner.environment = {HUB_VARIABLE: f'{CLASS_URL}/services/class'}
