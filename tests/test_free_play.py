@@ -1,0 +1,48 @@
+"""Free play: its predictions, in a JavaScript engine, are those of `predict`."""
+
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from support.javascript import Script
+
+from helpers.queue_model import predict
+from helpers.replay.free import FreePlay
+
+numbers = st.tuples(
+    st.integers(1, 50),  # hundredths of a second, as the sliders have them
+    st.integers(1, 100),
+    st.integers(1, 41),
+    st.integers(1, 10),
+    st.booleans(),
+)
+
+
+@pytest.fixture(scope='module')
+def script():
+    return Script('free.js', '')
+
+
+@settings(max_examples=100)
+@given(numbers)
+@example((5, 20, 10, 1, True))
+@example((5, 20, 10, 4, False))
+def test_what_is_drawn_is_the_prediction(script, drawn):
+    period, callback, depth, threads, exclusive = drawn
+    given_ = {'period': period / 100, 'callback': callback / 100, 'depth': depth}
+    given_ |= {'threads': threads}
+    messages = script.call('predicted', given_ | {'exclusive': exclusive})
+    table = predict(period / 100, callback / 100, depth, 1 if exclusive else threads, 41)
+    started = [one.get('started') for one in messages]
+    assert [at is None for at in started] == table['started_s'].isna().tolist()
+    assert [at for at in started if at is not None] == pytest.approx(
+        table['started_s'].dropna().tolist()
+    )
+    assert [one.get('lost') is None for one in messages] == table['started_s'].notna().tolist()
+    heard = table['started_s'].notna().sum()
+    assert script.call('told', messages).startswith(f'{heard} of 41 messages are heard.')
+
+
+def test_the_page():
+    page = FreePlay()._repr_mimebundle_()
+    assert page['text/plain'] == str(FreePlay())
+    assert len(page['text/html']) <= 30_000
