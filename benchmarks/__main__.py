@@ -20,6 +20,7 @@ from typing import NamedTuple
 import pandas as pd
 import psutil
 
+from benchmarks.classroom import class_of_40
 from benchmarks.latency import KINDS, RATES_HZ, latency_s
 from helpers.queue_model import explain, predict
 
@@ -113,7 +114,18 @@ def checks() -> Iterable[Row]:
     return [Row(whole, all_s, alone, notebooks_s)]
 
 
-BENCHMARKS = {b.__name__: b for b in (latency, model, checks)}
+def classroom() -> Iterable[Row]:
+    """Lesson 02 in twelve kernels of a class of 40, against the same without a class."""
+    inside, without, delays = class_of_40()
+    ratios = [one / other for one, other in zip(inside, without, strict=True)]
+    return [
+        Row('a cell of lesson 02 in a class of 40', inside, 'in no class', without),
+        Row('the same, each cell against itself', ratios, 'in no class', [1.0]),
+        Row('from a hand to the page', delays, 'wanted', [1.0]),
+    ]
+
+
+BENCHMARKS = {b.__name__: b for b in (latency, model, checks, classroom)}
 
 
 # --- The tool ------------------------------------------------------------------------------------

@@ -102,9 +102,9 @@ def leave_class() -> None:
             known = _class(db)
             db.execute('DELETE FROM waiting')
             db.execute('DELETE FROM class')
-            if HUB_VARIABLE in os.environ:
+            if os.environ.get(HUB_VARIABLE):
                 db.execute("INSERT INTO class VALUES ('', '', 0)")
-        if HUB_VARIABLE not in os.environ:
+        if not os.environ.get(HUB_VARIABLE):
             path.unlink()
     if known:
         try:
@@ -213,7 +213,7 @@ class _Outbox:
             except ValueError as refused:  # the class does not know this seat any more
                 with db:
                     db.execute('DELETE FROM waiting')
-                    if HUB_VARIABLE not in os.environ:
+                    if not os.environ.get(HUB_VARIABLE):
                         db.execute('DELETE FROM class WHERE token = ?', [known.token])
                 self._trouble = str(refused)
                 return False
@@ -335,7 +335,7 @@ def _file() -> Path | None:
 def _file_of_class() -> Path | None:
     """Return the file if there may be a class: who has joined none has no file."""
     path = _file()
-    return path if path and (path.exists() or HUB_VARIABLE in os.environ) else None
+    return path if path and (path.exists() or os.environ.get(HUB_VARIABLE)) else None
 
 
 def _lesson() -> str:

@@ -1,5 +1,6 @@
 """The class: what its server takes, what it refuses, and what its page says."""
 
+import contextlib
 import csv
 import json
 import re
@@ -23,9 +24,12 @@ from support.classes import (
     RunningClass,
     event,
     running_class,
+    student,
     write_lesson,
 )
+from support.machines import ADDRESSES, LIMIT_S, ended, two_machines
 
+from helpers.classroom import HUB_VARIABLE
 from tools.class_server.lessons import Known
 from tools.class_server.store import EVENTS_OF_SEAT, SEATS, WORDS, Class, bars
 from tools.class_server.web import EVENTS_AT_ONCE, WRONG_A_MINUTE
@@ -426,3 +430,59 @@ def test_forgetting_leaves_nothing_in_the_file(store):
         assert b'Lovelace' not in path.read_bytes(), path
         assert b'what was said' not in path.read_bytes(), path
     assert store.take(seat, [event(number=1)]) == ''
+
+
+# --- A network that is cut -----------------------------------------------------------------------
+
+HELD = """
+import sys
+from tools.class_server.__main__ import main
+main(['--lan', '--no-browser', '--port', '8765', '--root', sys.argv[1]])
+"""
+TELLS = """
+import sys, time
+from helpers.classroom import *
+join_class(*sys.argv[1:3])
+for value in range(60):
+    guess(sys.argv[3], value)
+    print(value, flush=True)
+    time.sleep(0.25)
+sys.stdin.read()
+"""
+READS = """
+import sys, urllib.request
+print(urllib.request.urlopen(sys.argv[1] + 'class.csv').read().decode().strip())
+"""
+
+
+def test_what_is_told_while_the_network_is_cut_arrives_once(tmp_path):
+    """Nothing says that the network is cut: packets are lost, as in a room without reception."""
+    write_lesson(tmp_path)
+    with two_machines() as (one, two), contextlib.ExitStack() as stack:
+        held = one.start(HELD, tmp_path, JUPYTER_CONFIG_DIR=str(tmp_path / 'jupyter'))
+        stack.enter_context(ended(held))
+        said = ''
+        while 'Ctrl+C' not in said:
+            said += held.stdout.readline()
+        address, code = re.search(rf"join_class\('({ADDRESSES[0]}:8765)', '(.*)'\)", said).groups()
+        page = re.search(r'http://localhost:8765/\w+/', said)[0]
+        kernel = student(tmp_path / 'ada') | {HUB_VARIABLE: ''}
+        ada = two.start(TELLS, address, code, QUESTION, **kernel)
+        stack.enter_context(ended(ada))
+        printed = [ada.stdout.readline()]
+        while printed[-1] != '5\n':
+            printed.append(ada.stdout.readline())
+        with one.firewall('drop', 'tcp dport 1 accept'):
+            while printed[-1] != '55\n':  # it takes longer than a message waits for its answer
+                printed.append(ada.stdout.readline())
+        assert 'The class does not answer. What you tell is kept until it does.\n' in printed
+        end = time.monotonic() + LIMIT_S
+        while (rows := list(csv.reader(read_in(one, page))))[-1][-1] != '59':
+            assert time.monotonic() < end, rows
+            time.sleep(0.5)
+    assert [int(row[-1]) for row in rows[1:]] == list(range(60))
+
+
+def read_in(machine, page):
+    reader = machine.start(READS, page)
+    return reader.communicate(timeout=LIMIT_S)[0].splitlines()
