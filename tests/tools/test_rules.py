@@ -161,7 +161,7 @@ ADDED = [
     ('tagged', note('Ask first.')),
     ('tagged', new_markdown_cell('For the instructor: ask', metadata=note('').metadata)),
     ('fits_a_slide', code('\n'.join(['run()'] * (rules.MAX_CODE_LINES + 1)))),
-    ('fits_a_slide', code('%%write a\n' + 'run()\n' * rules.MAX_FILE_LINES)),
+    ('fits_a_slide', code('%%write a\n' + 'run()\n' * rules.MAX_CODE_LINES)),
     ('fits_a_slide', new_markdown_cell('word ' * (rules.MAX_WORDS + 1))),
     ('fits_a_slide', printed('line\n' * 40)),
     ('links_lead_somewhere', new_markdown_cell('[there](nowhere.ipynb)')),
@@ -188,7 +188,7 @@ def test_every_rule_is_broken_once():
     'cell',
     [
         code('# NBVAL_IGNORE_OUTPUT\n# Not compared: times.\nrun()'),
-        code('%%write a\n' + 'run()\n' * rules.MAX_CODE_LINES),
+        code('run()\n' * rules.MAX_CODE_LINES),
         printed('/dev/shm is empty; the topic /worker, 1/tmp, and/or\n'),
         printed('    python3/site-packages/my_pkg/\n'),
         shown(text_plain='<t>', text_html='t'),

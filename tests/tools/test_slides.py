@@ -99,7 +99,7 @@ def test_what_makes_a_cell_high():
     assert height(code(1, outputs=table(9))) > height(code(1, outputs=table(3)))
     assert height(code(1, outputs=picture(900, 400))) > height(code(1, outputs=picture(900, 200)))
     assert height(code(1, outputs=picture(900, 9000))) < SLIDE
-    assert height(code(36)) < SLIDE
+    assert height(code(24, outputs=printed(3))) < SLIDE
     assert height(text('word ' * 180)) < SLIDE
     assert height(text('| a | b |\n|---|---|\n' + '| 1 | 2 |\n' * 9)) > height(text('a b ' * 9))
     assert height(text('- a\n- b\n- c')) > height(text('a\nb\nc'))

@@ -19,8 +19,7 @@ from helpers.progress import title_of
 from tools.lessons.lesson import FOLDED, FOLDER, GLOSSARY, LANGUAGES, NOTE, Lesson
 from tools.lessons.slides import PICTURE, SKIPPED, SLIDE, height
 
-MAX_CODE_LINES = 25
-MAX_FILE_LINES = 36  # of a cell that writes a file, which cannot be cut in two
+MAX_CODE_LINES = 24  # what a slide has room for
 MAX_WORDS = 180
 LEAST_WORDS = 6  # of an alternative text
 QUESTIONS = 3  # in each lesson's quiz
@@ -217,9 +216,11 @@ def tagged(lesson: Lesson) -> Iterator[str]:
 def fits_a_slide(lesson: Lesson) -> Iterator[str]:
     for index, cell in enumerate(lesson.notebook.cells, 1):
         lines = len(cell.source.splitlines())
-        most = MAX_FILE_LINES if cell.source.startswith('%%write ') else MAX_CODE_LINES
-        if cell.cell_type == 'code' and lines > most:
-            yield f'Cell {index} has {lines} lines of code, more than {most}.'
+        if cell.cell_type == 'code' and lines > MAX_CODE_LINES:
+            yield (
+                f'Cell {index} has {lines} lines of code, more than {MAX_CODE_LINES}: make two '
+                'cells of it. A file can stand in two: `%%write PATH part 1`, then `part 2`.'
+            )
         # Of a text in several languages, which a reader unfolds one by one, the longest counts.
         parts = re.split(r'<details[^>]*>', cell.source)
         words = max(len(re.sub(r'<[^>]+>|\|', ' ', part).split()) for part in parts)

@@ -36,9 +36,8 @@ TABLE_ROW, TABLE_CHARACTERS = 4.6, 120
 UNFOLDED = re.compile(r'<summary>(.*?)</summary>.*?</details>', re.DOTALL)
 LISTING = re.compile(r'^```.*?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 MARKUP = re.compile(r'<[^>]+>|\]\([^)]*\)|[*`\[]')
-# Lines of code at most: the size of a letter, the height of a figure.
-CODE = {8: (2.78, 62.0), 18: (2.78, 38.0), 24: (2.78, 28.0), 999: (2.1, 28.0)}
-DENSE = 2.1  # the size of a letter in a cell of more than 18 lines with a figure
+CODE = {8: 62.0, 18: 38.0, 999: 28.0}  # lines of code at most: the height of a figure
+LETTER = 2.78  # of code
 CODE_LINE, CODE_CHARACTER = 1.2, 0.61  # times the size of a letter
 REPLAY = 80.0  # one row of threads, and the picture that it makes smaller; a level is no higher
 PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
@@ -98,14 +97,12 @@ def height(cell: NotebookNode) -> float:
         listings = LISTING.findall(source)
         prose = re.split(r'\n{2,}', LISTING.sub('', source).strip())
         return sum(map(_height_of_prose, prose)) + sum(
-            PROSE_GAP + _height_of_text(listing, CODE[8][0]) for listing in listings
+            PROSE_GAP + _height_of_text(listing) for listing in listings
         )
     lines = len(cell.source.splitlines())
-    letter, figure = next(sizes for most, sizes in CODE.items() if lines <= most)
-    if lines > 18 and any(map(png_of, cell.outputs)):
-        letter = DENSE
-    source = FOLDED if folded(cell) else _height_of_text(cell.source, letter)
-    outputs = sum(_height_of_output(output, letter, figure) for output in cell.outputs)
+    figure = next(tall for most, tall in CODE.items() if lines <= most)
+    source = FOLDED if folded(cell) else _height_of_text(cell.source)
+    outputs = sum(_height_of_output(output, figure) for output in cell.outputs)
     return BORDER + source + outputs + (BORDER if cell.outputs else 0)
 
 
@@ -143,7 +140,7 @@ def png_of(output: NotebookNode) -> bytes | None:
     return b64decode(found[1]) if found else None
 
 
-def _height_of_output(output: NotebookNode, letter: float, figure: float) -> float:
+def _height_of_output(output: NotebookNode, figure: float) -> float:
     data = output.get('data', {})
     if png := png_of(output):
         width, tall = (int.from_bytes(png[i : i + 4], 'big') for i in (16, 20))
@@ -152,10 +149,10 @@ def _height_of_output(output: NotebookNode, letter: float, figure: float) -> flo
         return REPLAY
     if 'text/html' in data:
         return data['text/html'].count('<tr') * TABLE_ROW
-    return _height_of_text(output.get('text', '') or data.get('text/plain', ''), letter)
+    return _height_of_text(output.get('text', '') or data.get('text/plain', ''))
 
 
-def _height_of_text(text: str, letter: float) -> float:
-    most = int(WIDTH / letter / CODE_CHARACTER)
+def _height_of_text(text: str) -> float:
+    most = int(WIDTH / LETTER / CODE_CHARACTER)
     lines = sum(max(1, ceil(len(line) / most)) for line in text.splitlines())
-    return lines * letter * CODE_LINE
+    return lines * LETTER * CODE_LINE
