@@ -32,6 +32,8 @@ from typing import NamedTuple
 from helpers import progress
 from helpers.text import wrap
 
+__all__ = ['guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand']
+
 HUB_VARIABLE = 'ROS2_NOTEBOOKS_CLASS'  # on a JupyterHub: the address of its class
 JOINED_FOR_S = 12 * 3600  # a class that was not left is forgotten, so that nothing is sent at home
 ADDRESS = re.compile(r'(https?://)?[\w.-]+(:\d+)?(/[\w./-]*)?')

@@ -47,8 +47,8 @@ async def hold(store: Class, options: argparse.Namespace) -> None:
         f"join_class('{one}', '{store.code}')"
         for one in (options.lan and wall or [f'{"https://" if tls else ""}127.0.0.1:{port}'])
     ]
-    room.joins = joins
-    print('For the wall:', *joins, sep='\n    ')
+    room.joins = ['from helpers.classroom import *', *joins]
+    print('For the wall:', *room.joins, sep='\n    ')
     print('Your page:', page, sep='\n    ')
     if not options.lan:
         print('Only this machine can join. LAN=yes lets the networks of this machine in.')
