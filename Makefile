@@ -34,9 +34,9 @@ image: ## a container image of the lessons, with podman or docker: BASE=, CONTAI
 lab-container: ## the lessons in a container of that image, your notebooks in my_lessons/: PORT=8890, LESSONS=FOLDER
 	@tools/container/run.sh lab
 
-hub: ## a JupyterHub for a class on this machine; HUB_ARGS=... changes how. See teaching.md
+hub: ## a JupyterHub for a class on this machine; CONTAINERS=yes, HUB_ARGS=... change how. See teaching.md
 	@tools/hub/set_up.sh
-	@exec .venv/bin/jupyterhub --config tools/hub/jupyterhub_config.py $(HUB_ARGS)
+	@$(if $(filter yes,$(CONTAINERS)),DOCKER_HOST=$$(.venv/bin/python tools/hub/service.py) && export DOCKER_HOST &&) exec .venv/bin/jupyterhub --config tools/hub/jupyterhub_config.py $(HUB_ARGS)
 
 test-hub: ## a class of 12 on a JupyterHub, who run lessons 02 and 03 at the same time; it takes minutes
 	@tools/hub/set_up.sh

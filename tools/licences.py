@@ -18,6 +18,7 @@ LOCKS = sorted(ROOT.glob('requirements*.lock'))
 # What these say in a text or in their source only.
 STATED = {
     'empy': 'LGPL',
+    'jupyterhub-idle-culler': 'BSD-3-Clause',
     'quickjs-ng': 'MIT',
     'ros-fastcdr': 'Apache-2.0',
     'ros-fastrtps': 'Apache-2.0',

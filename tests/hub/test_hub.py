@@ -64,9 +64,9 @@ c.Authenticator.admin_users = {{'teacher'}}
 c.JupyterHub.services[0]['url'] = 'http://127.0.0.1:{class_port}'
 c.JupyterHub.services[0]['environment']['CLASS_FOLDER'] = str(folder)
 c.JupyterHub.services.append(dict(name='test', api_token={token!r}))
-c.JupyterHub.load_roles = [
+c.JupyterHub.load_roles.append(
     dict(name='test', services=['test'], scopes=['admin:users', 'admin:servers', 'tokens'])
-]
+)
 c.Spawner.args.append('--allow-root')
 c.Spawner.environment = dict(
     TMPDIR=str(folder), ROS2_NOTEBOOKS_CLASS='http://127.0.0.1:{class_port}/services/class'

@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -109,3 +110,19 @@ def test_the_lessons_and_the_port_of_a_run(run, tmp_path):
     assert f'--volume {tmp_path / "lessons"}:/home/student' in said
     assert '--user 0:' not in said
     assert os.path.isdir(tmp_path / 'lessons')
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason='a class in containers needs root')
+def test_a_class_without_a_service():
+    pytest.importorskip('docker', reason='`make test-hub` installs it')
+    done = subprocess.run(
+        [sys.executable, ROOT / 'tools/hub/service.py'],
+        env=os.environ | {'DOCKER_HOST': 'unix:///nowhere'},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (
+        1,
+        '',
+        'unix:///nowhere does not answer: start podman.socket or docker, then try again.\n',
+    )

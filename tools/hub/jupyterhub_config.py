@@ -1,8 +1,11 @@
 """JupyterHub for a class on one machine, started by `make hub`. teaching.md says how to use it.
 
-Everybody who has an account on this machine may log in, with its password.
+Everybody who has an account on this machine may log in, with its password. With CONTAINERS=yes each
+student's server runs in a container of the image of `make image`, with limits of its own.
 """
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -60,3 +63,87 @@ c.JupyterHub.services = [
     }
 ]
 c.Spawner.environment = {HUB_VARIABLE: f'{CLASS_URL}/services/class'}
+
+# --- A server that nobody has used for an hour is ended ------------------------------------------
+
+c.JupyterHub.services.append(
+    {
+        'name': 'idle-culler',
+        'command': [sys.executable, '-m', 'jupyterhub_idle_culler', '--timeout=3600'],
+    }
+)
+c.JupyterHub.load_roles.append(
+    {
+        'name': 'idle-culler',
+        'services': ['idle-culler'],
+        'scopes': ['list:users', 'read:users:activity', 'read:servers', 'delete:servers'],
+    }
+)
+
+# --- Each student in a container -----------------------------------------------------------------
+
+IMAGE = 'localhost/ros2_notebooks'
+HUB_PORT = 8081
+STUDENT = 1000  # the user of the image
+DISK = '4G'  # what a student may fill
+
+
+def prepare_container(spawner) -> None:
+    """Give a student a disk of their own, which cannot fill the machine's, and a network."""
+    import docker
+
+    spawner.port = 8888
+    name = spawner.escaped_name
+    home, disk = STATE / 'homes' / name, STATE / 'disks' / name
+    if not disk.exists():
+        disk.parent.mkdir(exist_ok=True)
+        new = disk.with_suffix('.new')
+        subprocess.run(['truncate', f'--size={DISK}', new], check=True)
+        owner = f'root_owner={STUDENT}:{STUDENT}'
+        subprocess.run(['mkfs.ext4', '-q', '-F', '-m', '0', '-E', owner, new], check=True)
+        new.rename(disk)
+    home.mkdir(parents=True, exist_ok=True)
+    if not home.is_mount():
+        subprocess.run(['mount', '-o', 'loop,nosuid,nodev', disk, home], check=True)
+    spawner.volumes = {str(home): '/home/student'}
+
+    networks = docker.from_env().networks
+    spawner.network_name = f'ros2-{name}'
+    found = [one for one in networks.list() if one.name == spawner.network_name]
+    network = found[0] if found else networks.create(spawner.network_name, driver='bridge')
+    network.reload()
+    gateway = network.attrs['IPAM']['Config'][0]['Gateway']
+    spawner.hub_connect_url = f'http://{gateway}:{HUB_PORT}'
+
+
+if os.environ.get('CONTAINERS') == 'yes':
+    from docker.types import Ulimit
+
+    # From their own networks students reach the hub, which asks for their token.
+    c.JupyterHub.hub_bind_url = f'http://0.0.0.0:{HUB_PORT}'
+    c.JupyterHub.spawner_class = 'dockerspawner.DockerSpawner'
+    c.Spawner.pre_spawn_hook = prepare_container
+    c.Spawner.cmd = ['/opt/ros2_notebooks/tools/container/start_student.sh']
+    c.Spawner.notebook_dir = '/home/student/ros2_notebooks'
+    c.Spawner.mem_limit, c.Spawner.cpu_limit = '2G', 2
+    c.DockerSpawner.image = IMAGE
+    c.DockerSpawner.pull_policy = 'never'
+    c.DockerSpawner.remove = True
+    c.DockerSpawner.extra_host_config = {
+        'shm_size': '256m',
+        'pids_limit': 400,
+        # Podman's own are more than some machines allow. `nproc` counts all students together:
+        # what one may have is pids_limit.
+        'ulimits': [
+            Ulimit(name='nofile', soft=4096, hard=4096),
+            Ulimit(name='nproc', soft=30000, hard=30000),
+        ],
+        'cap_drop': ['ALL'],
+        'security_opt': ['no-new-privileges'],
+        # What is neither the home nor in memory cannot be written.
+        'read_only': True,
+        'tmpfs': {'/tmp': 'size=64m,mode=1777'},
+    }
+    # Builds and temporary files go to the student's disk. The class page is not told anything: its
+    # port is open to this machine only.
+    c.Spawner.environment = {'TMPDIR': '/home/student/.tmp'}
