@@ -282,10 +282,12 @@ def test_attacks_on_the_form_of_a_message(opened):
 
 
 def test_a_message_that_is_too_long_is_not_read(opened):
+    """The server ends the connection: whether its answer arrives before is a matter of luck."""
     ada = opened.join()
-    with pytest.raises((urllib.error.URLError, ConnectionError)):
-        assert opened.post('events', b' ' * 300_000, ada)[0] != 200
-        raise ConnectionError
+    with contextlib.suppress(urllib.error.URLError, ConnectionError, json.JSONDecodeError):
+        status, _ = opened.post('events', b' ' * 300_000, ada)
+        assert status == 400
+    assert opened.csv()[1:] == []
     assert opened.tell(ada, event()) == ''
 
 
