@@ -9,6 +9,17 @@ AUTOSAVE = f'() => {PANEL}.context.save()'  # what JupyterLab's timer does
 REPLAY = """from helpers.queue_model import predict
 from helpers.replay import replay
 replay(predict(0.05, 0.2, 10, 1, 41), 10)"""
+# A second save some milliseconds after the first; at the end, whether the document is saved.
+TWO_SAVES = f"""async milliseconds => {{
+    const context = {PANEL}.context;
+    const write = text => context.model.sharedModel.cells[0].setSource(text);
+    write(`first ${{milliseconds}}`);
+    const first = context.save();
+    await new Promise(done => setTimeout(done, milliseconds));
+    write(`second ${{milliseconds}}`);
+    await Promise.all([first, context.save()]);
+    return !context.model.dirty;
+}}"""
 LETTER = (
     "() => parseFloat(getComputedStyle(document.querySelector('.cm-focused .cm-line')).fontSize)"
 )
@@ -68,6 +79,13 @@ def test_typing_goes_on_whatever_is_saved_and_printed(deck):
     copy, lesson = (deck.server.folder / name / LESSON for name in ('presentation', 'notebooks'))
     assert '# abxd' in copy.read_text()
     assert lesson.read_bytes() == (ROOT / 'notebooks' / LESSON).read_bytes()
+
+
+def test_a_save_during_a_save_asks_nothing(deck):
+    deck.present(LESSON)
+    for milliseconds in (5, 15, 30, 60, 100, 150, 220, 300):
+        assert deck.page.evaluate(TWO_SAVES, milliseconds)  # it waits where a dialog asks
+    assert deck.page.locator('.jp-Dialog').count() == 0
 
 
 def test_code_is_large_and_of_a_traceback_the_last_line_is_seen(deck):

@@ -87,11 +87,20 @@ function keepPlace(presenter, { workspaces, serverSettings }) {
     };
     if (!known.has(panel)) {
       known.add(panel);
+      saveInTurn(panel.context);
       if (path in deck.places) panel.content.activeCellIndex = deck.places[path];
       panel.content.activeCellChanged.connect(keep);
     }
     keep(panel.content);
   };
+}
+
+// JupyterLab takes the file of a save that has not ended for somebody else's, and asks about "File
+// Changed", where a second save begins: Ctrl+S during an autosave.
+function saveInTurn(context) {
+  const save = context.save.bind(context);
+  let last = Promise.resolve();
+  context.save = options => (last = last.catch(() => {}).then(() => save(options)));
 }
 
 async function showGuesses(notebook, baseUrl) {
