@@ -3,6 +3,8 @@
 import json
 import math
 import re
+import subprocess
+import sys
 from html import unescape
 from pathlib import Path
 from urllib.parse import unquote
@@ -475,3 +477,13 @@ def test_bad_input_is_one_sentence(table, options, said):
     with pytest.raises(ValueError, match=f'^{re.escape(said)}') as failure:
         replay(table, **{'depth': 10} | options)
     assert '\n' not in str(failure.value)
+
+
+def test_a_replay_leaves_no_thread():
+    code = """import threading
+from helpers.queue_model import predict
+from helpers.replay import replay
+replay(predict(0.05, 0.2, 2, 1, 9), 2)._repr_mimebundle_()
+print(*(thread.name for thread in threading.enumerate()))"""
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ['MainThread']
