@@ -41,20 +41,6 @@ def nobody():
         yield f'127.0.0.1:{taken.getsockname()[1]}'
 
 
-@pytest.fixture(scope='module')
-def one_class(tmp_path_factory):
-    with running_class(tmp_path_factory.mktemp('class')) as one:
-        one.go(1)
-        yield one
-
-
-@pytest.fixture
-def opened(one_class):
-    """Yield a class that was told nothing."""
-    one_class.do('forget')
-    return one_class
-
-
 @contextlib.contextmanager
 def kernel(folder, script, begin=BEGIN, **environment):
     """Run a script as cells of a lesson; yield what it prints. The kernel lives in the block."""

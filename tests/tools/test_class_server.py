@@ -38,20 +38,6 @@ from tools.lessons.lesson import lessons
 REAL = [Known(lesson) for lesson in lessons() if lesson.is_lesson]
 
 
-@pytest.fixture(scope='module')
-def one_class(tmp_path_factory):
-    with running_class(tmp_path_factory.mktemp('class')) as opened:
-        opened.go(1)
-        yield opened
-
-
-@pytest.fixture
-def opened(one_class):
-    """Yield a class that was told nothing."""
-    one_class.do('forget')
-    return one_class
-
-
 @pytest.fixture
 def store(tmp_path):
     """Yield the events of a class, without a server."""

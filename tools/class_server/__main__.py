@@ -12,17 +12,16 @@ import webbrowser
 from contextlib import suppress
 from pathlib import Path
 
-from jupyter_core.paths import jupyter_config_dir
 from tornado.netutil import bind_sockets
 
 from tools.addresses import in_networks
+from tools.class_server import folder, page_file
 from tools.class_server.lessons import Known
 from tools.class_server.store import Class
 from tools.class_server.web import Room, application, follow_class, serve
 from tools.lessons.lesson import GLOSSARY, ROOT, lessons
 
 FILE = 'class.sqlite'
-PAGE = 'page'  # the file in which the server of `make present` finds the address of the page
 
 
 def known_lessons(root: Path = ROOT) -> list[Known]:
@@ -55,8 +54,7 @@ async def hold(store: Class, options: argparse.Namespace) -> None:
     if store.went_on:
         print('The class that was broken off goes on, with what it was told.')
     print('Ctrl+C ends the class and deletes what it was told. Save the CSV before.', flush=True)
-    address_file = store.file.with_name(PAGE)
-    address_file.write_text(page)
+    page_file().write_text(page)
     if options.browser:
         webbrowser.open(page)
     following = asyncio.create_task(follow_class(room))
@@ -64,7 +62,7 @@ async def hold(store: Class, options: argparse.Namespace) -> None:
         await over.wait()
     finally:
         following.cancel()
-        address_file.unlink(missing_ok=True)
+        page_file().unlink(missing_ok=True)
         server.stop()
         await server.close_all_connections()
 
@@ -79,7 +77,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--ssl-cert', help='a certificate, as that of the hub')
     parser.add_argument('--ssl-key')
     options = parser.parse_args(arguments)
-    store = Class(Path(jupyter_config_dir(), 'class', FILE), known_lessons(options.root))
+    store = Class(folder() / FILE, known_lessons(options.root))
     try:
         asyncio.run(hold(store, options))
     except OSError as error:

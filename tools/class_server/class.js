@@ -64,9 +64,9 @@ function show(state) {
   put('lessons', state.lessons, ({ name, title, here, now }) =>
     element('option', here ? `${title} (${here})` : title, { value: name, selected: now }));
   const { name } = state.lessons.find(lesson => lesson.now);
-  put('steps', state.steps.map(step => ({ ...step, name })), ({ title, here, now }) => {
+  put('steps', state.steps.map(step => ({ ...step, name })), ({ title, here, now }, number) => {
     const step = element('li');
-    const go = button(title, 'go', { lesson: name, step: state.steps.findIndex(s => s.title === title) });
+    const go = button(title, 'go', { lesson: name, step: number });
     if (now) go.setAttribute('aria-current', 'step');
     go.prepend(element('b', here || ''));
     step.append(go);

@@ -32,6 +32,10 @@ CREATE TABLE IF NOT EXISTS events (
     value TEXT, UNIQUE (seat, id)
 );
 """
+INSERT = """
+INSERT OR IGNORE INTO events (seat, id, at_s, lesson, kind, what, value)
+VALUES (?, ?, ?, ?, ?, ?, ?)
+"""
 
 
 class Class:
@@ -104,11 +108,7 @@ class Class:
             return 'This seat has told enough.'
         with self._db:
             for row in rows:
-                values = ', '.join('?' * len(row))
-                columns = 'seat, id, at_s, lesson, kind, what, value'
-                new = self._db.execute(
-                    f'INSERT OR IGNORE INTO events ({columns}) VALUES ({values})', row
-                )
+                new = self._db.execute(INSERT, row)
                 if new.rowcount:
                     self._note(seat, *row[3:])
         self.changes += 1

@@ -82,7 +82,6 @@ c.JupyterHub.load_roles.append(
 
 # --- Each student in a container -----------------------------------------------------------------
 
-IMAGE = 'localhost/ros2_notebooks'
 HUB_PORT = 8081
 STUDENT = 1000  # the user of the image
 DISK = '4G'  # what a student may fill
@@ -118,6 +117,8 @@ def prepare_container(spawner) -> None:
 
 if os.environ.get('CONTAINERS') == 'yes':
     from docker.types import Ulimit
+
+    from tools.hub.service import IMAGE
 
     # From their own networks students reach the hub, which asks for their token.
     c.JupyterHub.hub_bind_url = f'http://0.0.0.0:{HUB_PORT}'

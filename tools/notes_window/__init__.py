@@ -18,7 +18,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import nbformat
-from jupyter_core.paths import jupyter_config_dir
 from jupyter_server.base.handlers import JupyterHandler
 from jupyter_server.utils import url_path_join
 from jupyterlab.commands import get_workspaces_dir
@@ -29,6 +28,7 @@ from tornado.httpserver import HTTPServer
 from tornado.netutil import bind_sockets
 
 from tools.addresses import in_networks
+from tools.class_server import page_file
 from tools.lessons.notes import of_step
 from tools.lessons.present import FOLDER
 
@@ -116,9 +116,8 @@ class PageOfClass(JupyterHandler):
     @web.authenticated
     def get(self) -> None:
         """Answer with the address."""
-        file = Path(jupyter_config_dir(), 'class', 'page')
         self.set_header('Content-Type', 'text/plain')
-        self.finish(file.read_text() if file.is_file() else '')
+        self.finish(page_file().read_text() if page_file().is_file() else '')
 
 
 def serve(root: Path, address: str) -> tuple[int, str]:

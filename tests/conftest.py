@@ -1,0 +1,20 @@
+"""Fixtures of more than one test module."""
+
+import pytest
+
+
+@pytest.fixture(scope='module')
+def one_class(tmp_path_factory):
+    """Yield a class, open at the first step of its lesson."""
+    from support.classes import running_class  # only what tests a class loads its server
+
+    with running_class(tmp_path_factory.mktemp('class')) as one:
+        one.go(1)
+        yield one
+
+
+@pytest.fixture
+def opened(one_class):
+    """Yield a class that was told nothing."""
+    one_class.do('forget')
+    return one_class
