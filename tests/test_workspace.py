@@ -10,6 +10,7 @@ import threading
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 from support.packages import (
     HOSTILE,
@@ -522,12 +523,34 @@ def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch):
         lambda: built.run('talker_pkg', 'talker'),
         lambda: built.build('talker_pkg'),
         built.environment,  # its shell starts once after each build
+        lambda: Process('sleep', ['sleep', '60'], dict(os.environ), built.path),
     ):
         with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
             patch.setattr(subprocess, 'Popen', Interrupted)
             start()
         built.close()  # as after each cell that was interrupted
-    assert [process.poll() is None for process in started] == [False] * 3
+    assert [process.poll() is None for process in started] == [False] * 4
+
+
+# When it is told to end, it first interrupts who tells it, and takes its time.
+INTERRUPTS = """
+import os, signal, sys, time
+def end(*_):
+    os.kill(os.getppid(), signal.SIGINT)
+    time.sleep(1)
+    sys.exit()
+signal.signal(signal.SIGINT, end)
+print('ready', flush=True)
+time.sleep(60)
+"""
+
+
+def test_an_interrupt_while_a_process_ends_leaves_none(tmp_path):
+    process = Process('slow', [sys.executable, '-c', INTERRUPTS], dict(os.environ), tmp_path)
+    process.wait_for('ready')
+    with pytest.raises(KeyboardInterrupt):
+        process.stop()
+    assert psutil.Process().children() == []
 
 
 # --- The folder ----------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from helpers.interrupts import uninterrupted
 from helpers.workspace.folders import locks
 
 STOP_TIMEOUT_S = 5.0
@@ -49,18 +50,26 @@ class Process:
         self.name = name
         # Not a pipe, which would need a thread that reads it.
         self._output = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
-        self._process = subprocess.Popen(
-            command,
-            env=environment,
-            cwd=folder,
-            stdin=subprocess.DEVNULL,
-            stdout=self._output,
-            stderr=subprocess.STDOUT,
-            # What goes on when the kernel is killed, such as a build, keeps its workspace claimed.
-            pass_fds=locks(),
-            # Interrupting the kernel must not reach it: its owner ends it in order.
-            start_new_session=True,
-        )
+        self._process = None
+        try:
+            with uninterrupted():
+                self._process = subprocess.Popen(
+                    command,
+                    env=environment,
+                    cwd=folder,
+                    stdin=subprocess.DEVNULL,
+                    stdout=self._output,
+                    stderr=subprocess.STDOUT,
+                    # What goes on when the kernel is killed, such as a build, keeps its workspace
+                    # claimed.
+                    pass_fds=locks(),
+                    # Interrupting the kernel must not reach it: its owner ends it in order.
+                    start_new_session=True,
+                )
+        except KeyboardInterrupt:  # it gets no owner
+            if self._process:
+                self.stop()
+            raise
 
     @property
     def lines(self) -> list[str]:
@@ -126,8 +135,11 @@ class Process:
 
     def stop(self) -> None:
         """End it as Ctrl+C does. One that does not end within a few seconds is killed."""
-        if not self.running:
-            return
+        with uninterrupted():
+            if self.running:
+                self._stop()
+
+    def _stop(self) -> None:
         for sent, timeout_s in (
             (signal.SIGINT, STOP_TIMEOUT_S),
             (signal.SIGTERM, STOP_TIMEOUT_S / 5),
