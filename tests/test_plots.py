@@ -61,10 +61,6 @@ def points_of(ax):
     return {scatter.get_label(): scatter.get_offsets().data for scatter in scatters}
 
 
-def points_of_all(ax):
-    return [c.get_offsets().data for c in ax.collections if isinstance(c, PathCollection)]
-
-
 def words_of(ax):
     return [text.get_text() for text in ax.texts if text.get_text()]
 
@@ -115,32 +111,17 @@ def test_can_be_read_on_a_projector_whatever_the_settings(slow, draw):
 
 
 @each_plot
-def test_order_of_rows_does_not_matter_and_the_table_stays_as_it_is(slow, draw):
-    shuffled = slow.sample(frac=1, random_state=1)
-    before = shuffled.copy()
-    one, other = draw(slow), draw(shuffled)
-    pd.testing.assert_frame_equal(shuffled, before)
-    for a, b in zip(one.collections, other.collections, strict=True):
-        np.testing.assert_array_equal(a.get_offsets(), b.get_offsets())
-    for a, b in zip(one.lines, other.lines, strict=True):
-        np.testing.assert_array_equal(a.get_xydata(), b.get_xydata())
-    assert bars_of(one) == bars_of(other)
-    assert words_of(one) == words_of(other)
-
-
-@each_plot
-@pytest.mark.parametrize('started', [[np.nan] * 12, [0.001]], ids=['nothing heard', 'one message'])
-def test_draws_the_shortest_runs(draw, started):
-    ax = draw(table_of(started))
+def test_draws_a_run_of_which_nothing_was_heard(draw):
+    ax = draw(table_of([np.nan] * 12))
     ax.figure.canvas.draw()
     assert all(np.isfinite([*ax.get_xlim(), *ax.get_ylim()]))
 
 
-@pytest.mark.parametrize('colour', style.GROUP_COLOURS)
-def test_black_numbers_stand_out_on_every_group_colour(colour):
-    channels = np.array(to_rgba(colour)[:3])
+def test_black_numbers_stand_out_on_every_group_colour():
+    channels = np.array([to_rgba(colour)[:3] for colour in style.GROUP_COLOURS])
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
-    assert (linear @ [0.2126, 0.7152, 0.0722] + 0.05) / 0.05 >= 4.5  # contrast as WCAG 2 defines it
+    contrast = (linear @ [0.2126, 0.7152, 0.0722] + 0.05) / 0.05  # as WCAG 2 defines it
+    assert (contrast >= 4.5).all()
 
 
 # --- Sequence gaps ---
@@ -282,16 +263,16 @@ def test_groups_differ_in_colour_and_in_hatch_and_share_the_lanes_of_threads(slo
 def test_with_the_depth_a_timeline_shows_which_messages_wait(slow):
     ax = plots.timeline({'exclusive': slow}, depth=10)
     assert [label.get_text() for label in ax.get_yticklabels()] == ['thread 1', 'waiting']
-    callbacks, *waits = ax.containers
+    callbacks, waits = ax.containers
     assert callbacks.get_label() == 'exclusive'
-    bars = [(b.get_y(), b.get_x(), b.get_x() + b.get_width()) for (b,) in waits]
+    bars = [(b.get_y(), b.get_x(), b.get_x() + b.get_width()) for b in waits]
     left_s = slow.started_s.fillna(slow.published_s.shift(-10))
     np.testing.assert_allclose([bar[1:] for bar in bars], np.array([slow.published_s, left_s]).T)
     lanes = pd.DataFrame(sorted(bars), columns=['lane', 'entered', 'left'])
     assert lanes.lane.nunique() == 10
     for _, lane in lanes.groupby('lane'):  # in each place one after the other
         assert (lane.entered[1:].to_numpy() >= lane.left[:-1] - 1e-9).all()
-    crosses = np.concatenate([*points_of_all(ax)])
+    (crosses,) = points_of(ax).values()
     np.testing.assert_allclose(sorted(crosses[:, 0]), sorted(left_s[slow.started_s.isna()]))
     assert min(lanes.lane) > callbacks[0].get_y() + callbacks[0].get_height()
     assert ax.get_ylim()[0] > max(lanes.lane)
@@ -569,11 +550,8 @@ RUN = table_of([0.0])
         (lambda: plots.latency(RUN.iloc[:0]), 'The table is empty'),
         (lambda: plots.timeline({}), '1 to 5 callback groups, not 0'),
         (lambda: plots.timeline({'a': RUN, 'b': RUN.drop(columns='seq')}), 'lacks .* seq'),
-        (lambda: plots.path(DRIVE, DRIVE), 'Give each estimate a name'),
-        (lambda: plots.path(DRIVE, {'a': DRIVE[['t']]}), "estimate 'a' lacks the column.* x, y"),
         (lambda: plots.error(dict.fromkeys('abcde', DRIVE)), '1 to 4 errors, not 5'),
         (lambda: plots.paths(DRIVE, dict.fromkeys('abcdefg', DRIVE)), '1 to 6 estimates, not 7'),
-        (lambda: plots.innovation(DRIVE), 'innovations lacks the column'),
         (lambda: plots.frame_tree(FRAMES.iloc[[0, 0]]), 'make no tree'),
         (lambda: plots.frame_tree(FRAMES.iloc[1:]), 'make no tree'),
     ],

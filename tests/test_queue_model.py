@@ -72,7 +72,7 @@ runs = st.tuples(
 )
 
 
-@tries(70)
+@tries(30)
 @given(runs)
 @example((50, 200, 10, 1, 41))
 @example((50, 200, 10, 3, 60))
@@ -104,12 +104,10 @@ def test_predict_is_what_a_queue_does(run):
     ('changed', 'said'),
     [
         ({'period_s': 0}, 'period_s must be seconds, 1e-09 or more, not 0.'),
-        ({'period_s': '0.5'}, "period_s must be seconds, 1e-09 or more, not '0.5'."),
         ({'callback_s': -1}, 'callback_s must be seconds, 0 or more, not -1.'),
         ({'callback_s': math.inf}, 'callback_s must be seconds, 0 or more, not inf.'),
         ({'depth': 0}, 'depth must be a whole number from 1 up, not 0.'),
         ({'threads': 1.5}, 'threads must be a whole number from 1 up, not 1.5.'),
-        ({'messages': None}, 'messages must be a whole number from 1 up, not None.'),
     ],
 )
 def test_bad_numbers(changed, said):
@@ -162,7 +160,7 @@ def contradictions(table, depth, threads):
     return [sentence for sentence in found if 'a worker was free' not in sentence]
 
 
-@tries(50)
+@tries(25)
 @given(happenings())
 def test_what_happened_is_explained(happening):
     table, depth, threads = happening
@@ -172,7 +170,7 @@ def test_what_happened_is_explained(happening):
     assert explanation.lost == explanation.explained == len(table) - len(heard(table))
 
 
-@tries(120)
+@tries(60)
 @given(
     happenings(), st.lists(st.sampled_from([lose, hear, swap]), min_size=1, max_size=2), st.data()
 )
@@ -186,20 +184,6 @@ def test_explain_finds_what_cannot_have_happened(happening, changes, data):
     possible = can_have_happened(table, depth, threads)
     event(f'possible: {possible}')
     assert (contradictions(table, depth, threads) == []) is possible
-
-
-def test_a_worker_that_is_busy_takes_nothing():
-    heard_late = {0: (0, 10, 'thread 1'), 1: (10, 12, 'thread 2'), 3: (12, 14, 'thread 1')}
-    table = made_table([0, 1, 2, 3], heard_late)
-    assert not can_have_happened(table, 1, 1)
-    assert contradictions(table, 1, 1) != []
-    # With two workers, message 1 was taken at once, and its callback came late.
-    assert can_have_happened(table, 1, 2)
-    assert contradictions(table, 1, 2) == []
-    # Not by the thread that had another callback then.
-    table = made_table([0, 1, 2, 3], heard_late | {1: (10, 12, 'thread 1')})
-    assert not can_have_happened(table, 1, 2)
-    assert contradictions(table, 1, 2) != []
 
 
 # explain: how long a worker may rest
@@ -251,18 +235,10 @@ def longest_rest(table, depth, threads):
     return longest
 
 
-@tries(40)
-@given(regular_runs(most_late=int(REST * 20)))
-def test_a_worker_may_be_a_little_late(run):
-    table, depth, threads = run
-    explanation = explain(table, depth, threads)
-    assert explanation.complete, f'{explanation}\n{table}'
-
-
 lateness = st.sampled_from([0, int(REST * 20), 20])
 
 
-@tries(100)
+@tries(50)
 @given(lateness.flatmap(regular_runs), st.integers(0, 2), st.data())
 def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, data):
     table, depth, threads = run
@@ -318,20 +294,25 @@ def without(table, seq):
     return broken
 
 
+TABLE = predict(0.05, 0.2, 10, 1, 41)  # message 3 starts at 0.6 s, message 4 is lost
+
+
 @pytest.mark.parametrize(
-    ('change', 'said'),
+    ('table', 'said'),
     [
-        ({'published_s': lambda t: t['published_s'].where(t['seq'] != 5, 9.0)}, 'in front of it'),
-        ({'started_s': lambda t: t['started_s'].where(t['seq'] != 3, 0.01)}, 'before it was pub'),
-        ({'started_s': lambda t: t['started_s'].where(t['seq'] != 3, 0.5)}, 'thread of message 3'),
-        ({'thread': lambda t: t['thread'].where(t['seq'] != 3, 'thread 2')}, None),
+        (TABLE.assign(thread=TABLE['thread'].replace('thread 1', 'thread 2')), None),
+        (TABLE.assign(published_s=TABLE['published_s'].replace(0.25, 9.0)), 'in front of it'),
+        (TABLE.assign(started_s=TABLE['started_s'].replace(0.6, 0.01)), 'before it was published'),
+        (TABLE.assign(started_s=TABLE['started_s'].replace(0.6, 0.5)), 'thread of message 3'),
+        (predict(0.05, 0.2, 9, 1, 41), 'cannot have been the oldest in the queue'),
+        (predict(0.05, 0.2, 10, 3, 41), 'More than 1 callback(s) ran when message 1 started.'),
     ],
 )
-def test_impossible_rows(change, said):
-    # Message 3 starts at 0.6 s and message 4 is the first that is lost.
-    explanation = explain(predict(0.05, 0.2, 10, 1, 41).assign(**change), 10, 1)
+def test_what_is_impossible_is_said(table, said):
+    explanation = explain(table, 10, 1)
     assert said is None or any(said in sentence for sentence in explanation.contradictions)
     assert explanation.complete is (said is None)
+    assert ('Everything is' in str(explanation)) is (said is None)
 
 
 # Recorded on two cores on which 24 kernels ran: in ms, when messages were published, and when the
@@ -368,27 +349,6 @@ def test_callbacks_that_are_still_running():
         table = without(table, seq)
     explanation = explain(table, 10, 1)
     assert (explanation.lost, explanation.explained) == (14, 4)
-
-
-def test_two_workers_that_are_both_a_little_late():
-    # Seconds in which one of them is free follow on each other: neither is free for 12 s.
-    table = predict(4, 20, 1, 2, 10)
-    table[['started_s', 'finished_s', 'thread']] = np.nan, np.nan, None
-    for seq, start, worker in ((0, 0, 1), (1, 4, 2), (6, 24, 1), (9, 36, 2)):
-        table.loc[seq, CALLBACK] = start, start + 20, f'thread {worker}'
-    assert explain(table, 1, 2).complete
-
-
-@pytest.mark.parametrize(('depth', 'threads'), [(11, 1), (10, 2)])
-def test_another_queue_or_executor_contradicts(depth, threads):
-    explanation = explain(predict(0.05, 0.2, 10, 1, 41), depth, threads)
-    assert not explanation.complete
-    assert 'Everything' not in str(explanation)
-
-
-def test_more_callbacks_at_a_time_than_threads():
-    explanation = explain(predict(0.05, 0.2, 10, 3, 41), 10, 2)
-    assert any('callback(s) ran when' in sentence for sentence in explanation.contradictions)
 
 
 def test_last_messages_that_were_never_heard():
@@ -437,7 +397,7 @@ steps = st.lists(
 )
 
 
-@tries(15)
+@tries(8)
 @given(
     depth=st.integers(1, 5),
     threads=st.integers(1, 5),

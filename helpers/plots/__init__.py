@@ -2,7 +2,7 @@
 
 Every function takes tables and draws them; it knows no node and no filter. The axes have units, the
 legend counts, and no meaning hangs on a colour alone. Each picture is described in words, too: see
-`helpers.alt_text`. A table that cannot be drawn raises TypeError or ValueError, with one sentence.
+`helpers.alt_text`. A run that cannot be drawn raises TypeError or ValueError, with one sentence.
 """
 
 from helpers.alt_text import describe

@@ -29,7 +29,6 @@ from helpers.plots.style import (
     label_axes,
     new_axes,
 )
-from helpers.values import check_columns
 
 TRUTH = '#c3c9ce'
 
@@ -48,12 +47,9 @@ def path(
     and `var_y` (m^2), too: every so many seconds an ellipse shows 3 sigma, where the robot should
     be 99 times of 100.
 
-    Raises TypeError or ValueError for a bad table, and for no or too many estimates.
+    Raises ValueError for no or too many estimates.
     """
-    check_columns(truth, ('x', 'y'), 'The truth')
-    more = ('t', 'var_x', 'cov_x_y', 'var_y') if ellipses_s else ()
-    _check_lines('estimate', estimates, 'x', 'y', *more)
-
+    check_count('estimates', estimates, len(LINE_LOOKS))
     ax = new_axes(height=5.6)
     handles = ax.plot(truth.x, truth.y, color=TRUTH, lw=6, label='truth', solid_capstyle='round')
     if fixes is not None:
@@ -87,10 +83,9 @@ def paths(
 
     The tables have the columns `x` and `y` in metres. All axes have the same scale.
 
-    Raises TypeError or ValueError for a bad table, and for no or too many estimates.
+    Raises ValueError for no or too many estimates.
     """
-    check_columns(truth, ('x', 'y'), 'The truth')
-    _check_lines('estimate', estimates, 'x', 'y', most=6)
+    check_count('estimates', estimates, 6)
     columns = min(3, len(estimates))
     rows = math.ceil(len(estimates) / columns)
     figure = plt.figure(figsize=(3.6 * columns, 3.1 * rows + 0.7), dpi=DPI, layout='constrained')
@@ -136,9 +131,9 @@ def error(
     something happened: `{'no GPS': (40, 80)}`, in seconds. `log` makes the vertical axis
     logarithmic, from 1 cm up.
 
-    Raises TypeError or ValueError for a bad table, and for no or too many tables.
+    Raises ValueError for no or too many tables.
     """
-    _check_lines('error', errors, 't', 'distance')
+    check_count('errors', errors, len(LINE_LOOKS))
     spans = spans_s or {}
     ax = new_axes()
     handles = []
@@ -163,10 +158,7 @@ def innovation(innovations: pd.DataFrame, title: str = 'Measured minus expected'
     `innovations` has one row a measurement, in the order of time: `t` (s), `innovation` and `sigma`
     (m), `accepted` (bool). A dot is a measurement that the filter used, a cross one that its gate
     kept out.
-
-    Raises TypeError or ValueError for a bad table.
     """
-    check_columns(innovations, ('t', 'innovation', 'sigma', 'accepted'), 'The table of innovations')
     used, kept_out = innovations[innovations.accepted], innovations[~innovations.accepted]
     ax = new_axes()
     three = 3 * innovations.sigma
@@ -254,14 +246,3 @@ def _tree_layout(transforms: pd.DataFrame) -> tuple[dict[str, int], dict[str, fl
 
     place(roots[0], 0)
     return depths, rows
-
-
-def _check_lines(
-    what: str, tables: Mapping[str, pd.DataFrame], *columns: str, most: int = len(LINE_LOOKS)
-) -> None:
-    """Raise TypeError or ValueError where the tables by name cannot be drawn as lines."""
-    if not isinstance(tables, Mapping):
-        raise TypeError(f'Give each {what} a name: {{"a name": table}}.')
-    check_count(f'{what}s', tables, most)
-    for name, table in tables.items():
-        check_columns(table, columns, f'The {what} {name!r}')

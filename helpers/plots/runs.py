@@ -239,13 +239,14 @@ def _draw_waiting(ax: Axes, table: pd.DataFrame, depth: int, top: float) -> tupl
     left_s = table.started_s.where(~lost, _pushed_out(table, depth)).fillna(table.published_s)
     lanes = top + 0.3 + 0.3 * np.arange(depth)
     free_s = np.full(depth, -np.inf)  # when the message before has left each place
-    look = {'facecolor': PUBLISHED, 'edgecolor': 'white'}
-    for entered, left, is_lost in zip(table.published_s, left_s, lost, strict=True):
-        place = int(free_s.argmin())
-        free_s[place] = left
-        ax.barh(lanes[place], left - entered, left=entered, height=0.24, **look)
-        if is_lost:
-            crosses(ax, left, lanes[place], '', 0.4)
+    places = []
+    for left in left_s:
+        places.append(int(free_s.argmin()))
+        free_s[places[-1]] = left
+    look = {'facecolor': PUBLISHED, 'edgecolor': 'white', 'height': 0.24}
+    ax.barh(lanes[places], left_s - table.published_s, left=table.published_s, **look)
+    if lost.any():
+        crosses(ax, left_s[lost], lanes[places][lost], '', 0.4)
     names = [label.get_text() for label in ax.get_yticklabels()]
     ax.set_yticks([*ax.get_yticks(), lanes.mean()], [*names, 'waiting'])
     crossed = 'a cross ends those that were pushed out' if lost.any() else 'none is pushed out'
