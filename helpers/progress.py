@@ -51,14 +51,10 @@ def lessons() -> list[Lesson]:
     """
     found = []
     for path in _notebooks():
-        try:
-            text = path.read_text(encoding='utf-8', errors='replace')
-        except OSError:
-            continue
+        text = path.read_text(encoding='utf-8', errors='replace')
         title = re.search(r'^\s*"# \d\d (.*?)(?:\\n)?",?$', text, re.MULTILINE)
         words = path.stem[3:].replace('_', ' ').capitalize()
-        with suppress(ValueError):
-            words = json.loads(f'"{title[1]}"') if title else words
+        words = json.loads(f'"{title[1]}"') if title else words
         numbers = re.findall(r'^\s*"### Exercise (\d+)', text, re.MULTILINE)
         found.append(Lesson(path.name[:2], path.stem[3:], words, len(set(numbers))))
     return [lesson for lesson in found if lesson.exercises]
@@ -88,12 +84,9 @@ def record(title: str) -> None:
     with suppress(OSError):
         for notebook in _notebooks(found[2]):
             key = f'{notebook.stem[3:]} {found[1]}'
-            text = _read(path)
-            if key not in text.splitlines():
-                # After a line without an end, begin a new one. A short write is one system call.
-                line = f'{key}\n' if text.endswith('\n') or not text else f'\n{key}\n'
-                with path.open('ab', buffering=0) as lines:
-                    lines.write(line.encode())
+            if key not in _read(path).splitlines():
+                with path.open('ab', buffering=0) as lines:  # a short write is one system call
+                    lines.write(f'{key}\n'.encode())
 
 
 def show() -> None:

@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from helpers import progress
 from helpers.checks import NO_GUESS, check, compare_prediction
 
 QUESTION = 'How many of 41 messages are heard?'
@@ -182,21 +181,6 @@ def test_interrupt_is_no_try(capsys, title):
     with pytest.raises(KeyboardInterrupt):
         check(title, ('it ends', interrupted, ''))
     assert 'Hint' not in tried(capsys, title, second=False)
-
-
-def test_each_test_runs_once(title):
-    calls = []
-    check(title, ('called', lambda: calls.append(1), ''))
-    assert calls == [1]
-
-
-def test_only_what_is_all_right_is_kept(capsys, title, monkeypatch):
-    kept = []
-    monkeypatch.setattr(progress, 'record', kept.append)
-    tried(capsys, title, second=False)
-    assert kept == []
-    tried(capsys, title)
-    assert kept == [title]
 
 
 def test_long_lines_are_broken_at_blanks(capsys, title):

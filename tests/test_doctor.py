@@ -49,18 +49,6 @@ def test_this_machine_is_ready():
     assert row_of(answer.stdout, 'CMake').startswith('CMake ok cmake version ')
 
 
-def test_in_a_notebook(capsys):
-    doctor.show()
-    table = capsys.readouterr().out
-    rows = table.splitlines()
-    assert rows[0].split() == ['check', 'verdict', 'found']
-    assert set(rows[1]) == {'-'}
-    assert len({row.index(' ok ') for row in rows[2:]}) == 1  # one column
-    assert row_of(table, 'platform').startswith('platform ok Linux')
-    doctor.ready()
-    assert capsys.readouterr().out == 'This machine is ready: 5 of 5 required checks are ok.\n'
-
-
 def test_without_rclpy_it_says_what_to_run(tmp_path):
     venv.create(tmp_path)
     answer = run_doctor(tmp_path / 'bin/python')

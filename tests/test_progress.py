@@ -70,10 +70,9 @@ def test_what_is_solved_stays_so_when_the_lesson_gets_another_number(kept, capsy
     assert '1 of 2   open        solved\n' in text
 
 
-@pytest.mark.parametrize('broken', [b'', b'\xff\xfe{', b'"# 92 \\x",\n"### Exercise 1: A",\n'])
+@pytest.mark.parametrize('broken', [b'', b'\xff\xfe{'])
 def test_a_broken_notebook_breaks_nothing(kept, capsys, folder, broken):
     (folder / '92_lose_them.ipynb').write_bytes(broken)
-    (folder / '94_no_file.ipynb').mkdir()
     progress.record(TITLE)
     text = shown(capsys)
     assert re.search(r'^00 Start here +0 of 1 +open$', text, re.MULTILINE)
@@ -85,18 +84,10 @@ def test_elsewhere_the_notebooks_are_those_of_the_checkout(folder, monkeypatch, 
     assert 'lose_messages' in {lesson.name for lesson in progress.lessons()}
 
 
-@pytest.mark.parametrize(
-    'title',
-    ['Solution of exercise 1', 'Exercise 1', 'Exercise 1 of lesson 98'],
-)
-def test_other_titles_are_not_kept(kept, title):
-    progress.record(title)
-    assert not kept.exists()
-
-
 def test_a_check_that_passes_is_kept_and_no_other(kept, capsys):
     checks.check(TITLE, ('it is right', False, 'Try again.'))
-    checks.check('Solution of exercise 2', ('it is right', True, ''))
+    for other in ('Solution of exercise 2', 'Exercise 2', 'Exercise 2 of lesson 98'):
+        checks.check(other, ('it is right', True, ''))
     assert not kept.exists()
     checks.check(TITLE, ('it is right', True, ''))
     checks.check(TITLE, ('it is right', False, 'It was right before.'))
@@ -136,16 +127,6 @@ def test_a_place_that_cannot_be_written_fails_no_lesson(tmp_path, monkeypatch, c
     assert text.startswith('Your progress is not kept, because ')
     assert f'{path} cannot be used: ' in text
     assert text.endswith('0 of 4 exercises are solved.')
-
-
-def test_what_is_damaged_is_left_as_it_is(kept, capsys):
-    kept.parent.mkdir()
-    damaged = b'lose_them 1\n\xff\x00?\n\nlose_mess'
-    kept.write_bytes(damaged)
-    progress.record(OTHER)
-    assert kept.read_bytes() == damaged + b'\nlose_them 2\n'
-    text = ' '.join(shown(capsys).split())
-    assert '92 Lose them 2 of 2 solved solved' in text
 
 
 def test_start_again(kept, capsys):

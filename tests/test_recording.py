@@ -1,4 +1,4 @@
-"""A recording says what happened, and costs next to nothing."""
+"""A recording says what happened."""
 
 import time
 from types import SimpleNamespace
@@ -167,7 +167,7 @@ def test_progress_is_the_part_that_was_worked_off(monkeypatch):
     assert seen == [0, 2 / 4]
 
 
-@pytest.mark.parametrize('kind', ['message', 'message and info', 'async', 'object'])
+@pytest.mark.parametrize('kind', ['message', 'message and info', 'async'])
 def test_kinds_of_callbacks(kind):
     seen = []
 
@@ -181,17 +181,12 @@ def test_kinds_of_callbacks(kind):
     async def as_coroutine(message):
         seen.append(message.data)
 
-    class Callable:
-        def __call__(self, message):
-            seen.append(message.data)
-
     with ros_session() as session:
         talker, listener = Talker(3), Listener()
         listener.subscription.callback = {
             'message': with_message,
             'message and info': with_info,
             'async': as_coroutine,
-            'object': Callable(),
         }[kind]
         recording = Recording(talker.publisher, listener.subscription)
         spin(session, talker, listener)
@@ -235,9 +230,7 @@ def test_a_picture_of_one_pixel_is_its_number():
     assert table['started_s'].notna().tolist() == [False, True]
 
 
-@pytest.mark.parametrize(
-    'message', [String(data='Hello World'), String(), Imu(), Image(), Image(data=[1, 2])]
-)
+@pytest.mark.parametrize('message', [String(data='Hello World'), Imu(), Image(data=[1, 2])])
 def test_message_without_a_number(message):
     recording = Recording(publisher := Publisher(), Subscription())
     with pytest.raises(ValueError, match='A recording needs messages whose data ends with their'):
@@ -252,28 +245,6 @@ def test_same_number_twice(what):
         (publisher.publish if what == 'published' else subscription.callback)(Int64(data=7))
     with pytest.raises(ValueError, match=f'^The number 7 was {what} twice: give every message'):
         recording.table()
-
-
-def cost_s(function, argument, calls=100):
-    """The cheapest of many batches: what the function itself costs on a busy machine too."""
-    batches = []
-    for _ in range(50):
-        started = time.perf_counter()
-        for _ in range(calls):
-            function(argument)
-        batches.append((time.perf_counter() - started) / calls)
-    return min(batches)
-
-
-@pytest.mark.parametrize('message', [String(data='Hello World: 1234'), Int64(data=1234)])
-def test_cost_of_a_record(message):
-    publisher, subscription = Publisher(), Subscription()
-    plain = cost_s(publisher.publish, message), cost_s(subscription.callback, message)
-    Recording(publisher, subscription)
-    recorded = cost_s(publisher.publish, message), cost_s(subscription.callback, message)
-    costs = np.subtract(recorded, plain)
-    assert (costs > 0).all()
-    assert (costs <= 5e-6).all()
 
 
 # check_table

@@ -1,5 +1,6 @@
 """Workspaces, with real builds and real processes. Most tests look at the packages of one build."""
 
+import ctypes
 import os
 import re
 import resource
@@ -12,13 +13,14 @@ from pathlib import Path
 
 import psutil
 import pytest
+from ament_index_python import get_package_share_directory
 from support.packages import (
     HOSTILE,
     SETUP_PY,
     TALKER,
     package_xml,
     processes_of,
-    write_interfaces,
+    write_library,
     write_talker,
 )
 from support.processes import running
@@ -35,13 +37,17 @@ ROOT = Path(__file__).resolve().parent.parent
 
 @pytest.fixture(scope='module')
 def built():
-    """Return a workspace in which an interface package and a Python package have been built."""
+    """Return a workspace in which packages with libraries and with a node have been built."""
     with pytest.MonkeyPatch.context() as patch:
         for name, value in HOSTILE.items() | {('HOME', '/proc')}:  # nobody can write there
             patch.setenv(name, value)
         workspace = Workspace('test_workspace')
-        write_interfaces(workspace)
+        write_library(workspace)
         write_talker(workspace)
+        cmake = 'cmake_minimum_required(VERSION 3.8)\nproject(user_pkg LANGUAGES NONE)\n'
+        workspace.write('src/user_pkg/CMakeLists.txt', f'{cmake}install(CODE "")\n')
+        depends = '<exec_depend>talker_pkg</exec_depend>'
+        workspace.write('src/user_pkg/package.xml', package_xml('user_pkg', 'cmake', depends))
         workspace.result = workspace.build()
         workspace.environment()  # sourced in the hostile environment, and kept
     yield workspace
@@ -69,10 +75,11 @@ def wait_until(predicate, timeout_s=60.0) -> bool:
 def test_a_build_says_what_was_built_and_nothing_that_changes(built):
     assert str(built.result) == (
         'colcon build\n'
-        'Finished <<< custom_interfaces\n'
+        'Finished <<< number_pkg\n'
         'Finished <<< talker_pkg\n'
+        'Finished <<< user_pkg\n'
         '\n'
-        'Summary: 2 packages finished'
+        'Summary: 3 packages finished'
     )
     assert repr(built.result) == str(built.result)
     assert built.result.ok
@@ -113,62 +120,40 @@ Every line: log/latest_build/before/stdout_stderr.log"""
 
 def test_mistakes_of_a_python_package(other):
     assert other.build().errors == ['Nothing was built: src/ has no package.']
-    write_talker(other, setup=SETUP_PY.replace("'resource/'", "'resources/'"))
-    assert other.build().errors == [
-        "error: can't copy 'resources/talker_pkg': doesn't exist or not a regular file"
-    ]
     write_talker(other, setup=SETUP_PY.replace('setup(\n', 'setup((\n'))
     errors = other.build().errors
     assert errors[0] == 'Traceback (most recent call last):'
     assert errors[-1].startswith('SyntaxError: ')
-
-    marker = "('share/ament_index/resource_index/packages', ['resource/' + package_name]),"
-    write_talker(other, setup=SETUP_PY.replace(marker, ''))
-    result = other.build()
-    assert result.ok
-    assert "doesn't explicitly install a marker in the package index" in str(result)
     result = other.build('talker')
     assert not result.ok
     assert "ignoring unknown package 'talker'" in ' '.join(result.errors)
     assert str(result).endswith('\n\nSummary: 0 packages finished')
 
 
-def test_links_make_a_change_count_and_an_overlay_hides_its_underlay(other):
-    write_talker(other)
-    other.write('src/talker_pkg/talker_pkg/talker.py', "def main():\n    print('old')\n")
-    cmake = 'cmake_minimum_required(VERSION 3.8)\nproject(user_pkg LANGUAGES NONE)\n'
-    other.write('src/user_pkg/CMakeLists.txt', f'{cmake}install(CODE "")\n')
-    depends = '<exec_depend>talker_pkg</exec_depend>'
-    other.write('src/user_pkg/package.xml', package_xml('user_pkg', 'cmake', depends))
-    result = other.build(symlink_install=True)
-    assert result.ok, result
-    assert str(result).startswith('colcon build --symlink-install\n')
-
+def test_an_overlay_hides_its_underlay_and_links_make_a_change_count(built):
     def says(workspace):
         with workspace.run('talker_pkg', 'talker') as talker:
-            talker.wait()
-        return talker.lines
+            talker.wait_for('')
+        return talker.lines[0]
 
-    other.write('src/talker_pkg/talker_pkg/talker.py', "def main():\n    print('linked')\n")
-    assert says(other) == ['linked']
-
-    overlay = Workspace('overlay', underlay=other)
-    write_talker(overlay)
-    overlay.write('src/talker_pkg/talker_pkg/talker.py', "def main():\n    print('above')\n")
-    result = overlay.build()
+    overlay = Workspace('overlay', underlay=built)
+    write_talker(overlay, talker="def main():\n    print('above')\n")
+    result = overlay.build(symlink_install=True)
     assert result.ok, result
+    assert str(result).startswith('colcon build --symlink-install\n')
     (warning,) = result.warnings
     assert "'talker_pkg' is in: ../install/talker_pkg\n" in warning
     assert warning.endswith(
         'This may be promoted to an error in a future release of colcon-override-check.'
     )
-    assert says(overlay) == ['above']
-    assert says(other) == ['linked']
-    assert other.build('talker_pkg').packages == {'talker_pkg': 'finished'}, 'not the overlay'
+    assert says(overlay) == 'above'
+    overlay.write('src/talker_pkg/talker_pkg/talker.py', "def main():\n    print('linked')\n")
+    assert says(overlay) == 'linked'
+    assert says(built).endswith('Publishing: 0')
 
 
 def test_without_a_compiler_one_sentence_says_what_to_install(other, monkeypatch, tmp_path):
-    write_interfaces(other)
+    write_library(other)
     monkeypatch.setenv('PATH', str(tmp_path))  # only what belongs to this Python is left
     told = (
         r'^Missing for this build: C\+\+ compiler. Run `sudo apt install g\+\+`, then run this cell'
@@ -178,11 +163,16 @@ def test_without_a_compiler_one_sentence_says_what_to_install(other, monkeypatch
 
 
 def test_an_interrupted_build_leaves_no_process(other):
-    write_interfaces(other)
-    generated = other.path / 'build/custom_interfaces/rosidl_generator_c'
+    other.write('src/slow/package.xml', package_xml('slow', 'cmake'))
+    other.write(
+        'src/slow/CMakeLists.txt',
+        'cmake_minimum_required(VERSION 3.8)\nproject(slow LANGUAGES NONE)\n'
+        'add_custom_target(slow ALL COMMAND touch started COMMAND sleep 60)\n',
+    )
+    started = other.path / 'build/slow/started'
 
     def interrupt() -> None:
-        wait_until(generated.exists)
+        wait_until(started.exists)
         signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
 
     thread = threading.Thread(target=interrupt)
@@ -190,7 +180,7 @@ def test_an_interrupted_build_leaves_no_process(other):
     with pytest.raises(KeyboardInterrupt):
         other.build()
     thread.join()
-    assert generated.exists()
+    assert started.exists()
     assert wait_until(lambda: processes_of(other.path) == [], timeout_s=2)
 
 
@@ -281,8 +271,9 @@ src/broken/main.cpp:2:10: error: 'missing' was not declared in this scope
     2 |   return missing;
       |          ^~~~~~~""",
     ),
-    'a linker': (
+    'a linker, and setup.py': (
         """\
+error: can't copy 'resources/a_pkg': doesn't exist or not a regular file
 /usr/bin/ld: lib/libmy.a(my.cpp.o): warning: relocation against `_ZTISt9exception'
 /usr/bin/x86_64-linux-gnu-ld.bfd: lib/libmy.a(my.cpp.o): relocation R_X86_64_PC32 against symbol \
 `_ZTISt9exception' can not be used when making a shared object; recompile with -fPIC
@@ -290,6 +281,7 @@ src/broken/main.cpp:2:10: error: 'missing' was not declared in this scope
 collect2: error: ld returned 1 exit status
 gmake[2]: *** [CMakeFiles/my.dir/build.make:100: my.so] Error 1""",
         """\
+error: can't copy 'resources/a_pkg': doesn't exist or not a regular file
 /usr/bin/x86_64-linux-gnu-ld.bfd: lib/libmy.a(my.cpp.o): relocation R_X86_64_PC32 against symbol \
 `_ZTISt9exception' can not be used when making a shared object; recompile with -fPIC""",
     ),
@@ -355,17 +347,9 @@ def used(built, monkeypatch):
     return built
 
 
-def test_a_built_interface_is_one_of_this_process(used):
-    from ament_index_python import get_package_share_directory
-    from custom_interfaces.srv import TurnCamera
-    from rclpy.node import Node
-
-    assert get_package_share_directory('custom_interfaces').startswith(str(used.path))
-    with ros_session():
-        node = Node('camera')
-        node.create_service(TurnCamera, 'turn_camera', lambda request, response: response)
-        client = node.create_client(TurnCamera, 'turn_camera')
-        assert client.wait_for_service(timeout_sec=20)
+def test_a_built_library_is_one_of_this_process(used):
+    assert get_package_share_directory('number_pkg').startswith(str(used.path))
+    assert ctypes.CDLL(None).doubled() == 42
 
 
 def test_what_was_built_again_is_used_or_the_kernel_must_be_restarted(used):
@@ -374,23 +358,19 @@ def test_what_was_built_again_is_used_or_the_kernel_must_be_restarted(used):
     assert talker_pkg.talker.GREETING == 'Hello World'
     path = list(sys.path)
     write_talker(used, talker=TALKER.replace('Hello World', 'Good morning'))
-    assert used.build('talker_pkg').ok
+    assert used.build('talker_pkg').packages == {'talker_pkg': 'finished'}, 'not the overlay'
     used.use()
     import talker_pkg.talker
 
     assert talker_pkg.talker.GREETING == 'Good morning'
     assert sorted(sys.path) == sorted(path)  # nothing twice
 
-    library = (
-        used.path / 'install/custom_interfaces/lib/libcustom_interfaces__rosidl_generator_c.so'
-    )
-    old = library.read_bytes()
-    library.unlink()
-    library.write_bytes(old + b'\0')
-    with pytest.raises(RuntimeError, match='^custom_interfaces has changed, .* restart the kernel'):
+    extension = used.path / 'install/number_pkg/lib/python3/site-packages/number_pkg/extension.so'
+    old = extension.read_bytes()
+    extension.write_bytes(old + b'\0')
+    with pytest.raises(RuntimeError, match='^number_pkg has changed, .* restart the kernel'):
         used.use()
-    library.unlink()
-    library.write_bytes(old)
+    extension.write_bytes(old)
     used.use()
 
 

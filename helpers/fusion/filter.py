@@ -104,9 +104,7 @@ class ExtendedKalmanFilter:
     """
 
     def __init__(self, process_noise: Mapping[str, float] | None = None) -> None:
-        noise = settings.variances(
-            'process_noise', process_noise, PROCESS_NOISE, settings.not_negative
-        )
+        noise = settings.variances('process_noise', process_noise, PROCESS_NOISE, or_zero=True)
         self.process_noise = np.diag([noise[name] for name in STATE])
         self.state = np.zeros(len(STATE))
         self.covariance = INITIAL_VARIANCE * _IDENTITY

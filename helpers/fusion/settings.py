@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 
 from helpers.values import shown
 
 
-def positive(name: str, value) -> float:
-    """Return a number that is more than zero."""
-    if not (isinstance(value, Real) and 0 < value < math.inf):
-        raise ValueError(f'{name} must be a positive number, not {shown(value)}.')
-    return float(value)
-
-
-def not_negative(name: str, value) -> float:
-    """Return a number that is zero or more."""
-    if not (isinstance(value, Real) and 0 <= value < math.inf):
-        raise ValueError(f'{name} must be a number, zero or more, not {shown(value)}.')
+def positive(name: str, value, or_zero: bool = False) -> float:
+    """Return a number that is more than zero; with `or_zero`, it may be zero."""
+    if not (isinstance(value, Real) and 0 <= value < math.inf and (value or or_zero)):
+        kind = 'a number, zero or more' if or_zero else 'a positive number'
+        raise ValueError(f'{name} must be {kind}, not {shown(value)}.')
     return float(value)
 
 
@@ -42,11 +36,8 @@ def chosen(name: str, given: Mapping | None, allowed: Iterable[str]) -> dict:
 
 
 def variances(
-    name: str,
-    given: Mapping | None,
-    defaults: Mapping[str, float],
-    check: Callable[[str, object], float] = positive,
+    name: str, given: Mapping | None, defaults: Mapping[str, float], or_zero: bool = False
 ) -> dict[str, float]:
     """Return the default variances, some of them replaced."""
     changed = chosen(name, given, defaults)
-    return defaults | {key: check(f'{name}[{key!r}]', changed[key]) for key in changed}
+    return defaults | {key: positive(f'{name}[{key!r}]', changed[key], or_zero) for key in changed}

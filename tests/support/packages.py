@@ -21,23 +21,20 @@ PACKAGE_XML = """\
   </export>
 </package>
 """
-INTERFACE_DEPENDS = """\
-<buildtool_depend>ament_cmake</buildtool_depend>
-  <buildtool_depend>rosidl_default_generators</buildtool_depend>
-  <exec_depend>rosidl_default_runtime</exec_depend>
-  <member_of_group>rosidl_interface_packages</member_of_group>
-"""
+# Two libraries, of which the first by name needs the other. The extension, as of an interface
+# package, is for Python alone to load.
 CMAKE_LISTS = """\
 cmake_minimum_required(VERSION 3.8)
-project(custom_interfaces)
-
+project(number_pkg CXX)
 find_package(ament_cmake REQUIRED)
-find_package(rosidl_default_generators REQUIRED)
-
-rosidl_generate_interfaces(${PROJECT_NAME}
-  "srv/TurnCamera.srv"
-)
-
+file(WRITE ${CMAKE_BINARY_DIR}/number.cpp "extern \\"C\\" int number() {return 21;}")
+file(WRITE ${CMAKE_BINARY_DIR}/double.cpp
+  "extern \\"C\\" int number(); extern \\"C\\" int doubled() {return 2 * number();}")
+add_library(number SHARED ${CMAKE_BINARY_DIR}/number.cpp)
+add_library(double SHARED ${CMAKE_BINARY_DIR}/double.cpp)
+target_link_libraries(double number)
+install(TARGETS number double DESTINATION lib)
+install(FILES package.xml DESTINATION lib/python3/site-packages/number_pkg RENAME extension.so)
 ament_package()
 """
 SETUP_PY = """\
@@ -131,12 +128,11 @@ def package_xml(name: str, build_type: str, depends: str = '') -> str:
     return PACKAGE_XML.format(name=name, build_type=build_type, depends=depends)
 
 
-def write_interfaces(workspace: Workspace) -> None:
-    top = 'src/custom_interfaces'
-    xml = package_xml('custom_interfaces', 'ament_cmake', INTERFACE_DEPENDS)
-    workspace.write(f'{top}/package.xml', xml)
-    workspace.write(f'{top}/CMakeLists.txt', CMAKE_LISTS)
-    workspace.write(f'{top}/srv/TurnCamera.srv', 'float32 deg_turn\n---\nbool done\n')
+def write_library(workspace: Workspace) -> None:
+    depends = '<buildtool_depend>ament_cmake</buildtool_depend>'
+    xml = package_xml('number_pkg', 'ament_cmake', depends)
+    workspace.write('src/number_pkg/package.xml', xml)
+    workspace.write('src/number_pkg/CMakeLists.txt', CMAKE_LISTS)
 
 
 def write_talker(workspace: Workspace, setup: str = SETUP_PY, talker: str = TALKER) -> None:
