@@ -348,7 +348,9 @@ class Session:
             for client in find(Client, self._context):
                 rclpy_private.fail_calls(client, SessionClosedError('The session closes.'))
             if self._ended_by_exception:
-                rclpy_private.end_wait(thread, longer_than_s=CLOSE_TIMEOUT_S)
+                # A long wait at once. A short one ends by itself, unless it comes again and again.
+                left_s = deadline - time.monotonic()
+                rclpy_private.end_wait(thread, longer_than_s=left_s - CLOSE_TIMEOUT_S / 2)
             thread.join(25 * POLL_S)  # less often than POLL_S: to look for calls takes long
 
     def _threads(self) -> list[threading.Thread]:

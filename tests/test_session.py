@@ -274,6 +274,23 @@ def test_callback_that_only_takes_long_ends_by_itself(threads):
     assert not gate.is_set()
 
 
+@EXECUTORS
+def test_callback_that_waits_again_and_again_for_an_interrupted_cell(threads):
+    gate, waiting = threading.Event(), []
+
+    def callback(message):
+        waiting.append(message)
+        while not gate.wait(0.05):
+            pass
+
+    with pytest.raises(KeyboardInterrupt) as interrupt, ros_session() as session:
+        spin(session, Listener(callback), threads=threads)
+        spin(session, Talker(1))
+        session.wait_until(lambda: waiting, LIMIT_S)
+        raise KeyboardInterrupt
+    assert not hasattr(interrupt.value, '__notes__')
+
+
 # Deadlocks
 
 

@@ -553,6 +553,20 @@ def test_a_new_workspace_is_empty_and_git_does_not_see_it(other):
         subprocess.run(['git', 'check-ignore', '-q', again.path], cwd=ROOT, check=True)
 
 
+def test_an_interrupt_while_a_file_is_written_loses_nothing(other, monkeypatch):
+    write_text = Path.write_text
+
+    def interrupted(path, text, **options):
+        write_text(path, '')
+        signal.raise_signal(signal.SIGINT)
+        write_text(path, text, **options)
+
+    monkeypatch.setattr(Path, 'write_text', interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        other.write('src/a.txt', 'text')
+    assert other.file('src/a.txt').read_text() == 'text'
+
+
 def test_an_interrupt_while_a_folder_is_emptied_is_an_interrupt(other, monkeypatch):
     for number in range(3):
         other.write(f'src/{number}.txt', 'text')

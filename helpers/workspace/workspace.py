@@ -86,15 +86,16 @@ class Workspace:
         between the parts. Raises ValueError where the part before it was not written.
         """
         file = self.file(relative_path)
-        parts = self._parts.pop(file, [])
-        if part is not None:
-            self._parts[file] = parts
-            if not 1 <= part <= len(parts) + 1:
-                raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
-            parts[part - 1 : part] = [text]
-            text = '\n'.join(parts)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(text, encoding='utf-8')
+        with uninterrupted():  # a file of which one half is written would be lost
+            parts = self._parts.pop(file, [])
+            if part is not None:
+                self._parts[file] = parts
+                if not 1 <= part <= len(parts) + 1:
+                    raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
+                parts[part - 1 : part] = [text]
+                text = '\n'.join(parts)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text, encoding='utf-8')
 
     def print_tree(self, relative_path: str = 'src', hide: Sequence[str] = ()) -> None:
         """Print the files below a folder of the workspace. `hide` holds patterns such as '*.zsh'.
