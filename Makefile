@@ -20,7 +20,7 @@ class: set_up ## see the guesses of a class as they come: LAN=yes lets students 
 test: set_up lint ## lint, tests of the helpers, every notebook compared with its saved outputs
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(PYTEST_ARGS)
 
-test-tools: set_up ## the tools: an installation from nothing, the soak, the licences, the benchmarks
+test-tools: set_up ## the tools: an installation from nothing, the soak, two machines, the licences, the benchmarks
 	@$(PYTHON) -m pytest -n 2 --dist worksteal --max-worker-restart 0 -o faulthandler_timeout=600 tests/tools $(PYTEST_ARGS)
 
 test-browser: ## the real JupyterLab in Chromium, as students and instructors use it; it takes minutes

@@ -25,11 +25,7 @@ def describe(ax: Axes, text: str, title: str | None = None) -> None:
 
     The title and the labels of `ax` are read out with it. Give `title` where the one that is seen
     holds a number that moves.
-
-    Raises ValueError for an empty text.
     """
-    if not text.strip():
-        raise ValueError('The description of a figure needs at least one sentence.')
     _described[ax] = text, title
 
 

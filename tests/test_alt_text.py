@@ -62,11 +62,6 @@ def test_each_of_several_axes_has_its_turn():
     assert alt_text(figure) == 'Two runs. Picture 1 of 2. A line. Picture 2 of 2. Which one?'
 
 
-def test_an_empty_description_is_refused():
-    with pytest.raises(ValueError, match='^The description of a figure needs'):
-        describe(plt.figure().add_subplot(), ' ')
-
-
 def test_an_axes_that_is_gone_leaves_nothing_behind():
     figure, ax = plt.subplots()
     describe(ax, 'A line.')

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from helpers.fusion.messages import (
@@ -27,6 +27,7 @@ def rotated(orientation, vector):
     return vector + 2 * np.cross(axis, np.cross(axis, vector) + orientation.w * vector)
 
 
+@settings(max_examples=20)
 @given(angles, angles, angles)
 def test_an_orientation_turns_about_x_then_y_then_z(roll, pitch, yaw):
     turned = np.array([0.3, -2.0, 1.0])
@@ -40,6 +41,7 @@ def test_an_orientation_turns_about_x_then_y_then_z(roll, pitch, yaw):
     assert np.allclose(rotated(quaternion(roll, pitch, yaw), np.array([0.3, -2.0, 1.0])), turned)
 
 
+@settings(max_examples=20)
 @given(st.integers(0, 10**12), angles)
 def test_stamps_and_yaws_come_back(nanoseconds, yaw):
     stamp = stamp_of(nanoseconds / 1e9)

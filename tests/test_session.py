@@ -589,7 +589,7 @@ def places(started_once):
 
 
 @pytest.mark.filterwarnings('ignore:Exception ignored in')  # rclpy's own, of a half-made executor
-@settings(max_examples=settings.default.max_examples // 5)
+@settings(max_examples=settings.default.max_examples // 8)
 @given(data=st.data())
 def test_interrupt_anywhere(places, data):
     place = data.draw(st.sampled_from(places))
