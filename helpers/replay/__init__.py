@@ -17,6 +17,7 @@ from functools import cached_property
 from html import escape
 from itertools import chain
 
+import numpy as np
 import pandas as pd
 
 from helpers.queue_model import check_count
@@ -28,7 +29,6 @@ from helpers.replay.picture import (
     LETTER,
     MOST_ROWS,
     NARROW,
-    RIGHT,
     WIDTH,
     address,
     picture,
@@ -87,8 +87,10 @@ class Run:
             return [f'{one["seq"]}' for one in self.messages]
         return [f'{callbacks[one["callback"]]["name"]} {one["seq"]}' for one in self.messages]
 
-    def picture(self, span_s: tuple[float, float], width: int, left: int) -> str:
-        """Return the run as an SVG, in a span of seconds. Sizes are pixels."""
+    def picture(
+        self, span_s: tuple[float, float], width: int, left: int
+    ) -> tuple[str, list[float]]:
+        """Return the run as an SVG, in a span of seconds, and its plot. Sizes are pixels."""
         return picture(self.messages, self.names, span_s, width, left, self.time_label)
 
     def record(self) -> dict:
@@ -121,14 +123,14 @@ class Replay:
         left = max(LEFT, *(round(LETTER * len(name)) for run in self.runs for name in run.names))
         starts, ends = zip(*(run.span_s for run in self.runs), strict=True)
         span_s = min(starts), max(ends)  # pictures beside each other share their time
+        pictures = [run.picture(span_s, width, left) for run in self.runs]
         figures = ''.join(
-            f'<figure><img alt="{escape(run.alternative)}" '
-            f'src="{address(run.picture(span_s, width, left))}"></figure>'
-            for run in self.runs
+            f'<figure><img alt="{escape(run.alternative)}" src="{address(svg)}"></figure>'
+            for run, (svg, _) in zip(self.runs, pictures, strict=True)
         )
         record = {
             'span': span_s,
-            'plot': [round(left / width, 4), round(1 - RIGHT / width, 4)],
+            'plots': [plot for _, plot in pictures],
             'runs': [run.record() for run in self.runs],
         }
         calls = any(has_calls(run.setup) for run in self.runs)
@@ -167,14 +169,15 @@ def replay(
     heard = table[table['started_s'].notna()]
     found = set(heard['thread'].dropna())
     names = fill_up(found, threads) if len(heard) else []
-    shown_here = table['seq'].between(*part) if part else table['seq'].notna()
-    if not shown_here.any():
-        raise ValueError(f'There is no message from {part[0]} to {part[1]}.')
-    if shown_here.sum() > MOST_MESSAGES:
+    if part is not None:
+        table = _rows_of_part(table, depth, part)
+    if len(table) > MOST_MESSAGES:
+        start = table['seq'].iloc[0] if part is None else part[0]
         raise ValueError(
-            f'{shown_here.sum():,} messages are too many to step through. Ask for a part of '
-            f'{MOST_MESSAGES:,} at most: part=(0, {MOST_MESSAGES - 1}).'
+            f'{len(table):,} messages are too many to step through. Ask for a smaller part: '
+            f'part=({start}, {start + 999}).'
         )
+    shown_here = table['seq'].between(*part) if part else table['seq'].notna()
     made = events(table, depth, threads if group == REENTRANT else 1)
     first = 0
     if part is not None:
@@ -204,17 +207,44 @@ def side_by_side(runs: Mapping[str, Replay]) -> Replay:
     return Replay(tuple(replace(run, name=name) for name, one in runs.items() for run in one.runs))
 
 
+def _rows_of_part(table: pd.DataFrame, depth: int, bounds: tuple[int, int]) -> pd.DataFrame:
+    """Return the rows of a part, and those of messages that are there while it happens.
+
+    Of the earlier ones that are those which wait or run when it begins, of the later ones those
+    which are published until its last message is pushed out or its callback ends.
+    """
+    places = np.flatnonzero(table['seq'].between(*bounds))
+    if not len(places):
+        raise ValueError(f'There is no message from {bounds[0]} to {bounds[1]}.')
+    first, last = places[0], places[-1]
+    begin_s = table['published_s'][first]
+    lost = table['started_s'].isna()
+    gone = table['finished_s'] < begin_s
+    gone |= lost & (table.index + depth < first)
+    own = table.loc[first:last]
+    pushes_out = min(last + depth, len(table) - 1) if lost[own.index].any() else last
+    ends = own['finished_s'].max(), own['started_s'].max(), table['published_s'][pushes_out]
+    end_s = np.nanmax(ends)
+    here = (table.index >= first) & (table['published_s'] <= end_s)
+    table = table[~gone & (table.index < first) | here].reset_index(drop=True)
+    # Taken after that, for there is nobody who would have pushed it out: it still waits.
+    waits = (table['started_s'] > end_s) & (table.index + depth >= len(table))
+    table.loc[waits, ['started_s', 'finished_s']] = np.nan
+    return table
+
+
 def _part_of(made: list[Event], depth: int, bounds: tuple[int, int]) -> tuple[list[Event], int]:
     """Return the events of a part, after those that lead to its start, and how many those are."""
     least, most = bounds
     waiting, running = deque(), {}
     before: list[Event] = []
-    begun = False
+    begun = arrived = False
     found = []
-    for event in made:
+    for index, event in enumerate(made):
         if not begun and event.do == ARRIVE and least <= event.seq <= most:
             begun = True
-            before = sorted([*chain(*running.values()), *waiting])
+            there = {id(one) for one in chain(*running.values(), waiting)}
+            before = [one for one in made[:index] if id(one) in there]
         if begun:
             found.append(event)
         if event.do == ARRIVE:
@@ -225,8 +255,9 @@ def _part_of(made: list[Event], depth: int, bounds: tuple[int, int]) -> tuple[li
             running[event.seq] = waiting.popleft(), event
         else:
             del running[event.seq]
-        left = not any(e.seq <= most for e in waiting) and not any(s <= most for s in running)
-        if begun and event.seq >= most and left:
+        arrived |= event.do == ARRIVE and event.seq >= most
+        there = chain((one.seq for one in waiting), running)
+        if arrived and not any(least <= seq <= most for seq in there):
             break
     return before + found, len(before)
 
@@ -245,7 +276,8 @@ def fill_up(found: set[str], threads: int) -> list[str]:
 
 def has_calls(setup: dict) -> bool:
     """Return whether a callback of a setup of model.js asks a service."""
-    return any('does' in callback for callback in setup['callbacks'])
+    steps = chain(*(callback.get('does', []) for callback in setup['callbacks']))
+    return any('client' in step for step in steps)
 
 
 def _natural(name: str) -> list:

@@ -11,6 +11,7 @@
 //                name of a number, is one more after it; `unless`, see `set`
 //                {read: name}, {write: name}     reads a number; writes what was read plus one
 //                {lock: name}, {unlock: name}
+//                {says: text}         is seen in the sentence, and nothing else
 //                {set: name}          from now on, a work with `unless` of this name does not begin
 //                {call: callback, client: callback}     waits, and holds thread and group
 //                {await: callback, client: callback}    waits, gives the thread back, not the group
@@ -283,6 +284,8 @@ function queueModel() {
     } else if (now.set !== undefined) {
       state.values[now.set] = 1;
       says = `${who} is heard: who looks, sees ${now.set} now.`;
+    } else if (now.says !== undefined) {
+      says = `${who} ${now.says}.`;
     } else if (now.client !== undefined) {
       return ask(setup, state, run, now);
     }

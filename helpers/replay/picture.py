@@ -43,10 +43,11 @@ def picture(
     width: int,
     left: int,
     time_label: str,
-) -> str:
-    """Return an SVG of messages, as stories.js tells of them, in a span of seconds.
+) -> tuple[str, list[float]]:
+    """Return an SVG of messages, as stories.js tells of them, in a span of seconds; and its plot.
 
-    It is `width` pixels wide; `left` of them are for the names, one for each message.
+    It is `width` pixels wide; `left` of them are for the names, one for each message. The plot is
+    where time is shown: its left, right, top and bottom, as parts of the width and of the height.
     """
     from_s, until_s = span_s
     rows = {(one['callback'], one['seq']): row for row, one in enumerate(messages)}
@@ -109,12 +110,14 @@ def picture(
     parts.append(_path([f'M{left} {bottom:g}H{width - RIGHT}'], INK, 1))
     above, top = _legend(legend, width)
     height = top + bottom + BOTTOM
-    return (
+    svg = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:g}" '
         f'width="{width}" height="{height:g}" font-family="sans-serif" font-size="12" '
         f'fill="{INK}"><rect width="100%" height="100%" fill="#fff"/>{"".join(above)}'
         f'<g transform="translate(0 {top})">{"".join(parts)}{"".join(texts)}</g></svg>'
     )
+    plot = left / width, 1 - RIGHT / width, top / height, (top + bottom) / height
+    return svg, [round(part, 4) for part in plot]
 
 
 def _path(lines: list[str], colour: str, line: float, dashes: str = '') -> str:

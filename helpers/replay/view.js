@@ -4,18 +4,22 @@
 const MOST_ITEMS = 100; // of a list; what is more is counted
 const DELAYS = [800, 400, 200, 100, 50]; // ms a step, while it plays
 
-// Does a callback ask a service? Then nothing is lost, and callbacks may wait in a circle.
-const asks = ({ setup }) => setup.callbacks.some(({ does }) => does);
+// Of many callbacks nothing is lost; where one asks a service, they may wait in a circle.
+const many = ({ setup }) => setup.callbacks.length > 1;
+const asks = ({ setup }) => setup.callbacks.some(({ does = [] }) => does.some(step => 'client' in step));
 
 // The lists of one run.
-function panel(run, record, picture, { span: [from, until], plot: [left, right] }) {
+function panel(run, record, picture, [from, until], [left, right, top, bottom]) {
   const list = name => element('ul', { 'aria-label': name, role: 'list', class: `replay-${name}` });
   const [threads, groups, queue, lost] = ['threads', 'groups', 'queue', 'lost'].map(list);
   const places = element('span', { 'aria-hidden': 'true' });
   const time = element('span', { class: 'replay-time' });
   const row = (name, ...content) => element('div', { class: 'replay-row' },
     element('b', { 'aria-hidden': 'true' }, name), element('div', {}, ...content));
-  const cursor = element('span', { class: 'replay-cursor', 'aria-hidden': 'true' });
+  const percent = part => `${100 * part}%`;
+  const cursor = element('span', {
+    class: 'replay-cursor', 'aria-hidden': 'true', style: `top: ${percent(top)}; height: ${percent(bottom - top)}`,
+  });
   const shown = element('div', { class: 'replay-picture' }, picture, cursor);
   const { setup } = record;
   const calls = asks(record);
@@ -31,7 +35,7 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
     });
   }
 
-  const seqOf = item => setup.callbacks.length > 1 ? model.named(setup, item) : `${item.seq}`;
+  const seqOf = item => many(record) ? model.named(setup, item) : `${item.seq}`;
 
   function draw(position) {
     const { state, says } = run.seek(position);
@@ -56,14 +60,14 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
     fill(queue, waiting.slice(0, MOST_ITEMS).map(item => [seqOf(item)])
       .concat(more > 0 ? [[`and ${more} more`]] : []));
     places.textContent = '';
-    const empty = setup.callbacks.length > 1 ? 0 : Math.min(depth, 40) - waiting.length;
+    const empty = many(record) ? 0 : Math.min(depth, 40) - waiting.length;
     for (let i = 0; i < empty; i += 1) places.append(element('i'));
     const early = state.lost.length - MOST_ITEMS;
     fill(lost, (early > 0 ? [[`${early} before`]] : []).concat(
       state.lost.slice(-MOST_ITEMS).map(item => [seqOf(item)])));
     time.textContent = `${state.now.toFixed(3)} s`;
     const part = Math.min(Math.max((state.now - from) / (until - from), 0), 1);
-    cursor.style.left = `${100 * (left + part * (right - left))}%`;
+    cursor.style.left = percent(left + part * (right - left));
     return says;
   }
 
@@ -72,7 +76,7 @@ function panel(run, record, picture, { span: [from, until], plot: [left, right] 
   const node = element('div', { class: 'replay-run', role: name && 'group', 'aria-label': name },
     row(record.name || 'time', time),
     row('threads', threads), row('groups', groups),
-    row('queue', queue, places), row(...(calls ? ['circle', circle] : ['lost', lost])), shown);
+    row('queue', queue, places), ...(calls ? [row('circle', circle)] : many(record) ? [] : [row('lost', lost)]), shown);
   return { node, draw };
 }
 
@@ -93,13 +97,12 @@ function show(root, record) {
     for (let i = 0; i < runs.length; i += 1) counts[i].push(next[i]);
   }
   const last = order.length;
-  const calls = record.runs.some(asks);
   let position = 0;
   let playing = null;
   let delay = 0;
 
   const pictures = [...root.querySelectorAll('figure > img')];
-  const panels = record.runs.map((one, i) => panel(runs[i], one, pictures[i], record));
+  const panels = record.runs.map((one, i) => panel(runs[i], one, pictures[i], record.span, record.plots[i]));
   const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
   const slider = element('input', {
     type: 'range', min: 0, max: last, step: 1, 'aria-label': 'step', oninput: () => go(+slider.value),
@@ -220,7 +223,7 @@ function show(root, record) {
   root.querySelector('.replay-on > p').after(
     says,
     element('div', { class: 'replay-controls' }, back, forth, play, faster, slider,
-      ...(calls ? [] : [loss, element('label', {}, 'Message ', number)])),
+      ...(record.runs.some(many) ? [] : [loss, element('label', {}, 'Message ', number)])),
     element('div', { class: 'replay-runs' }, ...panels.map(({ node }) => node)),
   );
   go(0);

@@ -173,6 +173,10 @@ def test_buttons_slider_and_numbers(exported, prediction):
     assert says.inner_text() != PUSHED_OUT
     shown.get_by_role('button', name='forward').click()
     assert says.inner_text() == PUSHED_OUT
+    # The line of time stays in the plot: below the legend, above the numbers of the axis.
+    picture, line = (shown.locator(part).bounding_box() for part in ('img', '.replay-cursor'))
+    assert picture['y'] + 20 < line['y']
+    assert line['y'] + line['height'] < picture['y'] + picture['height'] - 30
     number = shown.get_by_role('spinbutton', name='message')
     number.fill('30')
     number.press('Enter')

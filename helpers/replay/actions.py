@@ -1,0 +1,134 @@
+"""Step through the run of an action: its requests, its job, and for what a cancel waits."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+
+from helpers.queue_model import check_count
+from helpers.recording import CallbackRecording
+from helpers.replay import KINDS, Replay, Run, fill_up
+from helpers.replay.calls import DEPTH, SAME_TIME
+from helpers.replay.events import ARRIVE, END, TAKE
+
+REQUESTS = {'goal': 'send_goal', 'cancel': 'cancel_goal'}  # in `Waitable.execute`, and the service
+SAYS = 'publish_feedback', 'succeed', 'canceled', 'abort'  # methods of a goal handle
+TIME_LABEL = 'time since the goal was taken (s)'
+
+
+class ActionRecording(CallbackRecording):
+    """Records an action server, and services of its node, from now on.
+
+    `execute_callback` is the server's, and a plain function. The names of the runs are
+    'execute_callback', the names of the services, and 'send_goal' and 'cancel_goal' for the
+    requests of these two services of the action: while one runs, the server holds its group.
+    """
+
+    def __init__(self, server, execute_callback: Callable, **services) -> None:
+        super().__init__(**services)
+        self.said: list[tuple[float, str]] = []  # what the job called, of SAYS, and when (seconds)
+        # An execute callback is a task: in no group.
+        self.group_of = {'send_goal': server.callback_group, 'execute_callback': None}
+        self.group_of |= {'cancel_goal': server.callback_group}
+        self.group_of |= {name: service.callback_group for name, service in services.items()}
+        job, execute = self.watch('execute_callback', execute_callback), server.execute
+        requests = {kind: self.watch(name, execute) for kind, name in REQUESTS.items()}
+
+        def recorded_job(goal_handle):
+            for name in SAYS:
+                setattr(goal_handle, name, self._noted(getattr(goal_handle, name)))
+            return job(goal_handle)
+
+        @functools.wraps(execute)
+        async def recorded_execute(taken: dict) -> None:
+            kind = next(filter(requests.get, taken), None)
+            await requests.get(kind, execute)(taken)
+
+        server.register_execute_callback(recorded_job)
+        server.execute = recorded_execute
+
+    def _noted(self, method: Callable) -> Callable:
+        @functools.wraps(method)
+        def noted(*arguments):
+            self.said.append((time.monotonic(), method.__name__))
+            return method(*arguments)
+
+        return noted
+
+
+def replay_action(
+    recording: ActionRecording, threads: int, cancelled_s: float, *, name: str = ''
+) -> Replay:
+    """Return the run of one goal that was cancelled, to step through. Call it when all has ended.
+
+    `threads` is how many the executor of the server's node has, `cancelled_s` when the cancel was
+    sent, on the clock of `time.monotonic`.
+
+    Raises ValueError, with one sentence, unless one job has run.
+    """
+    check_count('threads', threads)
+    tables, runs = recording.tables(), recording.runs
+    if len(runs['execute_callback']) != 1:
+        raise ValueError('A replay shows one job: record the run of one goal.')
+    zero = runs['send_goal'][0][0]
+    names = list(recording.group_of)
+    groups = list(dict.fromkeys(recording.group_of.values()))
+    thread_names = fill_up({one for table in tables.values() for one in table['thread']}, threads)
+    ended_s = runs['execute_callback'][0][1]
+    late = any(started_s > ended_s for started_s, *_ in runs['cancel_goal'])
+    taken = 'is taken when the job has ended' if late else 'is taken while the job runs'
+    does = {
+        'execute_callback': [{'says': f'calls {said}'} for _, said in recording.said],
+        'cancel_goal': [{'says': taken}],
+    }
+    setup = {
+        'threads': thread_names,
+        'groups': [
+            {
+                'name': _name_of(group, recording.group_of),
+                'exclusive': isinstance(group, MutuallyExclusiveCallbackGroup),
+            }
+            for group in groups
+        ],
+        'callbacks': [
+            {
+                'name': one,
+                'word': 'job' if one == 'execute_callback' else 'request',
+                'group': groups.index(group),
+                'depth': DEPTH,
+                'does': does.get(one, []),
+            }
+            for one, group in recording.group_of.items()
+        ],
+    }
+    moves = []
+    for one, table in tables.items():
+        callback = names.index(one)
+        for run in table.itertuples():
+            thread = thread_names.index(run.thread)
+            arrived_s = run.started_s
+            if one == 'execute_callback':  # the request for the goal has made it
+                arrived_s = min(arrived_s, runs['send_goal'][0][1] - zero)
+                moves += [(at_s - zero, 'go', 0, thread) for at_s, _ in recording.said]
+            if one == 'cancel_goal':
+                arrived_s = cancelled_s - zero
+                moves.append((run.started_s, 'go', 0, thread))
+            moves.append((arrived_s, ARRIVE, callback, run.seq))
+            moves.append((run.started_s, TAKE, callback, thread))
+            if run.finished_s == run.finished_s:
+                moves.append((run.finished_s, END, callback, thread))
+    moves.sort(key=lambda move: (move[0], SAME_TIME.index(move[1])))
+    moves = [[round(1e6 * at_s), KINDS.index(do), one, other] for at_s, do, one, other in moves]
+    summary = f'{"One thread" if threads == 1 else f"{threads} threads"}. The cancel {taken}.'
+    return Replay((Run(name, summary, False, setup, moves, 0, TIME_LABEL),))
+
+
+def _name_of(group, group_of: dict) -> str:
+    """Return what a page calls a callback group: by the first callback that is in it."""
+    if group is None:
+        return 'no group'
+    first = next(name for name, one in group_of.items() if one is group)
+    return f'the group of {"the action" if first == "send_goal" else first}'

@@ -1,0 +1,146 @@
+"""The run of an action, recorded with the real rclpy and replayed: for what a cancel waits."""
+
+import threading
+import time
+
+import pytest
+from rclpy.action import ActionClient, ActionServer, CancelResponse
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+from support.javascript import Script
+from support.nodes import LIMIT_S, spin
+from test_msgs.action import Fibonacci
+
+from helpers.replay.actions import ActionRecording, replay_action
+from helpers.session import ros_session
+
+GLUE = """
+// Of each step of a record: the sentence, who runs, who waits and why, and who is in which group.
+function steps({ setup, ...record }) {
+  const run = walk({ setup, ...record });
+  return run.times.map((at, step) => {
+    const { state, says } = run.seek(step + 1);
+    const named = item => item && setup.callbacks[item.callback].name;
+    return {
+      says,
+      at: at / 1e6,
+      running: state.runs.map(named),
+      cause: state.queues.map((queue, i) => queue.length && model.cause(setup, state, i)),
+      held: setup.groups.map((_, group) => named(model.holderOf(setup, state, group)) ?? null),
+    };
+  });
+}
+"""
+CANCEL = 2  # the place of cancel_goal
+
+
+class Robot(Node):
+    """Serves `job`, and `charge`, which answers when the job has ended."""
+
+    def __init__(self, own_group=False):
+        super().__init__('robot')
+        self.gate, self.begun, self.ended = (threading.Event() for _ in range(3))
+        self.server = ActionServer(
+            self,
+            Fibonacci,
+            'job',
+            self.execute,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+            callback_group=MutuallyExclusiveCallbackGroup() if own_group else None,
+        )
+        self.charger = self.create_service(Trigger, 'charge', self.charge)
+
+    def execute(self, goal_handle):
+        goal_handle.publish_feedback(Fibonacci.Feedback(sequence=[0]))
+        self.begun.set()
+        assert self.gate.wait(LIMIT_S)
+        if goal_handle.is_cancel_requested:
+            goal_handle.canceled()
+        else:
+            goal_handle.succeed()
+        self.ended.set()
+        return Fibonacci.Result()
+
+    def charge(self, request, response):
+        assert self.ended.wait(LIMIT_S)
+        return response
+
+
+@pytest.fixture
+def cancel():
+    """Return a function that cancels a job, waits, and lets it end. It returns what was found."""
+
+    def run(threads, charges=False, own_group=False):
+        with ros_session() as session:
+            robot, operator = Robot(own_group), Node('operator')
+            recording = ActionRecording(robot.server, robot.execute, charge=robot.charger)
+            executor, own = spin(session, robot, threads=threads), spin(session, operator)
+            client = ActionClient(operator, Fibonacci, 'job')
+            charger = operator.create_client(Trigger, 'charge')
+
+            def ask(call, *arguments):
+                task = own.create_task(call, *arguments)
+                session.wait_until(task.done, LIMIT_S)
+                return task.result()
+
+            session.wait_until(client.server_is_ready, LIMIT_S)
+            goal = ask(client.send_goal_async, Fibonacci.Goal())
+            session.wait_until(lambda: goal.done() and robot.begun.is_set(), LIMIT_S)
+            if charges:
+                session.wait_until(charger.service_is_ready, LIMIT_S)
+                ask(charger.call_async, Trigger.Request())
+                session.wait_until(lambda: recording.runs['charge'], LIMIT_S)
+            cancelled_s = time.monotonic()
+            answer = ask(goal.result().cancel_goal_async)
+            session.wait_until_quiet(executor)
+            heard = answer.done()
+            robot.gate.set()
+            session.wait_until(lambda: robot.ended.is_set() and answer.done(), LIMIT_S)
+        accepted = len(answer.result().goals_canceling) == 1
+        return replay_action(recording, threads, cancelled_s), heard, accepted
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ('threads', 'charges', 'own_group', 'cause'),
+    [
+        (1, False, False, 'thread busy'),
+        (2, False, False, ''),
+        (2, True, True, 'thread busy'),
+        (3, True, False, 'group busy'),
+        (3, True, True, ''),
+    ],
+)
+def test_a_cancel_waits_for_what_rclpy_lets_it_wait(cancel, threads, charges, own_group, cause):
+    shown, heard, accepted = cancel(threads, charges, own_group)
+    steps = Script(glue=GLUE).call('steps', shown.runs[0].record())
+    said = [step['says'] for step in steps]
+    sent = next(i for i, says in enumerate(said) if 'of cancel_goal arrives' in says)
+    assert steps[sent]['cause'][CANCEL] == cause
+    assert 'execute_callback' in steps[sent]['running']
+    # What rclpy answered while the job was held: it waited if and only if there is a cause.
+    assert heard == accepted == (not cause)
+    taken = 'is taken while the job runs.' if heard else 'is taken when the job has ended.'
+    assert f'Request 0 of cancel_goal {taken}' in said
+    assert str(shown) == (
+        f'Replay: {f"{threads} threads" if threads > 1 else "One thread"}. The cancel {taken}'
+    )
+    end = 'canceled' if heard else 'succeed'
+    assert [says for says in said if ' calls ' in says] == [
+        f'Job 0 of execute_callback calls {call}.' for call in ('publish_feedback', end)
+    ]
+    # The job holds no group; the request of its goal does.
+    held = {name for step in steps for name in step['held']} - {None}
+    assert held == {'send_goal', 'cancel_goal', *(['charge'] if charges else [])}
+    assert set(steps[-1]['running']) == {None}
+
+
+def test_two_jobs_are_one_sentence():
+    with ros_session() as session:
+        robot = Robot()
+        recording = ActionRecording(robot.server, robot.execute)
+        spin(session, robot)
+        with pytest.raises(ValueError, match=r'^A replay shows one job: record the run of one'):
+            replay_action(recording, 1, 0.0)
