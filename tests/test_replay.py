@@ -174,7 +174,7 @@ def test_sentences_of_the_tutorial(script):
         '',
         'Message 0 arrives. A thread is free to take it.',
         'Thread 1 is free and takes the oldest that waits, 0.',
-        'Message 1 arrives. It waits: the thread is busy.',
+        'Message 1 arrives. It waits: thread 1 is busy.',
     ]
     assert 'Message 14 arrives. Ten wait, so the oldest, 4, is pushed out.' in said
     assert said[-1] == 'The callback of message 40 ends. Thread 1 is free.'
@@ -253,7 +253,7 @@ def test_a_circle_is_said(script):
     one_group = script.call('play', services(2, 'one group', {'call': 1, 'client': 2}))
     assert [it['says'] for it in one_group['circle']] == [
         'Tick 0 of timer waits for an answer. '
-        'The answer is there, but tick 0 of timer holds driver.'
+        'The answer is there, but client is in driver, which tick 0 of timer holds.'
     ]
     one_thread = script.call('play', services(1, 'two groups', {'call': 1, 'client': 2}))
     assert [it['says'] for it in one_thread['circle']] == [
@@ -307,7 +307,7 @@ def test_an_update_is_lost_without_a_lock_and_never_with_one(script):
         (
             [*ARRIVALS, TAKES[0]],
             TAKES[0],
-            'Thread 1 is busy with message 0: a thread runs one callback at a time.',
+            'Thread 1 is busy with message 0: it runs one callback at a time.',
         ),
         (
             [*ARRIVALS, TAKES[0]],

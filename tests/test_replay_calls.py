@@ -83,14 +83,15 @@ def test_the_circle_closes_when_the_question_is_asked(script):
     shown, *_ = record(2, 1, 'call')
     assert str(shown) == (
         'Replay: 2 threads. Tick 0 of tick waits for an answer. '
-        'The answer is there, but tick 0 of tick holds the group of tick.'
+        'The answer is there, but client is in the group of tick and client, which tick 0 of tick '
+        'holds.'
     )
     steps = script.call('steps', shown.runs[0].record())
     asked = next(i for i, step in enumerate(steps) if 'asks look' in step['says'])
     assert [bool(step['circle']) for step in steps] == [i >= asked for i in range(len(steps))]
     assert steps[asked]['circle'] == [
         'Tick 0 of tick waits for an answer. '
-        'It will need the group of tick, but tick 0 of tick holds that.'
+        'client must take it, but is in the group of tick and client, which tick 0 of tick holds.'
     ]
     assert steps[-1]['queues'] == [0, 0, 1]
 

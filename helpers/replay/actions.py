@@ -75,7 +75,9 @@ def replay_action(
         raise ValueError('A replay shows one job: record the run of one goal.')
     zero = runs['send_goal'][0][0]
     names = list(recording.group_of)
-    groups = list(dict.fromkeys(recording.group_of.values()))
+    groups: dict = {}
+    for one, group in recording.group_of.items():
+        groups.setdefault(group, []).append(one)
     thread_names = fill_up({one for table in tables.values() for one in table['thread']}, threads)
     ended_s = runs['execute_callback'][0][1]
     late = any(started_s > ended_s for started_s, *_ in runs['cancel_goal'])
@@ -88,16 +90,16 @@ def replay_action(
         'threads': thread_names,
         'groups': [
             {
-                'name': _name_of(group, recording.group_of),
+                'name': 'no group' if group is None else f'the group of {" and ".join(members)}',
                 'exclusive': isinstance(group, MutuallyExclusiveCallbackGroup),
             }
-            for group in groups
+            for group, members in groups.items()
         ],
         'callbacks': [
             {
                 'name': one,
                 'word': 'job' if one == 'execute_callback' else 'request',
-                'group': groups.index(group),
+                'group': list(groups).index(group),
                 'depth': DEPTH,
                 'does': does.get(one, []),
             }
@@ -124,11 +126,3 @@ def replay_action(
     moves = [[round(1e6 * at_s), KINDS.index(do), one, other] for at_s, do, one, other in moves]
     summary = f'{"One thread" if threads == 1 else f"{threads} threads"}. The cancel {taken}.'
     return Replay((Run(name, summary, False, setup, moves, 0, TIME_LABEL),))
-
-
-def _name_of(group, group_of: dict) -> str:
-    """Return what a page calls a callback group: by the first callback that is in it."""
-    if group is None:
-        return 'no group'
-    first = next(name for name, one in group_of.items() if one is group)
-    return f'the group of {"the action" if first == "send_goal" else first}'

@@ -40,7 +40,10 @@ def replay_calls(recording: CallbackRecording, threads: int = 1, *, name: str = 
     setup = {
         'threads': thread_names,
         'groups': [
-            {'name': f'the group of {one}', 'exclusive': bool(groups.loc[one, 'exclusive'])}
+            {
+                'name': f'the group of {" and ".join(groups.index[groups["group"] == one])}',
+                'exclusive': bool(groups.loc[one, 'exclusive']),
+            }
             for one in group_names
         ],
         'callbacks': [

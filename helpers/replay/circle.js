@@ -50,9 +50,9 @@ function circleOf(setup, state) {
     if (working && !can(working)) says = `${model.capital(name(working))} must give it, and waits itself.`;
     else if ((there || waiting) && !hasThread()) says = `${what}, but no thread is free.`;
     else if ((there || waiting) && !isOpen(needed))
-      says = `${what}, but ${holder(needed)} holds ${group(needed)}.`;
+      says = `${what}, but ${setup.callbacks[needed].name} is in ${group(needed)}, which ${holder(needed)} holds.`;
     else if (working || waiting)
-      says = `It will need ${group(client)}, but ${holder(client)} holds that.`;
+      says = `${setup.callbacks[client].name} must take it, but is in ${group(client)}, which ${holder(client)} holds.`;
     return `waits for an answer. ${says}`;
   }
 

@@ -96,7 +96,11 @@ function show(root, level) {
   function choose(move) {
     const refused = now.refusal(state, move);
     says.textContent = '';
-    if (refused) return say(`No. ${refused}`);
+    if (refused) {
+      say(`No. ${refused}`);
+      if (now.isOver(state)) say(...result());
+      return;
+    }
     const done = now.choose(state, move);
     state = done.state;
     say(done.says);

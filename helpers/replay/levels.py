@@ -223,8 +223,9 @@ def _deadlock(threads: int, groups: str) -> Variant:
     elif threads == 1:
         lesson = 'No order ends it. The only thread waits for work that only it could do.'
     else:
-        lesson = 'No order ends it. A thread is free, but the group that the answer needs is held.'
-    groups_made = [{'name': "the driver's group", 'exclusive': exclusive}]
+        lesson = 'No order ends it. A thread is free, but the client is in the group that is held.'
+    name = "the timer's group" if two else 'the group of timer and client'
+    groups_made = [{'name': name, 'exclusive': exclusive}]
     groups_made += [{'name': "the client's group", 'exclusive': True}] if two else []
     camera = len(groups_made)
     return Variant(

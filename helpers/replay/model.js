@@ -115,7 +115,7 @@ function queueModel() {
     if (move.do === 'take' || move.do === 'resume') {
       if (run)
         return `${capital(thread)} is busy with ${named(setup, run)}: `
-          + 'a thread runs one callback at a time.';
+          + 'it runs one callback at a time.';
       if (move.do === 'resume') {
         const asleep = state.asleep.find(({ id }) => id === move.run);
         return asleep?.waits === 'thread' ? '' : 'Its answer has not come.';
@@ -224,7 +224,7 @@ function queueModel() {
     const why = {
       '': says || 'A thread is free to take it.',
       'no executor': 'No executor takes it.',
-      'thread busy': setup.threads.length === 1 ? 'It waits: the thread is busy.' : 'It waits: every thread is busy.',
+      'thread busy': `It waits: ${setup.threads.length > 1 ? 'every thread' : setup.threads[0]} is busy.`,
       'group busy': 'It waits: a thread is free, but its group is busy.',
       answer: 'It waits for a callback that waits for an answer.',
       lock: 'It waits for a callback that waits for a lock.',
@@ -252,21 +252,24 @@ function queueModel() {
     const stops = Boolean(state.values[unless]);
     if (stops) run.step = stepsOf(setup, run).length;
     run.until = stops || work === undefined ? undefined : state.now + work;
-    return stops ? ` It looks, sees ${unless}, and stops.` : '';
+    if (stops) return ` It looks, sees ${unless}, and stops.`;
+    return unless ? ` It looks, and does not see ${unless}.` : '';
   }
 
-  // Of a work that is done.
+  // Of a work that is done. Return what is to be said of it.
   function add(setup, state, run) {
     const { adds } = step(setup, run) ?? {};
-    if (adds) state.values[adds] = (state.values[adds] ?? 0) + 1;
+    if (!adds) return '';
+    state.values[adds] = (state.values[adds] ?? 0) + 1;
+    return `: ${adds} ${state.values[adds]}`;
   }
 
   function go(setup, state, thread) {
     const run = state.runs[thread];
     const who = capital(named(setup, run));
     const now = step(setup, run);
-    let says = `${who} goes on.`;
-    add(setup, state, run);
+    const added = add(setup, state, run);
+    let says = `${who} goes on${added}.`;
     if (now.read !== undefined) {
       run.seen = state.values[now.read] ?? 0;
       says = `${who} reads ${now.read}: ${run.seen}.`;

@@ -66,7 +66,8 @@ def test_a_circle_is_read_where_it_closes(page, artefacts):
     page.keyboard.press('End')
     assert circle.all_inner_texts() == [
         'Tick 0 of tick waits for an answer. '
-        'The answer is there, but tick 0 of tick holds the group of tick.'
+        'The answer is there, but client is in the group of tick and client, which tick 0 of tick '
+        'holds.'
     ]
     assert root.locator('.replay-stuck').count() == 2
     assert not page.evaluate(WIDER)

@@ -44,7 +44,7 @@ def test_the_first_level_by_keys_alone(page, artefacts):
     page.keyboard.press('1')
     page.keyboard.press('2')
     assert says.inner_text() == (
-        'No. The program is busy with picture 0: a thread runs one callback at a time.'
+        'No. The program is busy with picture 0: it runs one callback at a time.'
     )
     assert items(root, 'queue') == ['1']
     page.keyboard.press('1')
