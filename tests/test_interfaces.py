@@ -178,12 +178,8 @@ def test_an_overlay_wins_and_a_change_is_seen(prefix, listing):
     ('name', 'hint'),
     [
         ('sensor_msgs/Image', 'The nearest: sensor_msgs/msg/Image.'),
-        ('Image', 'The nearest: sensor_msgs/msg/Image.'),
-        ('sensor_msgs/srv/Image', 'The nearest: sensor_msgs/msg/Image.'),
-        ('sensor_msgs/msg/image', 'The nearest: sensor_msgs/msg/Image.'),
         ('sensor_msg/msg/Imagge', 'The nearest: sensor_msgs/msg/Image.'),
         ('custom_interfaces/msg/Twist', 'The nearest: geometry_msgs/msg/Twist.'),
-        ('std_msgs/msg/../msg/String', 'The nearest: std_msgs/msg/String.'),
         ('qqq', 'list_interfaces() prints all names.'),
         (int, 'list_interfaces() prints all names.'),
     ],

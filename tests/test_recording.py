@@ -329,15 +329,9 @@ def test_run_that_goes_on():
 
 
 def test_watched_function():
-    recording = CallbackRecording()
+    recording = CallbackRecording(look=Subscription())
+    assert recording.tables()['look'].columns.tolist() == COLUMNS
     double = recording.watch('double', lambda number: 2 * number)
     assert recording.tables()['double'].empty
     assert [double(2), double(3)] == [4, 6]
     assert recording.finished('double') == 2
-
-
-def test_no_run():
-    assert CallbackRecording().tables() == {}
-    recording = CallbackRecording(look=Subscription())
-    assert recording.tables()['look'].columns.tolist() == COLUMNS
-    assert recording.tables()['look'].empty
