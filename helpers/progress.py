@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from jupyter_core.paths import jupyter_data_dir
 
-from helpers.text import wrap
+from helpers import text
 
 FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progress is kept
 TITLE = re.compile(r'Exercise (\d+) of lesson (\d\d)')
@@ -51,11 +51,11 @@ def lessons() -> list[Lesson]:
     """
     found = []
     for path in _notebooks():
-        text = path.read_text(encoding='utf-8', errors='replace')
-        title = re.search(r'^\s*"# \d\d (.*?)(?:\\n)?",?$', text, re.MULTILINE)
+        source = path.read_text(encoding='utf-8', errors='replace')
+        title = re.search(r'^\s*"# \d\d (.*?)(?:\\n)?",?$', source, re.MULTILINE)
         words = path.stem[3:].replace('_', ' ').capitalize()
         words = json.loads(f'"{title[1]}"') if title else words
-        numbers = re.findall(r'^\s*"### Exercise (\d+)', text, re.MULTILINE)
+        numbers = re.findall(r'^\s*"### Exercise (\d+)', source, re.MULTILINE)
         found.append(Lesson(path.name[:2], path.stem[3:], words, len(set(numbers))))
     return [lesson for lesson in found if lesson.exercises]
 
@@ -96,8 +96,8 @@ def show() -> None:
         try:
             lines = _read(path).splitlines()
         except OSError as error:
-            text = f'Your progress is not kept, because {path} cannot be used: {error.strerror}.'
-            print(*wrap(text), sep='\n')
+            why = f'Your progress is not kept, because {path} cannot be used: {error.strerror}.'
+            print(*text.wrap(why), sep='\n')
     print(table(known, lines))
 
 
@@ -112,20 +112,16 @@ def start_again() -> None:
 
 def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
     """Return a row for each lesson, and a line with the sum; `solved` holds lines of the file."""
-    rows, done = [], []
     known = list(known)
-    most = max((lesson.exercises for lesson in known), default=1)
-    heads = '  '.join(f'exercise {count}' for count in range(1, most + 1))
-    width = max((len(lesson.title) for lesson in known), default=0) + 5
-    rows.append(f'{"lesson":<{width}}{"solved":<9}{heads}')
-    for lesson in known:
-        states = [key in solved for key in lesson.lines()]
-        done += states
-        words = ''.join(f'{"solved" if one else "open":<12}' for one in states)
-        count = f'{sum(states)} of {len(states)}'
-        rows.append(f'{f"{lesson.number} {lesson.title}":<{width}}{count:<9}{words}'.rstrip())
-    rows.append(f'{sum(done)} of {len(done)} exercises are solved.')
-    return '\n'.join(rows)
+    states = [[line in solved for line in lesson.lines()] for lesson in known]
+    most = max(map(len, states), default=0)
+    rows = [['lesson', 'solved', *(f'exercise {count}' for count in range(1, most + 1))]]
+    for lesson, done in zip(known, states, strict=True):
+        words = ['solved' if one else 'open' for one in done] + [''] * (most - len(done))
+        count = f'{sum(done)} of {len(done)}'
+        rows.append([f'{lesson.number} {lesson.title}', count, *words])
+    done = sum(states, [])
+    return f'{text.table(rows)}\n{sum(done)} of {len(done)} exercises are solved.'
 
 
 def _notebooks(number: str = '[0-9][0-9]') -> list[Path]:

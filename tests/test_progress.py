@@ -44,10 +44,11 @@ def shown(capsys):
 
 def test_a_new_student(kept, capsys):
     assert shown(capsys) == (
-        'lesson          solved   exercise 1  exercise 2\n'
-        '00 Start here   0 of 1   open\n'
-        '92 Lose them    0 of 2   open        open\n'
-        '93 Share "C++"  0 of 1   open\n'
+        'lesson          solved  exercise 1  exercise 2\n'
+        '----------------------------------------------\n'
+        '00 Start here   0 of 1  open\n'
+        '92 Lose them    0 of 2  open        open\n'
+        '93 Share "C++"  0 of 1  open\n'
         '0 of 4 exercises are solved.\n'
     )
 
@@ -56,8 +57,8 @@ def test_a_solved_exercise_is_in_the_table(kept, capsys):
     progress.record(OTHER)
     progress.record('Exercise 1 of lesson 00')
     text = shown(capsys)
-    assert '92 Lose them    1 of 2   open        solved\n' in text
-    assert '00 Start here   1 of 1   solved\n' in text
+    assert '92 Lose them    1 of 2  open        solved\n' in text
+    assert '00 Start here   1 of 1  solved\n' in text
     assert text.endswith('\n2 of 4 exercises are solved.\n')
 
 
@@ -66,8 +67,8 @@ def test_what_is_solved_stays_so_when_the_lesson_gets_another_number(kept, capsy
     (folder / '92_lose_them.ipynb').rename(folder / '94_lose_them.ipynb')
     (folder / '92_count.ipynb').write_text('"# 92 Count",\n"### Exercise 1: A",\n')
     text = shown(capsys)
-    assert '\n92 Count        0 of 1   open\n' in text
-    assert '1 of 2   open        solved\n' in text
+    assert '\n92 Count        0 of 1  open\n' in text
+    assert '1 of 2  open        solved\n' in text
 
 
 @pytest.mark.parametrize('broken', [b'', b'\xff\xfe{'])
