@@ -644,9 +644,13 @@ def test_two_cells_write_a_file_in_any_order_and_again(shell, capsys):
 def test_an_interrupted_cell_ends_the_processes(shell, built):
     workspace = Workspace('test_workspace_other')
     (workspace.path / 'install').symlink_to(built.path / 'install')
-    talker = workspace.run('talker_pkg', 'talker')
-    talker.wait_for('Publishing')
-    shell.run_cell('1 + 1')
-    assert talker.running
-    shell.run_cell('raise KeyboardInterrupt')
-    assert not talker.running
+    for interrupt in (
+        lambda: shell.run_cell('raise KeyboardInterrupt'),
+        lambda: shell.events.trigger('post_run_cell', None),  # what IPython does outside the cell
+    ):
+        talker = workspace.run('talker_pkg', 'talker')
+        talker.wait_for('Publishing')
+        shell.run_cell('1 + 1')
+        assert talker.running
+        interrupt()
+        assert not talker.running

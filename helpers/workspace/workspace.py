@@ -316,8 +316,8 @@ def write(line: str, cell: str) -> None:
 
 
 def _after_cell(result) -> None:
-    """End the processes when a cell was interrupted."""
-    if isinstance(result.error_in_exec, KeyboardInterrupt):
+    """End the processes when a cell was interrupted, in its code or in IPython's (no result)."""
+    if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
         _close()
 
 
