@@ -21,7 +21,6 @@ from test_msgs.action import Fibonacci
 from helpers.replay.levels import LEVELS, level
 from helpers.replay.script import source
 from helpers.session import ros_session
-from tools.lessons.lesson import lessons
 
 GLUE = """
 // Play with numbers that say which choice is tried, and go round in them.
@@ -226,20 +225,6 @@ def test_rclpy_did_what_the_level_says(script, goal, variant):
     followed = script.call('follow', variant.setup, goal, moves)
     assert sorted(map(tuple, followed['lost'])) == lost
     assert followed['score'] == variant.rclpy
-
-
-def test_who_gets_an_answer_is_what_rclpy_did():
-    """The real run is that of lesson 06: its table, as it is saved there."""
-    (lesson,) = (one for one in lessons() if one.name == 'call_a_service_from_a_callback')
-    texts = [
-        output.get('data', {}).get('text/plain', '')
-        for cell in lesson.notebook.cells
-        for output in cell.get('outputs', [])
-    ]
-    (table,) = (text for text in texts if 'done callback' in text and 'Reentrant' in text)
-    answers = re.findall('yes|no', table.partition('\n')[2].replace('one', ''))[::3]
-    said = [variant.rclpy for variant in level('deadlock').variants().values()]
-    assert ['no' if unfinished else 'yes' for unfinished in said] == answers
 
 
 def cancelled_job(setup):

@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 import time
+from copy import deepcopy
 from html import unescape
 from pathlib import Path
 from urllib.parse import unquote
@@ -29,6 +30,7 @@ from support.runs import (
 
 from helpers.queue_model import explain, predict
 from helpers.replay import replay, side_by_side
+from helpers.replay.levels import level
 from tools.lessons.lesson import lessons
 
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
@@ -198,25 +200,11 @@ ORDERS = [], ['resume', 'go', 'end', 'take'], ['take', 'end', 'resume', 'go']
 
 
 def services(threads, groups, does):
-    """A timer asks a service of another node, as lesson 06 does. The tick is there at the start."""
-    exclusive = groups != 'Reentrant'
-    return {
-        'threads': [f'thread {number + 1}' for number in range(threads)],
-        'groups': [{'name': name, 'exclusive': exclusive} for name in ('driver', 'own')]
-        + [{'name': 'camera', 'exclusive': True}],
-        'callbacks': [
-            {'name': 'timer', 'word': 'tick', 'group': 0, 'depth': 1, 'does': [does, {'work': 1}]},
-            {'name': 'look', 'word': 'request', 'group': 2, 'depth': 10, 'does': [{'work': 1}]},
-            {
-                'name': 'client',
-                'word': 'answer',
-                'group': 1 if groups == 'two groups' else 0,
-                'depth': 10,
-                'does': [],
-            },
-        ],
-        'arrivals': [{'at': 0, 'callback': 0, 'seq': 0}],
-    }
+    """A timer asks a service of another node, as in the level of lesson 06."""
+    setup = deepcopy(level('deadlock').variants()[threads, groups].setup)
+    setup['callbacks'][0]['does'] = [does, {'work': 1}]
+    setup['callbacks'][1]['does'] = [{'work': 1}]
+    return setup
 
 
 def lesson_06():
@@ -247,13 +235,16 @@ def test_who_gets_an_answer_is_what_rclpy_did(script):
                     assert going_on != answered
                 found.append('yes' if answered else 'no')
     assert found == lesson_06()
+    said = [variant.rclpy for variant in level('deadlock').variants().values()]
+    assert ['no' if unfinished else 'yes' for unfinished in said] == found[::3]  # of `call`
 
 
 def test_a_circle_is_said(script):
     one_group = script.call('play', services(2, 'one group', {'call': 1, 'client': 2}))
     assert [it['says'] for it in one_group['circle']] == [
         'Tick 0 of timer waits for an answer. '
-        'The answer is there, but client is in driver, which tick 0 of timer holds.'
+        'The answer is there, but client is in the group of timer and client, which tick 0 of '
+        'timer holds.'
     ]
     one_thread = script.call('play', services(1, 'two groups', {'call': 1, 'client': 2}))
     assert [it['says'] for it in one_thread['circle']] == [
