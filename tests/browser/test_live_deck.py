@@ -1,9 +1,9 @@
 """In front of a class: what is typed stays where it was typed, and the deck where it was."""
 
-from lab_page import PANEL, printed
+from lab_page import PANEL, SLIDES_SHOWN, printed
 from lab_server import ROOT
 
-LESSON = '02_lose_messages.ipynb'
+LESSON, NEXT = '02_lose_messages.ipynb', '03_run_callbacks_in_parallel.ipynb'
 SAVED = f'() => !{PANEL}.context.model.dirty'
 AUTOSAVE = f'() => {PANEL}.context.save()'  # what JupyterLab's timer does
 REPLAY = """from helpers.queue_model import predict
@@ -135,6 +135,25 @@ def test_the_deck_stays_where_it_was(deck):
     deck.page.keyboard.press('Escape')
     deck.page.wait_for_function(IN_SIGHT)
     assert deck.active() == place
+
+
+def test_the_next_lesson_is_shown_from_its_link_and_after_each_reload(deck):
+    deck.present(LESSON)
+    deck.press('End')
+    deck.page.locator('.jp-deck-mod-onscreen a', has_text='03 Run').click()
+    deck.wait_for_notebook(f'presentation/{NEXT}')
+    deck.page.wait_for_function(SLIDES_SHOWN)
+    deck.page.keyboard.press('Home')
+    deck.wait_for_slide(0)
+    place = deck.press('Space')
+    for _ in range(2):
+        deck.page.reload()
+        deck.wait_for_notebook(f'presentation/{NEXT}')
+        deck.wait_for_slide(place)
+        deck.page.keyboard.press('Escape')
+        deck.page.wait_for_function(IN_SIGHT)
+        assert deck.page.evaluate(f'() => {PANEL}.context.path') == f'presentation/{NEXT}'
+        assert deck.active() == place
 
 
 def test_from_the_first_slide_all_come_again(deck):

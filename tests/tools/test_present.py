@@ -52,6 +52,8 @@ def test_what_was_typed_is_kept_until_it_is_thrown_away(root, capsys):
     assert 'NEW=yes' in capsys.readouterr().err
     assert code(made(root, '02', '--new')).source == 'newer()'
     assert code(other).source == 'typed()'
+    made(root, '01 02', '--new')
+    assert code(other).source == 'run()'
 
 
 def test_a_copy_in_which_nothing_happened_follows_its_lesson(root):
@@ -65,7 +67,7 @@ def test_a_copy_in_which_nothing_happened_follows_its_lesson(root):
     assert code(other).source == 'newer()'
 
 
-@pytest.mark.parametrize('number', ['', '03', '01 02'])
+@pytest.mark.parametrize('number', ['', '03', '01 03'])
 def test_a_wrong_number_is_told_in_one_sentence(root, capsys, number):
     assert present.main([number, '--root', str(root)]) == 1
     assert capsys.readouterr().err.count('\n') == 1

@@ -18,6 +18,7 @@ const ACTIONS = {
   'Shift  ': 'back',
   PageUp: 'back',
   Home: 'first',
+  End: 'last',
   b: 'black',
   '.': 'black',
   n: 'notes',
@@ -38,6 +39,11 @@ function activate(app, manager) {
     const presenter = manager._presenters.find(one => one.id === 'notebooks');
     keepEditing(presenter);
     keepPlace(presenter, app.serviceManager);
+    // The slideshow remembers that it was left. A page of `make present` begins with slides.
+    void manager._settings.then(settings => settings.set('active', true));
+    // Of a page that was loaded with slides, JupyterLab keeps other open notebooks back, and puts
+    // them in the place of this one when the slides are left.
+    void app.restored.then(() => (app.shell._layoutRestorer._deferred.length = 0));
     window.addEventListener('message', ({ source, data }) => {
       const frame = document.getElementById('deck-guesses');
       if (source !== frame?.contentWindow) return;
@@ -164,6 +170,9 @@ function act(action, manager, presenter) {
     case 'first':
       presenter._extents.delete(content.model); // each slide begins with its first part again
       content.activeCellIndex = 0;
+      return;
+    case 'last':
+      content.activeCellIndex = content.widgets.length - 1;
       return;
     case 'black':
       document.body.classList.toggle('deck-black');
