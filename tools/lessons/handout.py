@@ -110,6 +110,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--root', type=Path, default=ROOT)
     options = parser.parse_args(arguments)
     output = options.root / 'handout' / f'{NAME}.tar.gz'
+    if options.wheels:
+        print('Fetching the packages, about 200 MB', file=sys.stderr)
     try:
         solutions, pythons = not options.no_solutions, tuple(options.wheels)
         handout(options.root, output, solutions=solutions, pythons=pythons)

@@ -1,5 +1,7 @@
 """What the instructor's notes of a lesson say: of a step, and how many minutes they plan."""
 
+import re
+
 from nbconvert.filters import markdown2html
 from nbformat import NotebookNode
 
@@ -19,7 +21,12 @@ def of_step(cells: list[NotebookNode], at: int) -> dict:
     return {
         'lesson': first_heading(cells[0].source),
         'step': first_heading(cells[step].source),
-        'notes': ''.join(markdown2html(cells[i].source) for i in for_it),
+        'notes': ''.join(markdown2html(_with_breaks(cells[i].source)) for i in for_it),
         'planned': sum(minutes[i] for i in before),
         'all': sum(minutes.values()),
     }
+
+
+def _with_breaks(source: str) -> str:
+    """Return a text whose lines stay lines in Markdown."""
+    return re.sub(r'(?<=\S)\n(?=\S)', '  \n', source)
