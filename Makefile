@@ -77,7 +77,7 @@ soak: set_up ## run the notebooks in hard conditions, as root: N=10 times, CONDI
 		$(if $(LESSON),--lesson "$(LESSON)")
 
 bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="latency model" for some
-	@$(PYTHON) -m benchmarks $(ONLY)
+	@PYTHONPATH=tests $(PYTHON) -m benchmarks $(ONLY)
 
 lint: set_up ## ruff: style and format of modules and notebooks
 	@.venv/bin/ruff check && .venv/bin/ruff format --check

@@ -5,83 +5,47 @@ from __future__ import annotations
 import csv
 import json
 import os
-import re
-import subprocess
-import sys
 import tempfile
 import threading
 import time
 import urllib.request
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 
 import nbformat
 from jupyter_client.manager import KernelManager
+from support.classes import NAME, RunningClass, event, running_class
 
 from helpers.progress import FILE_VARIABLE
 from tools.class_server.lessons import Known
-from tools.lessons.lesson import FOLDER, read
+from tools.lessons.lesson import FOLDER, ROOT, read
 
-NAME = 'lose_messages'
 KERNELS, SEATS, EVENTS, MINUTE_S = 12, 28, 30, 60.0
 PROBE_EVERY_S = 1.0
-STARTED = re.compile(
-    r"join_class\('(.*)', '(.*)'\)[\s\S]*(http://localhost:\d+/\w+/)[\s\S]*Ctrl\+C"
-)
 
 
-@contextmanager
-def held_class(folder: Path):
-    """Hold a class; yield its address, its code and its page."""
-    command = [sys.executable, '-u', '-m', 'tools.class_server', '--no-browser', '--port', '0']
-    with subprocess.Popen(
-        command,
-        env=os.environ | {'JUPYTER_CONFIG_DIR': str(folder)},
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
-        said = ''
-        while not (found := STARTED.search(said)):
-            said += process.stdout.readline()
-        yield found.groups()
-        process.kill()
-
-
-def post(address: str, path: str, body: dict, token: str = '') -> dict:
-    """Send a message as a student's computer does."""
-    request = urllib.request.Request(
-        f'http://{address}/{path}', json.dumps(body).encode(), {'Authorization': f'token {token}'}
-    )
-    with urllib.request.urlopen(request, timeout=60) as answer:
-        return json.load(answer)
-
-
-def tell_for_a_minute(address: str, code: str, question: str, seat: int) -> None:
+def tell_for_a_minute(opened: RunningClass, question: str, seat: int) -> None:
     """Tell the guesses of a seat, evenly over a minute."""
-    token = post(address, 'join', {'code': code})['token']
+    token = opened.join()
     start = time.monotonic()
     for number in range(EVENTS):
         time.sleep(max(0, start + (number + seat / SEATS) * MINUTE_S / EVENTS - time.monotonic()))
-        event = {'id': f'{number:016x}', 'kind': 'guess', 'lesson': NAME}
-        post(
-            address, 'events', {'events': [event | {'question': question, 'value': number}]}, token
-        )
+        opened.tell(token, event(number=number, question=question, value=number))
 
 
-def probe(address: str, code: str, page: str, over: threading.Event) -> list[float]:
+def probe(opened: RunningClass, over: threading.Event) -> list[float]:
     """Raise and lower a hand again and again; return after how many seconds the page showed it."""
-    seat = post(address, 'join', {'code': code})
+    token = opened.join(name='probe')
     shown: dict[bool, float] = {}
     seen = threading.Event()
 
     def read() -> None:
-        with urllib.request.urlopen(f'{page}live') as live:
+        with urllib.request.urlopen(f'{opened.page}live') as live:
             for line in live:
                 if line.startswith(b'data: '):
                     hands = json.loads(line.removeprefix(b'data: '))['hands']
-                    up = any(hand['seat'] == seat['seat'] for hand in hands)
+                    up = any(hand['name'] == 'probe' for hand in hands)
                     shown.setdefault(up, time.monotonic())
                     seen.set()
 
@@ -94,8 +58,7 @@ def probe(address: str, code: str, page: str, over: threading.Event) -> list[flo
         up = number % 2 == 0
         shown.pop(up, None)
         start = time.monotonic()
-        event = {'id': f'{number:016x}', 'kind': 'hand', 'lesson': NAME, 'up': up}
-        post(address, 'events', {'events': [event]}, seat['token'])
+        opened.tell(token, event('hand', number, up=up))
         while up not in shown and not over.is_set():
             time.sleep(0.005)
         if up in shown:
@@ -152,24 +115,25 @@ def class_of_40() -> tuple[list[float], list[float], list[float]]:
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         (folder / 'without').mkdir()
-        without = run_lessons(folder / 'without', 'pass')
         (folder / 'with').mkdir()
-        with held_class(folder / 'class') as (address, code, page), ThreadPoolExecutor() as pool:
+        lessons = '--root', str(ROOT)
+        with running_class(folder / 'class', *lessons) as opened, ThreadPoolExecutor() as pool:
+            without = run_lessons(folder / 'without', 'pass')
             over = threading.Event()
-            delays = pool.submit(probe, address, code, page, over)
+            delays = pool.submit(probe, opened, over)
             tellers = [
-                threading.Thread(target=tell_for_a_minute, args=(address, code, questions[0], n))
+                threading.Thread(target=tell_for_a_minute, args=(opened, questions[0], n))
                 for n in range(SEATS)
             ]
             for teller in tellers:
                 teller.start()
-            join = f'from helpers.classroom import *\njoin_class({address!r}, {code!r})'
+            join = 'from helpers.classroom import *\n'
+            join += f'join_class({opened.address!r}, {opened.code!r})'
             inside = run_lessons(folder / 'with', join)
             for teller in tellers:
                 teller.join()
             over.set()
-            with urllib.request.urlopen(f'{page}class.csv') as answer:
-                rows = list(csv.reader(answer.read().decode().splitlines()))[1:]
+            rows = list(csv.reader(opened.csv()))[1:]
             delays = delays.result()
     told = Counter(row[2] for row in rows if row[5] == 'guess')
     wanted = sorted([EVENTS] * SEATS + [len(questions)] * KERNELS)
