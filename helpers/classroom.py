@@ -44,7 +44,7 @@ BATCH = 50
 WAITING = 1000  # events that are kept while the class does not answer; the oldest ones go first
 LARGEST = 2**53  # of numbers, which a browser holds exactly
 TEXT = 200  # letters of a text, at most
-ITEMS = 20  # of a list, a set or a dict, at most
+ITEMS = 20  # of a list or a set, at most
 UNUSABLE = 'The class hears nothing, because {} cannot be used ({}): remove it, then join again.'
 NOT_JOINED = 'You are in no class: join_class(address, code) joins one.'
 SENT = (
@@ -73,7 +73,7 @@ def guess(question: str, value: object) -> object:
     """Return the value. Where there is a class, tell it in the background.
 
     The class counts the last guess of each student, of questions that the lesson has. The value
-    is a number, True or False, a text, or a few of them in a list, a tuple, a set or a dict.
+    is a number, True or False, a text, or a few of them in a list, a tuple or a set.
     """
     _tell('guess', question=question, value=value)
     _outbox.say_trouble()
@@ -238,7 +238,7 @@ def _tell(kind: str, **what: object) -> None:
         return
     with suppress(Exception):  # a value that no class can show; no lesson may fail because of it
         if 'value' in what:
-            what['value'] = _small(what['value'])
+            what['value'] = small(what['value'])
         _outbox.put({'id': secrets.token_hex(8), 'kind': kind, 'lesson': lesson, **what})
 
 
@@ -308,7 +308,7 @@ def _ask(known: Class, what: str, body: object) -> dict:
         raise OSError(str(problem)) from None
 
 
-def _small(value: object, deep: int = 0) -> object:
+def small(value: object, inside: bool = False) -> object:
     """Return a value as JSON holds it. Raises TypeError for one that a page could not show."""
     value = value.tolist() if hasattr(value, 'tolist') else value
     if isinstance(value, Set):
@@ -319,10 +319,8 @@ def _small(value: object, deep: int = 0) -> object:
         or (isinstance(value, str) and len(value) <= TEXT)
     ):
         return value
-    if deep < 2 and isinstance(value, list | tuple | range | dict) and len(value) <= ITEMS:
-        if isinstance(value, dict):
-            return {str(key): _small(item, deep + 1) for key, item in value.items()}
-        return [_small(item, deep + 1) for item in value]
+    if not inside and isinstance(value, list | tuple | range) and len(value) <= ITEMS:
+        return [small(item, inside=True) for item in value]
     raise TypeError
 
 

@@ -29,6 +29,7 @@ NAME = 'lose_messages'
 QUESTION = 'How many are heard?'
 OTHER = 'Which ones?'
 STEP, LATER = 'step-1', 'step-2'  # ids of cells
+PREDICT = {'tags': ['predict']}
 FORK = multiprocessing.get_context('fork')
 OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
@@ -43,11 +44,15 @@ def write_lesson(root: Path) -> None:
             id='note',
             metadata={'tags': ['notes']},
         ),
-        new_code_cell(f'my_guess = guess({QUESTION!r}, 41)', id=STEP),
-        new_code_cell(f'%matplotlib inline\nmy_ones = guess({OTHER!r}, [1])', id='magic'),
+        new_code_cell(f'my_guess = guess({QUESTION!r}, 41)', id=STEP, metadata=PREDICT),
+        new_code_cell(
+            f'%matplotlib inline\nmy_ones = guess({OTHER!r}, {{2, 10}})',
+            id='magic',
+            metadata=PREDICT,
+        ),
         new_markdown_cell('## 2. Look', id='heading-2'),
-        new_code_cell('1 + 1', id=LATER),
-        new_code_cell('this is no Python', id='broken'),
+        new_code_cell(f'compare_prediction({QUESTION!r}, my_guess, 14)', id=LATER),
+        new_code_cell('this is no Python', id='broken', metadata=PREDICT),
         new_markdown_cell('### Exercise 1: Try', id='exercise'),
     ]
     (root / 'notebooks').mkdir(parents=True, exist_ok=True)
@@ -127,7 +132,7 @@ class RunningClass:
 
     def join(self, **what: str) -> str:
         """Take a seat, and return its token."""
-        status, answer = self.post('join', {'code': self.code} | what)
+        status, answer = self.post('join', {'code': self.code, 'name': ''} | what)
         assert status == 200, answer
         return answer['token']
 

@@ -18,7 +18,7 @@ from tools.addresses import in_networks
 from tools.class_server import folder, page_file
 from tools.class_server.lessons import Known
 from tools.class_server.store import Class
-from tools.class_server.web import Room, application, follow_class, serve
+from tools.class_server.web import Room, application, serve
 from tools.lessons.lesson import GLOSSARY, ROOT, lessons
 
 FILE = 'class.sqlite'
@@ -39,15 +39,16 @@ async def hold(store: Class, options: argparse.Namespace) -> None:
     sockets = bind_sockets(options.port, address, socket.AF_INET)
     server = serve(application(room), sockets, tls or None)
     port = sockets[0].getsockname()[1]
-    scheme = 'https' if tls else 'http'
-    page = f'{scheme}://localhost:{port}/{store.secret}/'
-    wall = [f'{"https://" if tls else ""}{one}:{port}' for one in in_networks()]
-    joins = [
-        f"join_class('{one}', '{store.code}')"
-        for one in (options.lan and wall or [f'{"https://" if tls else ""}127.0.0.1:{port}'])
+    page = f'{"https" if tls else "http"}://localhost:{port}/{store.secret}/'
+    one, *others = (options.lan and in_networks()) or ['127.0.0.1']
+    room.joins = [
+        '# Type this into a new cell of a lesson, then press Shift+Enter:',
+        'from helpers.classroom import *',
+        f"join_class('{'https://' if tls else ''}{one}:{port}', '{store.code}')",
     ]
-    room.joins = ['from helpers.classroom import *', *joins]
     print('For the wall:', *room.joins, sep='\n    ')
+    if others:
+        print(f'In the place of {one}, for students in other networks:', *others)
     print('Your page:', page, sep='\n    ')
     if not options.lan:
         print('Only this machine can join. LAN=yes lets the networks of this machine in.')
@@ -57,11 +58,9 @@ async def hold(store: Class, options: argparse.Namespace) -> None:
     page_file().write_text(page)
     if options.browser:
         webbrowser.open(page)
-    following = asyncio.create_task(follow_class(room))
     try:
         await over.wait()
     finally:
-        following.cancel()
         page_file().unlink(missing_ok=True)
         server.stop()
         await server.close_all_connections()

@@ -32,26 +32,27 @@ function put(id, state, draw) {
   find(id).replaceChildren(...state.map(draw));
 }
 
-function guess({ question, cell, answered, shown: open, bars = [], measured = [], by }, seats) {
+// The first one is shown of what differs in capitals only.
+const same = (one, other) => one.toLowerCase() === other?.toLowerCase();
+
+function guess({ question, answered, shown: open, bars = [], given, measured = [], by }, seats) {
   const box = element('article');
   const count = element('p', `${answered} of ${seats} have answered `, { className: 'count' });
   count.append(button(open ? 'Hide' : 'Show', open ? 'hide' : 'show', { question }));
   box.append(element('h2', question), count);
   if (!open) return box;
-  const most = Math.max(...bars.map(bar => bar.count));
   const list = element('ol', '', { className: 'bars' });
   for (const { label, count } of bars) {
-    const right = measured[0] === label;
+    const right = same(label, measured[0]);
     const row = element('li', '', { className: right ? 'right' : '' });
-    const bar = element('span', '', { className: 'bar' });
-    bar.style.width = `${(100 * count) / most}%`;
-    const line = element('span', '', { className: 'line' });
-    line.append(bar);
-    row.append(element('span', `${right ? '✓ ' : ''}${label}`, { className: 'label' }), line);
-    row.append(element('span', count, { className: 'number' }));
+    const bar = element('span', count, { className: same(label, given) ? 'bar given' : 'bar' });
+    bar.style.setProperty('--share', count / answered);
+    row.append(element('span', `${right ? '✓ ' : ''}${label}`, { className: 'label' }), bar);
     list.append(row);
   }
   box.append(list);
+  if (bars.some(({ label }) => same(label, given)))
+    box.append(element('p', `Striped: ${given} stood there before anybody wrote a guess`, { className: 'measured' }));
   if (by) box.append(element('p', `Measured by ${by}: ${measured.join('; ')}`, { className: 'measured' }));
   return box;
 }
@@ -60,7 +61,9 @@ function show(state) {
   const [, cell] = location.hash.match(/^#cell=(.*)/) ?? [];
   document.body.className = cell ? 'slide' : location.hash === '#wall' ? 'wall' : '';
   find('trouble').textContent = '';
-  for (const id of ['seats', 'gone', 'planned', 'all', 'step']) find(id).textContent = state[id];
+  const { planned, all, gone } = state;
+  const texts = { ...state, of_step: planned - gone, of_lesson: all - gone };
+  for (const id of ['seats', 'of_step', 'of_lesson', 'step']) find(id).textContent = texts[id];
   put('lessons', state.lessons, ({ name, title, here, now }) =>
     element('option', here ? `${title} (${here})` : title, { value: name, selected: now }));
   const { name } = state.lessons.find(lesson => lesson.now);
@@ -72,7 +75,7 @@ function show(state) {
     step.append(go);
     return step;
   });
-  const guesses = state.guesses.filter(one => !cell || one.cell === cell);
+  const guesses = state.guesses.filter(one => !cell || one.cells.includes(cell));
   put('guesses', guesses.map(one => ({ ...one, seats: state.seats })), one => guess(one, state.seats));
   put('hands', state.hands, ({ seat, name }) => {
     const hand = element('li', name ? `${name} (seat ${seat}) ` : `Seat ${seat} `);

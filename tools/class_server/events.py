@@ -11,57 +11,29 @@ NUMBER = {'type': 'number', 'minimum': -(2**53), 'maximum': 2**53}
 PRINTABLE = r'^[^\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]*\Z'
 TEXT = {'type': 'string', 'maxLength': 200, 'pattern': PRINTABLE}
 PLAIN = {'anyOf': [{'type': 'boolean'}, NUMBER, TEXT]}
+VALUE = {'anyOf': [PLAIN, {'type': 'array', 'maxItems': 20, 'items': PLAIN}]}
 
 
-def _nested(inner: dict) -> dict:
-    items = {'type': 'array', 'maxItems': 20, 'items': inner}
-    named = {'type': 'object', 'maxProperties': 20, 'additionalProperties': inner}
-    return {'anyOf': [PLAIN, items, named | {'propertyNames': TEXT}]}
+def _form(**fields: dict) -> Draft202012Validator:
+    """Return the form of an object that has these fields and no others."""
+    form = {'type': 'object', 'properties': fields, 'required': [*fields]}
+    return Draft202012Validator(form | {'additionalProperties': False})
 
 
-def _kind(kind: str, **what: dict) -> dict:
-    properties = {
-        'id': {'type': 'string', 'pattern': r'^[0-9a-f]{16}\Z'},
-        'kind': {'const': kind},
-        'lesson': {'type': 'string', 'maxLength': 80},
-        **what,
-    }
-    return {
-        'type': 'object',
-        'properties': properties,
-        'required': list(properties),
-        'additionalProperties': False,
-    }
-
-
-VALUE = _nested(_nested(PLAIN))
-KINDS = {
-    'guess': _kind('guess', question=TEXT, value=VALUE),
-    'outcome': _kind('outcome', question=TEXT, value=VALUE),
-    'exercise': _kind('exercise', exercise={'type': 'integer'}, solved={'type': 'boolean'}),
-    'cell': _kind('cell', cell=TEXT),
-    'hand': _kind('hand', up={'type': 'boolean'}),
+EVENT = {
+    'id': {'type': 'string', 'pattern': r'^[0-9a-f]{16}\Z'},
+    'kind': TEXT,
+    'lesson': TEXT,
 }
-FORMS = {kind: Draft202012Validator(schema) for kind, schema in KINDS.items()}
-ENVELOPE = Draft202012Validator(
-    {
-        'type': 'object',
-        'properties': {'events': {'type': 'array', 'maxItems': 50}},
-        'required': ['events'],
-        'additionalProperties': False,
-    }
-)
-NAME = Draft202012Validator(
-    {
-        'type': 'object',
-        'properties': {
-            'code': {'type': 'string', 'maxLength': 60},
-            'name': TEXT | {'maxLength': 40},
-        },
-        'required': ['code'],
-        'additionalProperties': False,
-    }
-)
+KINDS = {
+    'guess': _form(**EVENT, question=TEXT, value=VALUE),
+    'outcome': _form(**EVENT, question=TEXT, value=VALUE),
+    'exercise': _form(**EVENT, exercise={'type': 'integer'}, solved={'type': 'boolean'}),
+    'cell': _form(**EVENT, cell=TEXT),
+    'hand': _form(**EVENT, up={'type': 'boolean'}),
+}
+EVENTS = _form(events={'type': 'array', 'maxItems': 50})
+JOIN = _form(code=TEXT, name=TEXT | {'maxLength': 40})
 
 
 def parse(body: bytes, form: Draft202012Validator) -> dict:
@@ -83,7 +55,7 @@ def _refuse(constant: str) -> None:
 def is_event(event: object) -> bool:
     """Return whether an event has the form of its kind."""
     kind = event.get('kind') if isinstance(event, dict) else None
-    return isinstance(kind, str) and kind in FORMS and FORMS[kind].is_valid(event)
+    return isinstance(kind, str) and kind in KINDS and KINDS[kind].is_valid(event)
 
 
 class Limit:

@@ -1,20 +1,30 @@
 """What a class knows of the lessons: steps, exercises and guesses, read from the notebooks."""
 
-import ast
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
-from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
 
+from helpers.classroom import small
+from tools.lessons.code import guess_of
 from tools.lessons.lesson import Lesson, first_heading
+from tools.lessons.notes import of_step
 from tools.lessons.slides import heading
+
+
+class Guess(NamedTuple):
+    """A question of a lesson: the cells that ask it and that compare it, by their ids."""
+
+    asked: str
+    compared: str
+    given: object  # what the cell holds before anybody writes a guess
 
 
 @dataclass(frozen=True)
 class Known:
-    """A notebook of the class. Steps, exercises and guesses are known by the index of a cell."""
+    """A notebook of the class. Steps are known by their number, the opening is 0."""
 
     lesson: Lesson
 
@@ -29,46 +39,41 @@ class Known:
         return first_heading(self.cells[0].source)
 
     @cached_property
-    def steps(self) -> list[int]:
-        """The cells with which its steps begin, the opening first."""
+    def starts(self) -> list[int]:
+        """The indices of the cells with which its steps begin."""
         return [i for i, cell in enumerate(self.cells) if i == 0 or heading(cell, '## ')]
 
     @cached_property
-    def step_of(self) -> dict[str, int]:
-        """For each cell's id the number of its step, counted from 0."""
-        step, found = 0, {}
-        for index, cell in enumerate(self.cells):
-            step += index in self.steps[1:]
-            found[cell.id] = step
-        return found
+    def notes(self) -> list[dict]:
+        """For each step its title, its notes, and the minutes that they plan."""
+        return [of_step(self.cells, start) for start in self.starts]
+
+    def step_at(self, cell: int) -> int:
+        """Return the step of the cell with an index."""
+        return sum(start <= cell for start in self.starts) - 1
 
     @cached_property
-    def guesses(self) -> dict[str, str]:
-        """For each question of a call `guess('How many?', 41)` the id of its cell."""
-        return {
-            question: cell.id
-            for cell in self.cells
-            if cell.cell_type == 'code'
-            for question in _guessed(cell.source)
-        }
+    def step_of(self) -> dict[str, int]:
+        """For each cell's id its step."""
+        return {cell.id: self.step_at(index) for index, cell in enumerate(self.cells)}
+
+    @cached_property
+    def guesses(self) -> dict[str, Guess]:
+        """By question what is guessed."""
+        found = {}
+        for index, cell in enumerate(self.cells):
+            if guess := guess_of(cell):
+                _, question, value = guess
+                later = (
+                    one.id
+                    for one in self.cells[index + 1 :]
+                    if one.cell_type == 'code' and repr(question) in one.source
+                )
+                found[question] = Guess(cell.id, next(later, cell.id), small(value))
+        return found
 
     @cached_property
     def exercises(self) -> list[int]:
         """The numbers of its exercises."""
         text = '\n'.join(cell.source for cell in self.cells if cell.cell_type == 'markdown')
         return sorted(set(map(int, re.findall(r'^### Exercise (\d+)', text, re.MULTILINE))))
-
-
-def _guessed(source: str) -> list[str]:
-    try:
-        tree = ast.parse(TransformerManager().transform_cell(source))
-    except SyntaxError:  # of a lesson that is being written
-        return []
-    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call) and node.args]
-    return [
-        call.args[0].value
-        for call in calls
-        if getattr(call.func, 'id', '') == 'guess'
-        and isinstance(call.args[0], ast.Constant)
-        and isinstance(call.args[0].value, str)
-    ]

@@ -16,13 +16,13 @@ from collections import Counter
 from pathlib import Path
 
 from tools.class_server import events
-from tools.class_server.lessons import Known
+from tools.class_server.lessons import Guess, Known
 
 WORDS = Path(__file__).with_name('words.txt').read_text().split()
 CODE_WORDS = 3  # of 256: 24 bits
 SEATS = 500
 EVENTS_OF_SEAT = 5000
-BARS = 10
+BARS = 8
 TABLES = """
 PRAGMA journal_mode = WAL;
 CREATE TABLE IF NOT EXISTS class (code TEXT, secret TEXT);
@@ -53,7 +53,6 @@ class Class:
                 self._db.execute('INSERT INTO class VALUES (?, ?)', (code, secrets.token_hex(8)))
         self.code, self.secret = self._db.execute('SELECT code, secret FROM class').fetchone()
         self.went_on = self._db.execute('SELECT 1 FROM events').fetchone() is not None
-        self.changes = 0  # counted, so that the page knows when to look
         self.shown: set[tuple[str, str]] = set()  # lesson and question
         self._latest: dict[tuple, dict[int, object]] = {}
         for row in self._db.execute(
@@ -75,7 +74,6 @@ class Class:
                 'ON CONFLICT (token) DO UPDATE SET name = excluded.name',
                 (_hash(token), name),
             )
-        self.changes += 1
         return self.seat(token)
 
     def seat(self, token: str) -> int | None:
@@ -90,7 +88,6 @@ class Class:
             self._db.execute('DELETE FROM events WHERE seat = ?', [seat])
         for answers in self._latest.values():
             answers.pop(seat, None)
-        self.changes += 1
 
     # Events
 
@@ -111,7 +108,6 @@ class Class:
                 new = self._db.execute(INSERT, row)
                 if new.rowcount:
                     self._note(seat, *row[3:])
-        self.changes += 1
         return refused
 
     def lower(self, seat: int) -> None:
@@ -159,16 +155,16 @@ class Class:
             ],
             'steps': [
                 {
-                    'title': known.cells[index].source.splitlines()[0].lstrip('# '),
+                    'title': notes['step'],
                     'here': at[lesson, number],
                     'now': number == step,
                 }
-                for number, index in enumerate(known.steps)
+                for number, notes in enumerate(known.notes)
             ],
             'guesses': [
-                self._guesses(lesson, question, cell)
-                for question, cell in known.guesses.items()
-                if known.step_of[cell] == step
+                self._guesses(lesson, question, guess)
+                for question, guess in known.guesses.items()
+                if known.step_of[guess.asked] <= step <= known.step_of[guess.compared]
             ],
             'exercises': [self._exercise(lesson, number, len(names)) for number in known.exercises],
             'hands': [
@@ -176,15 +172,17 @@ class Class:
             ],
         }
 
-    def _guesses(self, lesson: str, question: str, cell: str) -> dict:
+    def _guesses(self, lesson: str, question: str, guess: Guess) -> dict:
         answers = self._latest.get((lesson, 'guess', question), {})
-        found = {'question': question, 'cell': cell, 'answered': len(answers)}
+        cells = [guess.asked, guess.compared]
+        found = {'question': question, 'cells': cells, 'answered': len(answers)}
         if (lesson, question) not in self.shown:  # what is hidden does not leave the server
             return found | {'shown': False}
         measured = self._latest.get((lesson, 'outcome', question), {}).values()
         return found | {
             'shown': True,
             'bars': bars(list(answers.values())),
+            'given': label(guess.given),
             'measured': [label(value) for value, _ in _counted(measured)][:3],
             'by': len(measured),
         }
@@ -195,11 +193,11 @@ class Class:
         tried = len(tries) - solved
         return {'number': number, 'solved': solved, 'tried': tried, 'open': seats - len(tries)}
 
-    def busiest(self) -> tuple[str, int]:
-        """Return the lesson and the step at which most students are; else the first one."""
+    def busiest(self) -> tuple[str, int] | None:
+        """Return the lesson and the step at which most students are, None where nobody is."""
         places = self._latest.get(('', 'cell', ''), {}).values()
         if not places:
-            return next(iter(self.lessons)), 0
+            return None
         steps = Counter((name, self.lessons[name].step_of[cell]) for name, cell in places)
         return steps.most_common(1)[0][0]
 
@@ -225,7 +223,6 @@ class Class:
         self._db.execute('PRAGMA wal_checkpoint(TRUNCATE)')  # nor in its log
         self._latest.clear()
         self.shown.clear()
-        self.changes += 1
 
     def close(self) -> None:
         """Let go of the file."""
@@ -263,8 +260,6 @@ def label(value: object) -> str:
     """Return a value as a reader writes it."""
     if isinstance(value, list):
         return ', '.join(map(label, value)) or 'none'
-    if isinstance(value, dict):
-        return ', '.join(f'{key}: {label(item)}' for key, item in value.items()) or 'none'
     return f'{value:.6g}' if isinstance(value, float) else str(value)
 
 
@@ -279,16 +274,9 @@ def _counted(answers) -> list[tuple]:
 
 def _content(event: dict) -> tuple[str, str, str]:
     """Return kind, what and value, as the table holds them."""
-    kind = event['kind']
-    match kind:
-        case 'guess' | 'outcome':
-            return kind, event['question'], json.dumps(event['value'])
-        case 'exercise':
-            return kind, str(event['exercise']), json.dumps(event['solved'])
-        case 'cell':
-            return kind, '', json.dumps(event['cell'])
-        case _:
-            return kind, '', json.dumps(event['up'])
+    fields = events.KINDS[event['kind']].schema['properties']
+    *what, value = [event[field] for field in fields if field not in events.EVENT]
+    return event['kind'], str(what[0]) if what else '', json.dumps(value)
 
 
 def _hash(token: str) -> str:

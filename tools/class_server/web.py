@@ -12,7 +12,6 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from jupyter_core.paths import jupyter_config_dir
 from tornado import web
 from tornado.httpserver import HTTPServer
 from tornado.iostream import StreamClosedError
@@ -20,7 +19,7 @@ from tornado.iostream import StreamClosedError
 from tools.class_server import events
 from tools.class_server.events import Limit, parse
 from tools.class_server.store import Class
-from tools.lessons.notes import of_step
+from tools.lessons.present import deck
 
 HERE = Path(__file__).resolve().parent
 FILES = {'': 'text/html', 'class.css': 'text/css', 'class.js': 'text/javascript'}
@@ -32,12 +31,9 @@ HEADERS = {
     'Referrer-Policy': 'no-referrer',
     'X-Content-Type-Options': 'nosniff',
 }
-DECK = 'deck-*.jupyterlab-workspace'  # presenter.js keeps there where the slides are
 PAGE_EVERY_S = 0.25
-DECK_EVERY_S = 0.5
-SIGN_OF_LIFE_S = 15.0
 TOO_FAST = 'Too much at once: wait a minute.'
-WRONG_A_MINUTE = 10  # codes from an address; ten times as many from all together
+WRONG_A_MINUTE = 10  # codes from an address
 EVENTS_A_S, EVENTS_AT_ONCE = 20, 300  # of a seat
 
 
@@ -47,12 +43,11 @@ class Room:
     def __init__(self, store: Class, stop=lambda: None) -> None:
         self.store, self.stop = store, stop
         self.joins: list[str] = []  # what students type, for the wall
-        self.present = store.busiest()
+        self.present = next(iter(store.lessons)), 0
         self.follows_students = True  # until a deck or the instructor says where the class is
-        self._deck: object = self._place_of_deck()
+        self._deck = self._place_of(deck())
         self._began: dict[str, float] = {}
         self._limits: dict[tuple, Limit] = {}
-        self._all_wrong = Limit(WRONG_A_MINUTE / 6, 10 * WRONG_A_MINUTE)
 
     def limit(self, what: str, who: object, rate: float, burst: int) -> Limit:
         """Return the limit of somebody for something."""
@@ -60,45 +55,34 @@ class Room:
             self._limits.clear()
         return self._limits.setdefault((what, who), Limit(rate, burst))
 
-    def wrong_codes(self, address: str) -> list[Limit]:
-        """Return the limits of wrong codes: of an address, and of all."""
-        return [self._all_wrong, self.limit('wrong', address, WRONG_A_MINUTE / 60, WRONG_A_MINUTE)]
-
     def go_to(self, lesson: str, step: int) -> None:
         """Show this step. Raises LookupError where there is none."""
-        self.store.lessons[lesson].steps[step]
+        self.store.lessons[lesson].starts[step]
         self.present, self.follows_students = (lesson, step), False
-        self.store.changes += 1
 
-    def _place_of_deck(self) -> tuple[str, int] | None:
-        """Return the lesson and the cell at which `make present` is."""
-        with suppress(OSError, ValueError, LookupError):
-            [file] = Path(jupyter_config_dir(), 'lab', 'workspaces').glob(DECK)
-            deck = json.loads(file.read_text())['data']
-            lesson = Path(deck['current']).stem[3:]
-            if lesson in self.store.lessons:
-                return lesson, deck['places'].get(deck['current'], 0)
-        return None
+    def _place_of(self, slides: dict) -> tuple[str, int] | None:
+        path = slides.get('current', '')
+        known = self.store.lessons.get(Path(path).stem[3:])
+        return known and (known.lesson.name, known.step_at(slides['places'].get(path, 0)))
 
-    def follow(self) -> None:
-        """Go where the deck has gone since the last time, or else where most students are."""
-        deck = self._place_of_deck()
-        if deck != self._deck and deck:
-            lesson, cell = deck
-            steps = self.store.lessons[lesson].steps
-            self.go_to(lesson, sum(start <= cell for start in steps) - 1)
-        elif self.follows_students:
-            self.present = self.store.busiest()
-        self._deck = deck
+    def _gone(self, lesson: str, slides: dict) -> int:
+        """Return the minutes since the slides left the lesson's first one, or it was shown here."""
+        here = self._began.setdefault(lesson, time.time())
+        began = {Path(path).stem[3:]: at_s for path, at_s in slides.get('began', {}).items()}
+        return int(time.time() - began.get(lesson, here)) // 60
 
     def view(self) -> dict:
-        """Return all that the page shows."""
+        """Return all that the page shows: where the slides have gone, or most students are."""
+        slides = deck()
+        place = self._place_of(slides)
+        if place and place != self._deck:
+            self.go_to(*place)
+            self._deck = place
+        elif self.follows_students:
+            self.present = self.store.busiest() or self.present
         lesson, step = self.present
-        known = self.store.lessons[lesson]
-        notes = of_step(known.cells, known.steps[step])
-        began = self._began.setdefault(lesson, time.monotonic())
-        gone = int(time.monotonic() - began) // 60
-        return self.store.view(lesson, step) | notes | {'gone': gone, 'joins': self.joins}
+        shown = self.store.view(lesson, step) | self.store.lessons[lesson].notes[step]
+        return shown | {'gone': self._gone(lesson, slides), 'joins': self.joins}
 
 
 class Handler(web.RequestHandler):
@@ -124,14 +108,6 @@ class Handler(web.RequestHandler):
         self.finish({'error': f'This cannot be answered ({status_code}).'})
 
 
-class Nowhere(Handler):
-    """All other addresses."""
-
-    def prepare(self) -> None:
-        """Say that there is nothing."""
-        raise web.HTTPError(404)
-
-
 class Student(Handler):
     """The door of the students: what they tell comes in. Of others nothing goes out."""
 
@@ -149,21 +125,18 @@ class Student(Handler):
     def join(self) -> None:
         """Give who knows the code a seat; who has one keeps it."""
         store, address = self.room.store, self.request.remote_ip
-        wanted = parse(self.request.body, events.NAME)
-        wrong = self.room.wrong_codes(address)
-        if any(limit.left() < 1 for limit in wrong):
+        wanted = parse(self.request.body, events.JOIN)
+        wrong = self.room.limit('wrong', address, WRONG_A_MINUTE / 60, WRONG_A_MINUTE)
+        if wrong.left() < 1:
             self.refuse(429, TOO_FAST)
         elif not hmac.compare_digest(_letters(wanted['code']), _letters(store.code)):
-            for limit in wrong:
-                limit.take()
+            wrong.take()
             self.refuse(401, 'This is not the code of the class. Compare it with the wall.')
-        elif not self.room.limit('join', address, 1, 60).take():
-            self.refuse(429, TOO_FAST)
         else:
             token = self.token()
             if store.seat(token) is None:
                 token = secrets.token_hex(16)
-            self.finish({'seat': store.join(token, wanted.get('name', '')), 'token': token})
+            self.finish({'seat': store.join(token, wanted['name']), 'token': token})
 
     def events(self) -> None:
         """Take the events of a seat."""
@@ -175,7 +148,7 @@ class Student(Handler):
         if not limit.take():  # before anything is read
             self.refuse(429, TOO_FAST)
             return
-        messages = parse(self.request.body, events.ENVELOPE)['events']
+        messages = parse(self.request.body, events.EVENTS)['events']
         if not limit.take(len(messages)):
             self.refuse(429, TOO_FAST)
             return
@@ -193,7 +166,7 @@ class Instructor(Handler):
 
     def prepare(self) -> None:
         """Let nobody else in. They cannot tell this from an address that is not there."""
-        secret = self.path_args[0]
+        secret = self.path_args[0] or ''
         if not hmac.compare_digest(secret.encode(), self.room.store.secret.encode()):
             raise web.HTTPError(404)
 
@@ -213,19 +186,14 @@ class Instructor(Handler):
 
     async def _send_changes(self) -> None:
         self.set_header('Content-Type', 'text/event-stream')
-        sent, sent_at = None, 0.0
-        with suppress(StreamClosedError):
+        sent = ''
+        with suppress(StreamClosedError, asyncio.CancelledError):  # the page, or the class, is over
             while True:
-                view = json.dumps(self.room.view())
-                if view != sent or time.monotonic() - sent_at > SIGN_OF_LIFE_S:
+                if (view := json.dumps(self.room.view())) != sent:
                     self.write(f'data: {view}\n\n')
                     await self.flush()
-                    sent, sent_at = view, time.monotonic()
-                changes = self.room.store.changes
-                for _ in range(4):
-                    await asyncio.sleep(PAGE_EVERY_S)
-                    if changes != self.room.store.changes:
-                        break
+                    sent = view
+                await asyncio.sleep(PAGE_EVERY_S)
 
     def post(self, _secret: str, name: str) -> None:
         """Do what a button of the page says."""
@@ -249,7 +217,6 @@ class Instructor(Handler):
         except (ValueError, LookupError, TypeError):
             self.refuse(400, 'The page asked for what is not there.')
             return
-        store.changes += 1
         self.finish({})
 
 
@@ -263,8 +230,7 @@ def application(room: Room) -> web.Application:
     return web.Application(
         [
             (r'/(join|events|leave)', Student, {'room': room}),
-            (r'/(\w+)/(.*)', Instructor, {'room': room}),
-            (r'.*', Nowhere, {'room': room}),
+            (r'(?:/(\w+)/)?(.*)', Instructor, {'room': room}),
         ],
         log_function=lambda handler: None,  # addresses of students are kept nowhere
     )
@@ -285,10 +251,3 @@ def serve(
     )
     server.add_sockets(sockets)
     return server
-
-
-async def follow_class(room: Room) -> None:
-    """Look again and again where the deck and the students are."""
-    while True:
-        room.follow()
-        await asyncio.sleep(DECK_EVERY_S)

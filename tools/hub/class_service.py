@@ -20,7 +20,7 @@ from tornado.netutil import bind_sockets
 from tools.class_server import events
 from tools.class_server.__main__ import known_lessons
 from tools.class_server.store import Class
-from tools.class_server.web import Instructor, Nowhere, Room, Student, follow_class, serve
+from tools.class_server.web import Instructor, Room, Student, serve
 
 PREFIX = os.environ['JUPYTERHUB_SERVICE_PREFIX']
 
@@ -48,8 +48,8 @@ class HubStudent(HubOAuthenticated, Student):
 
     def join(self) -> None:
         """Say which seat the student has; the hub's login takes the place of the code."""
-        wanted = events.parse(self.request.body, events.NAME)
-        seat = self.room.store.join(self.token(), wanted.get('name', ''))
+        wanted = events.parse(self.request.body, events.JOIN)
+        seat = self.room.store.join(self.token(), wanted['name'])
         self.finish({'seat': seat, 'token': ''})
 
 
@@ -83,16 +83,13 @@ async def hold(store: Class) -> None:
             (f'{PREFIX}oauth_callback', HubOAuthCallbackHandler),
             (f'{PREFIX}(join|events|leave)', HubStudent, {'room': room}),
             (f'{PREFIX}()(.*)', HubInstructor, {'room': room}),
-            (r'.*', Nowhere, {'room': room}),
         ],
         cookie_secret=secrets.token_bytes(32),
         log_function=lambda handler: None,
     )
     where = urlsplit(os.environ['JUPYTERHUB_SERVICE_URL'])
     serve(application, bind_sockets(where.port, where.hostname, socket.AF_INET))
-    following = asyncio.create_task(follow_class(room))
     await over.wait()
-    following.cancel()
 
 
 if __name__ == '__main__':

@@ -16,13 +16,27 @@ import time
 from pathlib import Path
 
 import nbformat
+from jupyter_core.paths import jupyter_config_dir
 
 from tools.lessons import lesson
 from tools.lessons.clean import text_of
 from tools.lessons.slides import folded
 
 FOLDER = 'presentation'
+DECK = 'deck-d830.jupyterlab-workspace'  # so JupyterLab calls the file of its workspace `deck`
 MADE = '.made.json'  # the hash of each copy as it was made, and of what it was made from
+
+
+def deck() -> dict:
+    """Return what presenter.js keeps of the slides: `current`, `places` and `began`.
+
+    Nothing where there are no slides, or while JupyterLab writes the file. JupyterLab's own
+    `WorkspacesManager` reads it, too, but takes a second to import.
+    """
+    try:
+        return json.loads(Path(jupyter_config_dir(), 'lab/workspaces', DECK).read_text())['data']
+    except (OSError, ValueError):
+        return {}
 
 
 def _copy_of(source: str, outputs: bool) -> str:

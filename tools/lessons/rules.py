@@ -4,18 +4,17 @@ A rule looks at a lesson and yields a sentence for each thing that is wrong. EVE
 for all notebooks, LESSON those for lessons only. What `make notebooks` writes, tables.py compares.
 """
 
-import ast
 import re
 import sys
 from collections.abc import Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 
-from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
 from nbval.plugin import comment_markers, metadata_tags
 
 from helpers.progress import title_of
+from tools.lessons.code import guess_of
 from tools.lessons.lesson import FOLDED, FOLDER, GLOSSARY, LANGUAGES, NOTE, Lesson
 from tools.lessons.slides import PICTURE, SKIPPED, SLIDE, height
 
@@ -137,11 +136,6 @@ def exercises(lesson: Lesson) -> dict[str, list[NotebookNode]]:
             end = following[0] if following else len(cells)
             found[text] = [cell for cell in cells[index:end] if cell.cell_type == 'code']
     return found
-
-
-def last_statement(source: str) -> ast.stmt | None:
-    plain = TransformerManager().transform_cell(source)  # a magic becomes a call
-    return next(reversed(ast.parse(plain).body), None)
 
 
 # Outputs
@@ -327,15 +321,10 @@ def guesses_are_compared(lesson: Lesson) -> Iterator[str]:
     for count, (name, cell) in enumerate(cells, 1):
         if 'predict' not in tags(cell):
             continue
-        match last_statement(cell.source):
-            case ast.Assign(
-                [ast.Name(guess)],
-                ast.Call(ast.Name('guess'), [ast.Constant(str(question)), _]),
-            ):
-                pass
-            case _:
-                yield f"{name} must end like this: `my_guess = guess('How many are heard?', 41)`."
-                continue
+        if (found := guess_of(cell)) is None:
+            yield f"{name} must end like this: `my_guess = guess('How many are heard?', 41)`."
+            continue
+        guess, question, _ = found
         if question in asked:
             yield f'{name} asks what another guess asks: {question!r}.'
         asked.add(question)

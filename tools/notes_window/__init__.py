@@ -20,8 +20,6 @@ from pathlib import Path
 import nbformat
 from jupyter_server.base.handlers import JupyterHandler
 from jupyter_server.utils import url_path_join
-from jupyterlab.commands import get_workspaces_dir
-from jupyterlab_server.workspaces_handler import WorkspacesManager
 from nbconvert.filters import markdown2html
 from tornado import web
 from tornado.httpserver import HTTPServer
@@ -30,7 +28,7 @@ from tornado.netutil import bind_sockets
 from tools.addresses import in_networks
 from tools.class_server import page_file
 from tools.lessons.notes import of_step
-from tools.lessons.present import FOLDER
+from tools.lessons.present import FOLDER, deck
 
 HERE = Path(__file__).resolve().parent
 PORTS = range(8900, 8950)
@@ -100,8 +98,7 @@ class Window(web.RequestHandler):
         for header, value in HEADERS.items():
             self.set_header(header, value)
         if name == 'state':
-            deck = WorkspacesManager(get_workspaces_dir()).load('deck')['data']
-            self.finish(state(self.root, deck))
+            self.finish(state(self.root, deck()))
         elif name in FILES:
             file, kind = FILES[name]
             self.set_header('Content-Type', f'{kind}; charset=UTF-8')

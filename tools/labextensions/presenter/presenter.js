@@ -1,7 +1,8 @@
 // What `make present` adds to jupyterlab-slideshow 0.3.4: editing stays editing, keys that change
 // the notebook do nothing, a clicker walks and steps through replays, and the deck stands where it
 // was after a reload. It also keeps that place for the instructor's window, tools/notes_window, and
-// shows the guesses of the class, tools/class_server, below the cell that asks for them.
+// shows the guesses of the class, tools/class_server, below the cells that ask for them and that
+// compare them with what was measured.
 //
 // JupyterLab loads this file as it is. It has the form of a prebuilt extension, so that neither
 // webpack nor npm is needed.
@@ -48,6 +49,7 @@ function activate(app, manager) {
       const frame = document.getElementById('deck-guesses');
       if (source !== frame?.contentWindow) return;
       frame.style.height = `${Number(data)}px`;
+      frame.scrollIntoView({ block: 'nearest' }); // many bars are more than the slide has room for
       // A click on "Show" took the focus: the keys of the deck want it back.
       if (document.activeElement === frame) manager.activeWidget.content.activeCell.node.focus();
     });
@@ -112,7 +114,8 @@ function saveInTurn(context) {
 async function showGuesses(notebook, baseUrl) {
   document.getElementById('deck-guesses')?.remove();
   const cell = notebook.activeCell;
-  if (!cell?.model.getMetadata('tags')?.includes('predict')) return;
+  const asks = cell?.model.getMetadata('tags')?.includes('predict');
+  if (!asks && !cell?.model.sharedModel.getSource().includes('compare_prediction(')) return;
   const page = await fetch(`${baseUrl}class`).then(answer => answer.text());
   const reached = page && (await fetch(page, { mode: 'no-cors' }).catch(() => null));
   if (!reached || notebook.activeCell !== cell) return;
