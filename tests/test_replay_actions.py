@@ -137,10 +137,10 @@ def test_a_cancel_waits_for_what_rclpy_lets_it_wait(cancel, threads, charges, ow
     assert set(steps[-1]['running']) == {None}
 
 
-def test_two_jobs_are_one_sentence():
+def test_no_job_is_one_sentence():
     with ros_session() as session:
         robot = Robot()
         recording = ActionRecording(robot.server, robot.execute)
         spin(session, robot)
-        with pytest.raises(ValueError, match=r'^A replay shows one job: record the run of one'):
+        with pytest.raises(ValueError, match=r'^A replay shows one job and its cancel: record'):
             replay_action(recording, 1, 0.0)

@@ -148,7 +148,6 @@ def replay(
     threads: int = 1,
     group: str = EXCLUSIVE,
     *,
-    name: str = '',
     part: tuple[int, int] | None = None,
 ) -> Replay:
     """Return a run to step through. `table` is one of `Recording.table` or of `predict`.
@@ -199,7 +198,7 @@ def replay(
     if not any(event.do == TAKE for event in made):
         end = 'None was heard'
     summary = f'{shown_here.sum()} messages, depth {depth}, {said}. {end}.'
-    return Replay((Run(name, summary, lost, setup, moves, first),))
+    return Replay((Run('', summary, lost, setup, moves, first),))
 
 
 def side_by_side(runs: Mapping[str, Replay]) -> Replay:

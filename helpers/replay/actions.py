@@ -59,20 +59,18 @@ class ActionRecording(CallbackRecording):
         return noted
 
 
-def replay_action(
-    recording: ActionRecording, threads: int, cancelled_s: float, *, name: str = ''
-) -> Replay:
+def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) -> Replay:
     """Return the run of one goal that was cancelled, to step through. Call it when all has ended.
 
     `threads` is how many the executor of the server's node has, `cancelled_s` when the cancel was
     sent, on the clock of `time.monotonic`.
 
-    Raises ValueError, with one sentence, unless one job has run.
+    Raises ValueError, with one sentence, unless one job and one cancel have run.
     """
     check_count('threads', threads)
     tables, runs = recording.tables(), recording.runs
-    if len(runs['execute_callback']) != 1:
-        raise ValueError('A replay shows one job: record the run of one goal.')
+    if any(len(runs[one]) != 1 for one in ('execute_callback', 'cancel_goal')):
+        raise ValueError('A replay shows one job and its cancel: record the run of one goal.')
     zero = runs['send_goal'][0][0]
     names = list(recording.group_of)
     groups: dict = {}
@@ -80,7 +78,7 @@ def replay_action(
         groups.setdefault(group, []).append(one)
     thread_names = fill_up({one for table in tables.values() for one in table['thread']}, threads)
     ended_s = runs['execute_callback'][0][1]
-    late = any(started_s > ended_s for started_s, *_ in runs['cancel_goal'])
+    late = runs['cancel_goal'][0][0] > ended_s
     taken = 'is taken when the job has ended' if late else 'is taken while the job runs'
     does = {
         'execute_callback': [{'says': f'calls {said}'} for _, said in recording.said],
@@ -125,4 +123,4 @@ def replay_action(
     moves.sort(key=lambda move: (move[0], SAME_TIME.index(move[1])))
     moves = [[round(1e6 * at_s), KINDS.index(do), one, other] for at_s, do, one, other in moves]
     summary = f'{"One thread" if threads == 1 else f"{threads} threads"}. The cancel {taken}.'
-    return Replay((Run(name, summary, False, setup, moves, 0, TIME_LABEL),))
+    return Replay((Run('', summary, False, setup, moves, 0, TIME_LABEL),))

@@ -18,7 +18,7 @@ HANGS_S = 0.1  # so much is shown of a wait that never ends
 SAME_TIME = [ARRIVE, TAKE, 'go', 'resume', END]
 
 
-def replay_calls(recording: CallbackRecording, threads: int = 1, *, name: str = '') -> Replay:
+def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
     """Return what a recording has seen until now, to step through.
 
     `threads` is how many the executor of all its callbacks has. The recording must watch timers,
@@ -58,14 +58,13 @@ def replay_calls(recording: CallbackRecording, threads: int = 1, *, name: str = 
         ],
     }
     moves = _moves(tables, calls, names, thread_names)
-    record = {'name': name, 'setup': setup, 'moves': moves, 'first': 0}
-    stuck = stories(record, MOST_ROWS)['stuck']
+    stuck = stories({'setup': setup, 'moves': moves}, MOST_ROWS)['stuck']
     summary = ' '.join(
         ['One thread.' if threads == 1 else f'{threads} threads.']
         + (stuck or ['Nobody waits for ever.'])
     )
     after_s = HANGS_S if stuck else 0.0
-    return Replay((Run(name, summary, False, setup, moves, 0, TIME_LABEL, after_s),))
+    return Replay((Run('', summary, False, setup, moves, 0, TIME_LABEL, after_s),))
 
 
 def _steps(name: str, calls: pd.DataFrame, tables: dict, groups: pd.DataFrame) -> list[dict] | None:
