@@ -16,15 +16,15 @@ def shown(value: object) -> str:
     return f'this {type(value).__name__}' if '\n' in text or len(text) > LONGEST else text
 
 
-def check_columns(table: pd.DataFrame, names: Iterable[str], what: str = 'The table') -> None:
+def check_columns(table: pd.DataFrame, names: Iterable[str]) -> None:
     """Raise TypeError unless `table` is a DataFrame, ValueError where a column or all rows lack."""
     if not isinstance(table, pd.DataFrame):
-        raise TypeError(f'{what} must be a DataFrame, not {type(table).__name__}.')
+        raise TypeError(f'The table must be a DataFrame, not {type(table).__name__}.')
     missing = [name for name in names if name not in table.columns]
     if missing:
-        raise ValueError(f'{what} lacks the column(s) {", ".join(missing)}.')
+        raise ValueError(f'The table lacks the column(s) {", ".join(missing)}.')
     if table.empty:
-        raise ValueError(f'{what} is empty: it needs at least one row.')
+        raise ValueError('The table is empty: it needs at least one row.')
 
 
 def column_of_numbers(table: pd.DataFrame, name: str) -> np.ndarray:

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.text import Text
 
 from helpers.alt_text import describe
 from helpers.plots.style import (
@@ -15,12 +16,11 @@ from helpers.plots.style import (
     GROUP_COLOURS,
     INK,
     LARGE,
+    NORMAL,
     PALE,
     PUBLISHED,
     SMALL,
     WIDTH,
-    box,
-    canvas,
     in_words,
     new_axes,
 )
@@ -40,7 +40,9 @@ def topic_graph(endpoints: pd.DataFrame, title: str) -> Axes:
     subscriptions = endpoints[endpoints['role'] == 'subscription']
     topics = endpoints.drop_duplicates('topic')
     rows = max(len(publishers), len(subscriptions), len(topics))
-    ax = canvas(title, height=0.9 + 1.25 * rows)
+    ax = new_axes(height=0.9 + 1.25 * rows)
+    ax.set_axis_off()
+    ax.set_title(title, fontsize=LARGE, loc='left')
     ax.set(xlim=(0, 10), ylim=(-0.5 * rows, 0.5 * rows))
 
     def spread(count: int) -> np.ndarray:
@@ -49,12 +51,12 @@ def topic_graph(endpoints: pd.DataFrame, title: str) -> Axes:
     heights = dict(zip(topics['topic'], spread(len(topics)), strict=True))
     for topic in topics.itertuples():
         text = f'{topic.topic}\n{topic.type}'
-        box(ax, 5, heights[topic.topic], text, 'round,pad=0.7,rounding_size=1.2')
+        _box(ax, 5, heights[topic.topic], text, 'round,pad=0.7,rounding_size=1.2')
     sides = ((publishers, 1.4, GROUP_COLOURS[1]), (subscriptions, 8.6, GROUP_COLOURS[0]))
     words = ['Boxes for nodes and topics, joined by arrows.']
     for side, x, colour in sides:
         for end, y in zip(side.itertuples(), spread(len(side)), strict=True):
-            box(ax, x, y, f'{end.node}\n{end.qos}', 'square,pad=0.7', colour)
+            _box(ax, x, y, f'{end.node}\n{end.qos}', 'square,pad=0.7', colour)
             if end.role == 'publisher':
                 tail, head, does = (2.6, y), (3.7, heights[end.topic]), 'publishes on'
             else:
@@ -64,6 +66,13 @@ def topic_graph(endpoints: pd.DataFrame, title: str) -> Axes:
             words.append(f'{end.node} {does} {end.topic} ({end.type}), {end.qos}.')
     describe(ax, ' '.join(words))
     return ax
+
+
+def _box(ax: Axes, x: float, y: float, text: str, style: str, colour: str = '#FFFFFF') -> Text:
+    """Write a text in a box, centred at (x, y). `style` is one of matplotlib's box styles."""
+    look = {'boxstyle': style, 'facecolor': colour, 'edgecolor': INK, 'linewidth': 1.4}
+    centred = {'ha': 'center', 'va': 'center', 'linespacing': 1.5}
+    return ax.text(x, y, text, fontsize=NORMAL, bbox=look, **centred)
 
 
 def interface_tree(tree: pd.DataFrame) -> Axes:

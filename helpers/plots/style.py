@@ -1,4 +1,4 @@
-"""What all pictures share: colours, sizes, axes, boxes, arrows.
+"""What all pictures share: colours, sizes, axes, marks.
 
 The colours are those of Okabe and Ito ("Color Universal Design", 2008), which people with any kind
 of colour vision can tell apart. All sizes are set here and not through rcParams, because the axes
@@ -12,7 +12,6 @@ from collections.abc import Iterable
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
-from matplotlib.text import Text
 
 PUBLISHED, HEARD, LOST = '#9aa5ae', '#0072B2', '#D55E00'
 LOST_TEXT = '#9c4300'  # a darker vermillion: letters need more contrast than marks
@@ -37,14 +36,6 @@ DPI = 110
 def new_axes(height: float = HEIGHT, width: float = WIDTH) -> Axes:
     """Return the axes of a new figure. The sizes are in inches."""
     return plt.figure(figsize=(width, height), dpi=DPI, layout='constrained').add_subplot()
-
-
-def canvas(title: str, height: float) -> Axes:
-    """Return new axes without ticks and frame, for boxes and arrows."""
-    ax = new_axes(height)
-    ax.set_axis_off()
-    ax.set_title(title, fontsize=LARGE, loc='left')
-    return ax
 
 
 def label_axes(
@@ -78,13 +69,6 @@ def crosses(ax: Axes, x, y, label: str, scale: float = 1.0) -> PathCollection:
     """Mark what was lost: the same cross in every picture. `scale` is the area of a mark."""
     look = {'marker': 'x', 's': 40 * scale, 'linewidths': 2 * scale**0.5, 'color': LOST}
     return ax.scatter(x, y, label=label, zorder=4, clip_on=False, **look)
-
-
-def box(ax: Axes, x: float, y: float, text: str, style: str, colour: str = '#FFFFFF') -> Text:
-    """Write a text in a box, centred at (x, y). `style` is one of matplotlib's box styles."""
-    look = {'boxstyle': style, 'facecolor': colour, 'edgecolor': INK, 'linewidth': 1.4}
-    centred = {'ha': 'center', 'va': 'center', 'linespacing': 1.5}
-    return ax.text(x, y, text, fontsize=NORMAL, bbox=look, **centred)
 
 
 def say(ax: Axes, text: str) -> None:
