@@ -1,4 +1,7 @@
-"""What is said about a figure. tools/test_run.py shows figures in a real kernel."""
+"""What is said about a figure. nbval compares what each picture of a lesson says.
+
+tools/test_run.py shows figures in a real kernel.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -87,40 +90,3 @@ def test_losses_and_overlaps_in_words():
     groups = {'fast': run(), 'slow': run(overlap=True)}
     assert 'The groups are: fast; slow. Some' in said(plots.timeline, groups)
     assert 'None is pushed out.' in said(plots.queue_length, run(), 3)
-
-
-def test_graphs_are_told_arrow_by_arrow():
-    columns = ['node', 'role', 'topic', 'type', 'qos']
-    ends = [
-        ('talker', 'publisher', '/topic', 'std_msgs/msg/String', 'RELIABLE, depth 10'),
-        ('listener', 'subscription', '/topic', 'std_msgs/msg/String', 'BEST_EFFORT, depth 1'),
-    ]
-    text = said(plots.topic_graph, pd.DataFrame(ends, columns=columns), 'Two nodes')
-    assert 'talker publishes on /topic (std_msgs/msg/String), RELIABLE, depth 10.' in text
-    assert 'listener subscribes to /topic' in text
-    edges = pd.DataFrame([('map', 'odom', 'ekf')], columns=['parent', 'child', 'publisher'])
-    assert 'map to odom by ekf.' in said(plots.frame_tree, edges)
-
-
-def test_what_was_compared_is_named():
-    t = np.arange(3.0)
-    truth = pd.DataFrame({'t': t, 'x': t, 'y': t, 'var_x': 1.0, 'cov_x_y': 0.0, 'var_y': 1.0})
-    fixes = pd.DataFrame({'gps_x': t, 'gps_y': t})
-    text = said(plots.path, truth, {'wheels': truth, 'all': truth}, fixes, 5)
-    assert 'a line for each of: wheels; all. Plus signs' in text
-    assert '3 sigma every 5 seconds.' in text
-    errors = {'wheels': pd.DataFrame({'t': t, 'distance': t + 1})}
-    text = said(plots.error, errors, {'no GPS': (1, 2.5)}, True)
-    assert 'One line for each of: wheels. The vertical axis is logarithmic.' in text
-    assert 'Shaded: no GPS, 1 to 2.5 s.' in text
-    results = pd.DataFrame({'lost (%)': [50, 0]}, index=pd.Index([1, 4], name='threads'))
-    text = said(plots.sweep, results, 4, 'enough', 'Forty a second')
-    assert text == (
-        'Forty a second. lost (%). One dot for each of 1; 4, joined by a line. '
-        'A dashed line marks 4: enough. Horizontal axis: threads.'
-    )
-    assert 'for each of: a; b.' in said(plots.bars, pd.Series({'a': 1, 'b': 2}), 'count')
-    assert 'a: 1; b: 0.25.' in said(plots.bars, pd.Series({'a': 1, 'b': 0.25}), 'm', '', True)
-    kept = pd.DataFrame({'t': t, 'innovation': t, 'sigma': 1.0, 'accepted': [True, True, False]})
-    assert 'Crosses were kept out.' in said(plots.innovation, kept)
-    assert 'None was kept out.' in said(plots.innovation, kept[:2])

@@ -264,19 +264,6 @@ def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, data):
 # explain: examples
 
 
-def test_losses_of_the_tutorial():
-    explanation = explain(predict(0.05, 0.2, 10, 1, 41), depth=10, threads=1)
-    losses = explanation.losses
-    assert (explanation.messages, explanation.lost, explanation.explained) == (41, 21, 21)
-    assert losses['seq'].tolist() == [i for i in range(41) if i not in TUTORIAL]
-    assert (losses['pushed_out_by'] == losses['seq'] + 10).all()
-    assert losses['queue_after'][0] == '5 to 14'
-    assert str(explanation) == (
-        '21 of 41 messages were lost, 21 losses explained.\n'
-        'Everything is as a KEEP_LAST queue must do it.'
-    )
-
-
 def test_order_and_start_of_the_numbers_do_not_matter():
     table = predict(0.05, 0.2, 10, 1, 41)
     shifted = table.assign(seq=table['seq'] + 1000).sample(frac=1, random_state=1)

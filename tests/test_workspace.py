@@ -72,18 +72,10 @@ def wait_until(predicate, timeout_s=60.0) -> bool:
 # --- Build ---------------------------------------------------------------------------------------
 
 
-def test_a_build_says_what_was_built_and_nothing_that_changes(built):
-    assert str(built.result) == (
-        'colcon build\n'
-        'Finished <<< number_pkg\n'
-        'Finished <<< talker_pkg\n'
-        'Finished <<< user_pkg\n'
-        '\n'
-        'Summary: 3 packages finished'
-    )
-    assert repr(built.result) == str(built.result)
-    assert built.result.ok
+def test_nothing_that_was_set_for_other_work_reaches_a_build(built):
+    assert built.result.ok, built.result
     assert built.result.failed is None
+    assert str(built.result).endswith('\n\nSummary: 3 packages finished')
     assert (built.path / built.result.log).is_file()
 
 
