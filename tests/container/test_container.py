@@ -1,135 +1,20 @@
-"""The image of the lessons, built and used: `make test-container`.
-
-Its base is Debian from debootstrap, because a machine without a registry of images runs this, too.
-Where podman, debootstrap, the rights or the network cannot be had, this says so and is left out.
-"""
+"""The image of the lessons, used: `make test-container`."""
 
 import json
-import os
 import shutil
 import socket
 import subprocess
-import tempfile
 import time
 import urllib.error
 import urllib.request
 from pathlib import Path
 
 import pytest
+from support.containers import IMAGE, LIMITS
 
-ROOT = Path(__file__).resolve().parents[2]
-SUITE = 'trixie'  # the base that the Containerfile names
-IMAGE = 'localhost/ros2_notebooks'
-LIMITS = '--ulimit nofile=1024:1024 --ulimit nproc=1000:1000'
-CERTIFICATES = Path('/etc/ssl/certs/ca-certificates.crt')
-# One that loses messages and one that compiles. The others were tried by hand: environment.md.
-LESSONS = ['lose_messages', 'use_a_message_in_your_own_interface']
+# One that compiles, for the class in containers runs others. environment.md says what was tried.
+LESSON = 'use_a_message_in_your_own_interface'
 START_S = 180
-ROOM = 6e9  # bytes on the disk, for base, image and layers
-# What apt, pip and uv say.
-NO_NETWORK = ('Temporary failure', 'Could not connect', 'Failed to fetch', 'check the network')
-
-
-def leave_out(why: str) -> None:
-    pytest.skip(f'LEFT OUT: the container, because {why}.')
-
-
-def output_of(*command: object) -> str:
-    return subprocess.run(command, check=True, capture_output=True, text=True).stdout
-
-
-@pytest.fixture(scope='module')
-def folder():
-    folder = Path(tempfile.mkdtemp(prefix='container-', dir='/var/tmp'))
-    yield folder
-    shutil.rmtree(folder, ignore_errors=True)
-
-
-@pytest.fixture(scope='module')
-def base(folder) -> Path:
-    """Return an archive with the files of a Debian."""
-    if os.geteuid():
-        leave_out('only root can make its base')
-    for command in ('podman', 'debootstrap'):
-        if not shutil.which(command):
-            leave_out(f'there is no {command}')
-    if shutil.disk_usage(folder).free < ROOM:
-        leave_out(f'{folder.parent} has less than {ROOM / 1e9:.0f} GB')
-    files, archive = folder / 'base', folder / 'base.tar'
-    done = subprocess.run(
-        ['debootstrap', '--variant=minbase', SUITE, files], capture_output=True, text=True
-    )
-    if done.returncode:
-        leave_out(f'debootstrap could not make its base ({done.stdout[-200:].strip()!r})')
-    # The certificates of a network that inspects what passes, as pip is told outside.
-    if CERTIFICATES.exists():
-        copy = Path('/usr/local/share/ca-certificates/machine.crt')
-        (files / copy.relative_to('/')).parent.mkdir(parents=True)
-        shutil.copy(CERTIFICATES, files / copy.relative_to('/'))
-        (files / 'etc/pip.conf').write_text(f'[global]\ncert = {copy}\n')
-    for downloaded in (files / 'var/cache/apt/archives').glob('*.deb'):
-        downloaded.unlink()
-    subprocess.run(['tar', '--create', '--file', archive, '--directory', files, '.'], check=True)
-    shutil.rmtree(files)
-    return archive
-
-
-@pytest.fixture(scope='module')
-def podman(folder, base) -> list[str]:
-    """Return podman with the options that work on this machine, and images of its own."""
-    said = ''
-    for driver in ('overlay', 'vfs'):
-        for more in ([], ['--runtime', 'runc']):
-            where = folder / driver
-            podman = ['podman', f'--storage-driver={driver}', '--cgroup-manager=cgroupfs', *more]
-            podman += ['--root', str(where / 'root'), '--runroot', str(where / 'run')]
-            steps = ['import', base, 'localhost/base'], ['run', '--rm', *LIMITS.split()]
-            steps[1].extend(['localhost/base', 'true'])
-            done = [subprocess.run([*podman, *s], capture_output=True, text=True) for s in steps]
-            if not any(one.returncode for one in done):
-                yield podman
-                subprocess.run([*podman, 'rm', '--all', '--force'], capture_output=True)
-                subprocess.run([*podman, 'rmi', '--all', '--force'], capture_output=True)
-                # Where podman has mounted its images.
-                subprocess.run(['umount', where / 'root' / driver], capture_output=True)
-                return
-            said = ' '.join(done[-1].stderr.split())[-200:]
-    leave_out(f'podman cannot run a container here ({said!r})')
-
-
-@pytest.fixture(scope='module')
-def make(folder, podman):
-    """Return `make` in a checkout of its own, with the files that git knows."""
-    checkout = folder / 'checkout'
-    files = output_of('git', '-C', ROOT, 'ls-files', '-z', '--cached', '--others',
-                      '--exclude-standard').split('\0')  # fmt: skip
-    for name in filter(None, files):
-        if (ROOT / name).exists():
-            (checkout / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / name, checkout / name, follow_symlinks=False)
-
-    def make(*arguments: str) -> subprocess.CompletedProcess:
-        return subprocess.run(
-            ['make', '--silent', f'CONTAINER={" ".join(podman)}', *arguments],
-            cwd=checkout,
-            text=True,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-        )
-
-    make.checkout = checkout
-    return make
-
-
-@pytest.fixture(scope='module')
-def image(make, podman):
-    start = time.monotonic()
-    done = make('image', 'BASE=localhost/base', f'IMAGE_ARGS={LIMITS}')
-    if done.returncode and any(words in done.stdout for words in NO_NETWORK):
-        leave_out('its network does not reach a package index')
-    assert not done.returncode, done.stdout[-3000:]
-    print(f'\nbuilt in {time.monotonic() - start:.0f} s')
-    return json.loads(output_of(*podman, 'image', 'inspect', IMAGE))[0]
 
 
 @pytest.fixture(scope='module')
@@ -171,9 +56,9 @@ def test_size_and_user(image):
     assert '8888/tcp' in image['Config']['ExposedPorts']
 
 
-def test_lessons(podman, image, make):
-    """Run lessons with the image's packages, and compare their outputs with the saved ones."""
-    notebooks = [next(make.checkout.glob(f'notebooks/??_{name}.ipynb')).name for name in LESSONS]
+def test_a_lesson(podman, image, make):
+    """Run a lesson with the image's packages, and compare its outputs with the saved ones."""
+    notebook = next(make.checkout.glob(f'notebooks/??_{LESSON}.ipynb')).name
     # The user of the image is not root, and lessons write beside themselves.
     checkout = shutil.copytree(make.checkout, make.checkout.with_name('lessons'), symlinks=True)
     subprocess.run(['chmod', '-R', 'a+rwX', checkout], check=True)
@@ -181,8 +66,7 @@ def test_lessons(podman, image, make):
     done = subprocess.run(
         [*podman, 'run', '--rm', *LIMITS.split(), '--shm-size=256m']
         + ['--volume', f'{checkout}:/checkout', '--workdir', '/checkout', IMAGE]
-        + ['python', '-m', 'pytest', '-p', 'no:cacheprovider', '-n', '2', '--dist', 'loadscope']
-        + [f'notebooks/{name}' for name in notebooks],
+        + ['python', '-m', 'pytest', '-p', 'no:cacheprovider', f'notebooks/{notebook}'],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -199,7 +83,7 @@ def test_a_new_version_keeps_what_was_written(lab, make, podman, port):
     assert f'The port {port} is already in use' in done.stdout
     subprocess.run([*podman, 'stop', 'lab'], capture_output=True, check=True)
 
-    name = next(make.checkout.glob(f'notebooks/??_{LESSONS[0]}.ipynb')).name
+    name = next(make.checkout.glob(f'notebooks/??_{LESSON}.ipynb')).name
     written, newer = mine / 'ros2_notebooks' / name, make.checkout / 'notebooks' / name
     for path, words in (written, 'I have written this.'), (newer, 'This is newer.'):
         notebook = json.loads(path.read_text())

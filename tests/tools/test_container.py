@@ -116,7 +116,7 @@ def test_the_lessons_and_the_port_of_a_run(run, tmp_path):
 def test_a_class_without_a_service():
     pytest.importorskip('docker', reason='`make test-hub` installs it')
     done = subprocess.run(
-        [sys.executable, ROOT / 'tools/hub/service.py'],
+        [sys.executable, ROOT / 'tools/hub/service.py', 'label'],
         env=os.environ | {'DOCKER_HOST': 'unix:///nowhere'},
         capture_output=True,
         text=True,

@@ -1,6 +1,6 @@
 #!/bin/sh
 # The lessons in a container, for `make image` and `make lab-container`. It runs on Linux and macOS.
-# usage: tools/container/run.sh image|lab
+# usage: tools/container/run.sh image|lab|label
 # CONTAINER is podman or docker, with options if it needs some; IMAGE_ARGS and RUN_ARGS are added to
 # its build and its run; BASE, PORT and LESSONS are those of the Makefile.
 set -eu
@@ -12,6 +12,11 @@ fail() {
     exit 1
 }
 
+# Which lessons and packages an image holds: its label is the checksum of what went into it.
+inside=$(find LICENSE pyproject.toml requirements.lock requirements-hub.lock Containerfile helpers notebooks tools -type f \
+    ! -path 'tools/hub/*' ! -path '*/__pycache__/*' ! -path '*/.ipynb_checkpoints/*' -exec cksum {} + | LC_ALL=C sort | cksum | tr ' ' -)
+[ "${1-}" != label ] || exec echo "$inside"
+
 container=${CONTAINER:-$(command -v podman || command -v docker || true)}
 [ -n "$container" ] ||
     fail 'There is neither podman nor docker: install one, for example with `sudo apt install podman`, then try again.'
@@ -19,10 +24,6 @@ command -v "${container%% *}" > /dev/null || fail "There is no command ${contain
 name=${container%% *}
 $container version > /dev/null 2>&1 ||
     fail "${name##*/} does not answer: start it (podman machine start, Docker Desktop, or sudo systemctl start docker), then try again."
-
-# Which lessons and packages an image holds: its label is the checksum of what went into it.
-inside=$(find LICENSE pyproject.toml requirements.lock requirements-hub.lock Containerfile helpers notebooks tools -type f \
-    ! -path '*/__pycache__/*' ! -path '*/.ipynb_checkpoints/*' -exec cksum {} + | LC_ALL=C sort | cksum | tr ' ' -)
 
 # The command's own words stay on the screen. If it fails, a sentence follows where the cause is known.
 trouble() { # FILE with what the command said
@@ -80,5 +81,5 @@ run_lab() {
 case ${1-} in
     image) make_image ;;
     lab) run_lab ;;
-    *) fail 'usage: tools/container/run.sh image|lab' ;;
+    *) fail 'usage: tools/container/run.sh image|lab|label' ;;
 esac

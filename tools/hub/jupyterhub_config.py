@@ -4,10 +4,16 @@ Everybody who has an account on this machine may log in, with its password. With
 student's server runs in a container of the image of `make image`, with limits of its own.
 """
 
+import asyncio
+import errno
 import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import urlsplit
+
+from jupyterhub.proxy import ConfigurableHTTPProxy
 
 from helpers.classroom import HUB_VARIABLE
 
@@ -19,6 +25,7 @@ STATE.mkdir(mode=0o700, parents=True, exist_ok=True)
 c = get_config()  # noqa: F821
 
 c.JupyterHub.bind_url = 'http://127.0.0.1:8000'
+c.JupyterHub.hub_bind_url = 'http://127.0.0.1:8081'
 c.JupyterHub.db_url = f'sqlite:///{STATE}/jupyterhub.sqlite'
 c.JupyterHub.cookie_secret_file = str(STATE / 'cookie_secret')
 c.ConfigurableHTTPProxy.pid_file = str(STATE / 'proxy.pid')
@@ -26,6 +33,31 @@ c.ConfigurableHTTPProxy.command = (
     f'{sys.prefix}/hub_proxy/node_modules/.bin/configurable-http-proxy'
 )
 c.Authenticator.allow_all = True
+
+
+class Proxy(ConfigurableHTTPProxy):
+    """The proxy, which says so where its port is in use. By itself it would go on without one."""
+
+    async def start(self) -> None:
+        """Start it, or end the hub with a sentence."""
+        self._check_previous_process()  # one that a hub has left, which was killed
+        where = urlsplit(self.public_url)
+        with socket.socket() as one:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                one.bind((where.hostname, where.port or (443 if where.scheme == 'https' else 80)))
+            except OSError as problem:
+                if problem.errno == errno.EADDRINUSE:
+                    self.log.critical(
+                        'The port of %s is already in use: choose another one, for example '
+                        "`make hub HUB_ARGS='--url=http://127.0.0.1:8001'`.",
+                        self.public_url,
+                    )
+                    self.app.exit(1)
+        await super().start()
+
+
+c.JupyterHub.proxy_class = Proxy
 
 c.Spawner.cmd = [str(ROOT / 'tools/container/start_student.sh')]
 c.Spawner.notebook_dir = '~/ros2_notebooks'
@@ -82,50 +114,76 @@ c.JupyterHub.load_roles.append(
 
 # --- Each student in a container -----------------------------------------------------------------
 
-HUB_PORT = 8081
 STUDENT = 1000  # the user of the image
-DISK = '4G'  # what a student may fill
+DISK = '1G'  # what a student may fill
 
 
-def prepare_container(spawner) -> None:
-    """Give a student a disk of their own, which cannot fill the machine's, and a network."""
-    import docker
+def mount_disk(name: str) -> Path:
+    """Return the student's home, on a disk of their own. Raises RuntimeError.
 
-    spawner.port = 8888
-    name = spawner.escaped_name
+    All its room is taken from the machine's disk at once: that one cannot become full in a lesson.
+    """
     home, disk = STATE / 'homes' / name, STATE / 'disks' / name
     if not disk.exists():
         disk.parent.mkdir(exist_ok=True)
         new = disk.with_suffix('.new')
-        subprocess.run(['truncate', f'--size={DISK}', new], check=True)
-        owner = f'root_owner={STUDENT}:{STUDENT}'
-        subprocess.run(['mkfs.ext4', '-q', '-F', '-m', '0', '-E', owner, new], check=True)
+        options = f'nodiscard,root_owner={STUDENT}:{STUDENT}'
+        try:
+            for command in (
+                ['fallocate', f'--length={DISK}', new],
+                ['mkfs.ext4', '-q', '-F', '-m', '0', '-E', options, new],
+            ):
+                subprocess.run(command, check=True, capture_output=True, text=True)
+        except subprocess.CalledProcessError as problem:
+            new.unlink(missing_ok=True)
+            # The student sees this, too.
+            raise RuntimeError(
+                f'There is no room for your disk of {DISK}: tell your teacher '
+                f'({problem.stderr.strip()}).'
+            ) from None
         new.rename(disk)
     home.mkdir(parents=True, exist_ok=True)
     if not home.is_mount():
         subprocess.run(['mount', '-o', 'loop,nosuid,nodev', disk, home], check=True)
-    spawner.volumes = {str(home): '/home/student'}
+    return home
+
+
+def make_network(name: str) -> None:
+    """Make a network if there is none with this name."""
+    import docker
 
     networks = docker.from_env().networks
+    if name not in {one.name for one in networks.list()}:
+        networks.create(name, driver='bridge')
+
+
+async def prepare_container(spawner) -> None:
+    """Give a student a disk of their own, which cannot fill the machine's, and a network."""
+    spawner.port = 8888
+    name = spawner.escaped_name
     spawner.network_name = f'ros2-{name}'
-    found = [one for one in networks.list() if one.name == spawner.network_name]
-    network = found[0] if found else networks.create(spawner.network_name, driver='bridge')
-    network.reload()
-    gateway = network.attrs['IPAM']['Config'][0]['Gateway']
-    spawner.hub_connect_url = f'http://{gateway}:{HUB_PORT}'
+    # In threads: meanwhile the hub answers others.
+    home = await asyncio.to_thread(mount_disk, name)
+    await asyncio.to_thread(make_network, spawner.network_name)
+    spawner.volumes = {str(home): '/home/student'}
 
 
 if os.environ.get('CONTAINERS') == 'yes':
     from docker.types import Ulimit
 
-    from tools.hub.service import IMAGE
+    from tools.hub.service import HUB, IMAGE
 
-    # From their own networks students reach the hub, which asks for their token.
-    c.JupyterHub.hub_bind_url = f'http://0.0.0.0:{HUB_PORT}'
+    # An address of this machine that its containers reach, and no other machine knows: not the
+    # network's. The hub asks for the students' tokens there.
+    c.JupyterHub.hub_bind_url = f'http://{HUB}:8081'
+    CLASS_URL = f'http://{HUB}:8764'
+    c.JupyterHub.services[0]['url'] = CLASS_URL
     c.JupyterHub.spawner_class = 'dockerspawner.DockerSpawner'
     c.Spawner.pre_spawn_hook = prepare_container
     c.Spawner.cmd = ['/opt/ros2_notebooks/tools/container/start_student.sh']
     c.Spawner.notebook_dir = '/home/student/ros2_notebooks'
+    # A trash on a full disk would keep it full.
+    c.Spawner.args.append('--FileContentsManager.delete_to_trash=False')
     c.Spawner.mem_limit, c.Spawner.cpu_limit = '2G', 2
     c.DockerSpawner.image = IMAGE
     c.DockerSpawner.pull_policy = 'never'
@@ -145,6 +203,7 @@ if os.environ.get('CONTAINERS') == 'yes':
         'read_only': True,
         'tmpfs': {'/tmp': 'size=64m,mode=1777'},
     }
-    # Builds and temporary files go to the student's disk. The class page is not told anything: its
-    # port is open to this machine only.
-    c.Spawner.environment = {'TMPDIR': '/home/student/.tmp'}
+    c.Spawner.environment = {
+        HUB_VARIABLE: f'{CLASS_URL}/services/class',
+        'TMPDIR': '/home/student/.tmp',  # builds and temporary files go to the student's disk
+    }

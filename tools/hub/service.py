@@ -1,18 +1,22 @@
 """Print the address of podman's or docker's service, for `make hub CONTAINERS=yes`.
 
+usage: python tools/hub/service.py LESSONS, which is the label that the image must have.
 Where a class in containers cannot begin, it prints one sentence instead, and its status is 1.
 """
 
 import os
+import subprocess
 import sys
 
 import docker
 
 IMAGE = 'localhost/ros2_notebooks'
 SERVICES = ('/run/podman/podman.sock', '/var/run/docker.sock')
+# Where the containers reach the hub and the class. RFC 3927: routers do not forward these.
+HUB = '169.254.20.81'
 
 
-def service() -> str:
+def service(lessons: str) -> str:
     """Return the address. Raises SystemExit with a sentence."""
     if os.geteuid():
         sys.exit('A class in containers needs root, for the disks: sudo make hub CONTAINERS=yes')
@@ -21,13 +25,28 @@ def service() -> str:
     if address is None:
         sys.exit('There is no service of podman or docker: sudo systemctl start podman.socket')
     try:
-        docker.APIClient(address).inspect_image(IMAGE)
+        image = docker.APIClient(address).inspect_image(IMAGE)
     except docker.errors.ImageNotFound:
         sys.exit('There is no image yet: run `sudo make image`, then try again.')
     except docker.errors.DockerException:
         sys.exit(f'{address} does not answer: start podman.socket or docker, then try again.')
+    if (image['Config']['Labels'] or {}).get('lessons') != lessons:
+        sys.exit('The image is not of these lessons: run `sudo make image`, then try again.')
     return address
 
 
+def take_address() -> None:
+    """Give this machine the address of the hub. Raises SystemExit with a sentence."""
+    command = ['ip', 'address', 'replace', f'{HUB}/32', 'dev', 'lo']
+    try:
+        subprocess.run(command, check=True, capture_output=True, text=True)
+    except FileNotFoundError:
+        sys.exit('There is no command ip: run `sudo apt install iproute2`, then try again.')
+    except subprocess.CalledProcessError as problem:
+        sys.exit(f'This machine cannot have the address {HUB}: {problem.stderr.strip()}')
+
+
 if __name__ == '__main__':
-    print(service())
+    found = service(sys.argv[1])
+    take_address()
+    print(found)

@@ -22,5 +22,6 @@ if ! cmp -s tools/hub/package-lock.json "$proxy/package-lock.json"; then
     mv "$proxy.new" "$proxy"
 fi
 
-# The first build of a lesson would do this, but a student may not write into .venv.
+# The first build of a lesson would do this, and the first import, but a student may not write here.
 .venv/bin/python -c 'from helpers.workspace.wheels import fix_wheels; fix_wheels()'
+.venv/bin/python -m compileall -q -j 0 -x '/tests?/' .venv/lib helpers > /dev/null || true
