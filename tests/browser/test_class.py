@@ -14,6 +14,7 @@ LESSON = '02_lose_messages.ipynb'
 NAMES = {'ada': 41, 'bob': 14, 'cyd': 14}
 CELLS = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4).cells
 [GUESS] = [i for i, cell in enumerate(CELLS) if 'my_guess = guess(' in cell.source]
+[COMPARED] = [i for i, cell in enumerate(CELLS) if 'my_guess, ' in cell.source]
 QUESTION = re.search(r"guess\('(.*)', ", CELLS[GUESS].source)[1]
 STARTED = re.compile(r"(join_class\('.*', '.*'\))[\s\S]*?(http://localhost:\d+/\w+/)[\s\S]*Ctrl\+C")
 
@@ -150,3 +151,7 @@ time.sleep(2)
             deck.screenshot('class_deck_shown')
             assert deck.press('Space') > GUESS
             assert deck.page.locator('#deck-guesses').count() == 0
+            while deck.active() < COMPARED:
+                deck.press('Space')
+            frame.locator('.bars').wait_for()
+            deck.screenshot('class_deck_compared')

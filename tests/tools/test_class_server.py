@@ -136,11 +136,13 @@ def test_the_page_follows_the_deck_and_the_instructor(opened):
 
     def walk(place):
         path = f'presentation/02_{NAME}.ipynb'
-        deck = {'data': {'current': path, 'places': {path: place}, 'began': {}}}
+        began = {path: time.time() - 600}
+        deck = {'data': {'current': path, 'places': {path: place}, 'began': began}}
         (workspaces / DECK).write_text(json.dumps(deck))
 
     walk(7)
     opened.wait_for(lambda view: view['step'] == '2. Look')
+    assert opened.view()['gone'] == 10
     opened.go(0)
     assert opened.view()['step'] == '02 Lose messages'
     walk(2)

@@ -46,7 +46,7 @@ class Room:
         self.present = next(iter(store.lessons)), 0
         self.follows_students = True  # until a deck or the instructor says where the class is
         self._deck = self._place_of(deck())
-        self._began: dict[str, float] = {}
+        self._began_s: dict[str, float] = {}  # by lesson, as the slides say, or when it was shown
         self._limits: dict[tuple, Limit] = {}
 
     def limit(self, what: str, who: object, rate: float, burst: int) -> Limit:
@@ -65,24 +65,20 @@ class Room:
         known = self.store.lessons.get(Path(path).stem[3:])
         return known and (known.lesson.name, known.step_at(slides['places'].get(path, 0)))
 
-    def _gone(self, lesson: str, slides: dict) -> int:
-        """Return the minutes since the slides left the lesson's first one, or it was shown here."""
-        here = self._began.setdefault(lesson, time.time())
-        began = {Path(path).stem[3:]: at_s for path, at_s in slides.get('began', {}).items()}
-        return int(time.time() - began.get(lesson, here)) // 60
-
     def view(self) -> dict:
         """Return all that the page shows: where the slides have gone, or most students are."""
-        slides = deck()
+        slides, now_s = deck(), time.time()
         place = self._place_of(slides)
         if place and place != self._deck:
             self.go_to(*place)
             self._deck = place
+            self._began_s[place[0]] = slides['began'].get(slides['current'], now_s)
         elif self.follows_students:
             self.present = self.store.busiest() or self.present
         lesson, step = self.present
+        gone = int(now_s - self._began_s.setdefault(lesson, now_s)) // 60
         shown = self.store.view(lesson, step) | self.store.lessons[lesson].notes[step]
-        return shown | {'gone': self._gone(lesson, slides), 'joins': self.joins}
+        return shown | {'gone': gone, 'joins': self.joins}
 
 
 class Handler(web.RequestHandler):
