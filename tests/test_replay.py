@@ -284,6 +284,9 @@ def test_an_update_is_lost_without_a_lock_and_never_with_one(script):
     locked = counting({'lock': 'lock'}, *update, {'unlock': 'lock'})
     refused = script.call('refusal', locked, [*ARRIVALS, *TAKES, go[0]], {'do': 'go', 'thread': 1})
     assert refused == 'lock is locked: message 0 has it.'
+    third = {'do': 'arrive', 'callback': 0, 'seq': 2}
+    # One waits for the lock, and the other, who has it, goes on.
+    assert script.call('cause', locked, [*ARRIVALS, *TAKES, go[0], third]) == 'thread busy'
     played = script.call('play', locked | {'arrivals': arrivals}, eager)
     assert played['state']['values'] == {'count': 2}
     assert played['state']['locks'] == {}
