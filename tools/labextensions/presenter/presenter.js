@@ -174,9 +174,12 @@ function act(action, manager, presenter) {
       presenter._extents.delete(content.model); // each slide begins with its first part again
       content.activeCellIndex = 0;
       return;
-    case 'last':
-      content.activeCellIndex = content.widgets.length - 1;
+    case 'last': {
+      const leadsOn = ({ model }) => /^Next: \[/m.test(model.sharedModel.getSource());
+      const link = content.widgets.findLastIndex(leadsOn);
+      content.activeCellIndex = link < 0 ? content.widgets.length - 1 : link;
       return;
+    }
     case 'black':
       document.body.classList.toggle('deck-black');
       return;
