@@ -144,8 +144,8 @@ ADDED = [
     ('prints_what_stays', shown(text_plain='<Axes: >')),
     ('prints_what_stays', shown(text_plain='[<Line2D>]')),
     ('prints_what_stays', shown(text_plain="Text(0, 1, 'a')")),
-    ('compared', code('# NBVAL_IGNORE_OUTPUT\nrun()')),
-    ('compared', code('# NBVAL_IGNORE_OUTPUT\n# Not compared:\nrun()')),
+    ('compared', code('# NBVAL_IGNORE_OUTPUT\n# Not compared: times.\nrun()')),
+    ('compared', code('# Not compared:\nrun()', 'nbval-ignore-output')),
     ('compared', code('run()', 'nbval-ignore-output')),
     ('compared', code('# Not compared: slow.\n# NBVAL_SKIP\nrun()')),
     ('compared', code('run()  \n  # NBVAL_RAISES_EXCEPTION')),
@@ -187,7 +187,7 @@ def test_every_rule_is_broken_once():
 @pytest.mark.parametrize(
     'cell',
     [
-        code('# NBVAL_IGNORE_OUTPUT\n# Not compared: times.\nrun()'),
+        code('# Not compared: times.\nrun()', 'nbval-ignore-output'),
         code('run()\n' * rules.MAX_CODE_LINES),
         printed('/dev/shm is empty; the topic /worker, 1/tmp, and/or\n'),
         printed('    python3/site-packages/my_pkg/\n'),

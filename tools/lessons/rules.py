@@ -162,13 +162,13 @@ def prints_what_stays(lesson: Lesson) -> Iterator[str]:
 
 
 def compared(lesson: Lesson) -> Iterator[str]:
-    """All outputs are compared, but for NBVAL_IGNORE_OUTPUT with its reason."""
+    """All outputs are compared, but for the tag nbval-ignore-output with its reason."""
     for name, cell in code_cells(lesson):
         lines = [line.strip() for line in cell.source.splitlines()]
         comments = {line.lstrip('#').strip() for line in lines if line.startswith('#')}
         for marker in sorted(comments & set(comment_markers) | tags(cell) & set(metadata_tags)):
-            if marker.upper().replace('-', '_') != 'NBVAL_IGNORE_OUTPUT':
-                yield f'{name} has the marker {marker}, which no lesson may use.'
+            if marker != 'nbval-ignore-output':
+                yield f'{name} has the marker {marker}: only the tag nbval-ignore-output is used.'
             elif not any(line.startswith(REASON) and line != REASON.strip() for line in lines):
                 yield f'{name} has the marker {marker} without "{REASON}...".'
 
