@@ -119,7 +119,8 @@ def test_nbval_agrees_with_what_the_tool_saves(tmp_path, monkeypatch):
     path = saved(
         tmp_path,
         'import sys\nfrom pathlib import Path\nPath.cwd().name, sys.executable',
-        'import os\nprint("seen")\n_ = os.write(1, b"at C level")',
+        'import atexit, os\nprint("seen")\n_ = os.write(1, b"at C level")\n'
+        '_ = atexit.register(os.write, 2, b"at the end")',
         'import ipywidgets\nout = ipywidgets.Output()\nwith out:\n    print("in")\nout',
         RANDOM_FIGURE,
         'for i in range(3):\n    print(f"\\r{i} of 3", end="", flush=True)\nprint("\\rdone")',

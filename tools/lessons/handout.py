@@ -74,6 +74,7 @@ def download(lock: Path, folder: Path, pythons: tuple) -> None:
     [known] = re.findall('for Python (.+)', head)
     if unknown := set(pythons) - {*known.split()}:
         raise ValueError(f'Not every package has a wheel for Python {min(unknown)}: take {known}.')
+    print('Fetching the packages, about 200 MB', file=sys.stderr)
     folder.mkdir()
     wanted, fetched = folder / 'wanted.lock', set()
     for python in pythons:
@@ -110,8 +111,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--root', type=Path, default=ROOT)
     options = parser.parse_args(arguments)
     output = options.root / 'handout' / f'{NAME}.tar.gz'
-    if options.wheels:
-        print('Fetching the packages, about 200 MB', file=sys.stderr)
     try:
         solutions, pythons = not options.no_solutions, tuple(options.wheels)
         handout(options.root, output, solutions=solutions, pythons=pythons)

@@ -65,11 +65,15 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     for cell in notebook.cells:
         if cell.cell_type == 'code':
             cell.outputs, cell.execution_count = [], None
-    running = 0
+    running = said = 0
 
     def count(**_: object) -> None:
         nonlocal running
         running += 1
+
+    def note(**_: object) -> None:
+        nonlocal said
+        said = os.fstat(written.fileno()).st_size
 
     log = logging.getLogger('nbclient')
     log.setLevel(logging.CRITICAL)  # a failure is told once, by the RuntimeError
@@ -83,6 +87,7 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
         skip_cells_with_tag='',
         record_timing=False,
         on_cell_execute=count,
+        on_cell_executed=note,
         log=log,
     )
     # nbval knows no widgets: what is printed into an Output widget is output of the cell.
@@ -93,10 +98,11 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
         FILE_VARIABLE: '',  # what is saved is the table of a reader who has solved nothing
     }
     try:
-        with tempfile.TemporaryFile('w+', errors='replace') as written:
+        with tempfile.TemporaryFile() as written:
             client.execute(env=environment, stdout=subprocess.DEVNULL, stderr=written)
-            written.seek(0)
-            from_c = ''.join(line for line in written if not line.startswith('[IPKernelApp]'))
+            # Not what ZeroMQ may say when the kernel ends: nobody sees that.
+            lines = os.pread(written.fileno(), said, 0).decode(errors='replace').splitlines(True)
+            from_c = ''.join(line for line in lines if not line.startswith('[IPKernelApp]'))
     except CellExecutionError as error:
         what = f'{error.ename}: {error.evalue}'.splitlines()[0]
     except CellTimeoutError:
