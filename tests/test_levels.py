@@ -1,5 +1,6 @@
 """Levels: the game, played by chance and by the real rclpy."""
 
+import functools
 import json
 import re
 import threading
@@ -15,7 +16,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from std_msgs.msg import Int32
 from support.javascript import FOLDER, Script
-from support.nodes import LIMIT_S, spin
+from support.nodes import LIMIT_S, call_in_executor, spin
 from test_msgs.action import Fibonacci
 
 from helpers.replay.levels import LEVELS, level
@@ -257,11 +258,7 @@ def cancelled_job(setup):
         executor = spin(session, robot, threads=len(setup['threads']))
         own = spin(session, operator)
 
-        def ask(call, *arguments):
-            task = own.create_task(call, *arguments)
-            session.wait_until(task.done, LIMIT_S)
-            return task.result()
-
+        ask = functools.partial(call_in_executor, session, own)
         session.wait_until(client.server_is_ready, LIMIT_S)
         goal = ask(client.send_goal_async, Fibonacci.Goal())
         session.wait_until(lambda: goal.done() and at_place, LIMIT_S)

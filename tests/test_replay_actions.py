@@ -1,5 +1,6 @@
 """The run of an action, recorded with the real rclpy and replayed: for what a cancel waits."""
 
+import functools
 import threading
 import time
 
@@ -9,7 +10,7 @@ from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 from support.javascript import Script
-from support.nodes import LIMIT_S, spin
+from support.nodes import LIMIT_S, call_in_executor, spin
 from test_msgs.action import Fibonacci
 
 from helpers.replay.actions import ActionRecording, replay_action
@@ -79,11 +80,7 @@ def cancel():
             client = ActionClient(operator, Fibonacci, 'job')
             charger = operator.create_client(Trigger, 'charge')
 
-            def ask(call, *arguments):
-                task = own.create_task(call, *arguments)
-                session.wait_until(task.done, LIMIT_S)
-                return task.result()
-
+            ask = functools.partial(call_in_executor, session, own)
             session.wait_until(client.server_is_ready, LIMIT_S)
             goal = ask(client.send_goal_async, Fibonacci.Goal())
             session.wait_until(lambda: goal.done() and robot.begun.is_set(), LIMIT_S)

@@ -16,7 +16,8 @@ def in_networks() -> list[str]:
         for one in interface
         if one.family == socket.AF_INET and not one.address.startswith(THIS_MACHINE)
     ]
-    return sorted(found, key=lambda address: address != _towards_the_internet())
+    first = _towards_the_internet()
+    return sorted(found, key=lambda address: address != first)
 
 
 def _towards_the_internet() -> str:

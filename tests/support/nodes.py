@@ -125,3 +125,10 @@ def spin(session, *nodes, threads: int = 1):
         executor.add_node(node)
     session.spin(executor)
     return executor
+
+
+def call_in_executor(session, executor, call, *arguments):
+    """Let a thread of the executor make a call. Return what the call returns."""
+    task = executor.create_task(call, *arguments)
+    session.wait_until(task.done, LIMIT_S)
+    return task.result()
