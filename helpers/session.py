@@ -10,6 +10,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import gc
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -174,6 +175,9 @@ class Session:
             thread.start()
 
     def _spin(self, executor: Executor) -> None:
+        # JupyterLab interrupts all processes of the kernel. One that a callback starts, for example
+        # a pool's, inherits this: an Interrupt before it can refuse would break the pool for good.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             executor.spin()
         except (ExternalShutdownException, SessionClosedError):

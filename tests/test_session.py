@@ -3,6 +3,7 @@
 import contextlib
 import gc
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -630,6 +631,19 @@ def test_interrupts_at_each_line_of_what_must_not_be_cut(function):
         run_cell(interrupt)
     assert len(interrupted) > 5
     assert not hasattr(failure.value, '__notes__')
+
+
+@EXECUTORS
+def test_a_process_that_a_callback_starts_is_not_interrupted_with_the_cell(threads):
+    started = []
+    with ros_session() as session:
+        callback = Listener(lambda message: started.append(subprocess.Popen(['sleep', '60'])))
+        spin(session, callback, threads=threads)
+        Talker(1).publish()
+        session.wait_until(lambda: started, LIMIT_S)
+    started[0].send_signal(signal.SIGINT)
+    started[0].terminate()
+    assert started[0].wait() == -signal.SIGTERM
 
 
 def test_interrupt_between_a_publisher_and_its_node():

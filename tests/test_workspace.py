@@ -62,6 +62,14 @@ def other(built):
     workspace.close()
 
 
+@pytest.fixture
+def shell():
+    from IPython.core.interactiveshell import InteractiveShell
+
+    yield InteractiveShell.instance()
+    InteractiveShell.clear_instance()
+
+
 def wait_until(predicate, timeout_s=60.0) -> bool:
     end = time.monotonic() + timeout_s
     while not predicate() and time.monotonic() < end:
@@ -120,28 +128,6 @@ def test_mistakes_of_a_python_package(other):
     assert not result.ok
     assert "ignoring unknown package 'talker'" in ' '.join(result.errors)
     assert str(result).endswith('\n\nSummary: 0 packages finished')
-
-
-def test_an_overlay_hides_its_underlay_and_links_make_a_change_count(built):
-    def says(workspace):
-        with workspace.run('talker_pkg', 'talker') as talker:
-            talker.wait_for('')
-        return talker.lines[0]
-
-    overlay = Workspace('overlay', underlay=built)
-    write_talker(overlay, talker="def main():\n    print('above')\n")
-    result = overlay.build(symlink_install=True)
-    assert result.ok, result
-    assert str(result).startswith('colcon build --symlink-install\n')
-    (warning,) = result.warnings
-    assert "'talker_pkg' is in: ../install/talker_pkg\n" in warning
-    assert warning.endswith(
-        'This may be promoted to an error in a future release of colcon-override-check.'
-    )
-    assert says(overlay) == 'above'
-    overlay.write('src/talker_pkg/talker_pkg/talker.py', "def main():\n    print('linked')\n")
-    assert says(overlay) == 'linked'
-    assert says(built).endswith('Publishing: 0')
 
 
 def test_without_a_compiler_one_sentence_says_what_to_install(other, monkeypatch, tmp_path):
@@ -441,9 +427,9 @@ def test_of_a_traceback_the_last_line_is_told(built):
 
 
 def test_a_process_that_ignores_ctrl_c_is_killed_and_so_is_what_one_leaves(built, monkeypatch):
-    monkeypatch.setattr(processes, 'STOP_TIMEOUT_S', 0.3)
     ignores = 'trap "" INT TERM; printf "up "; echo and running; sleep 60; true'
-    with run_script(built, 'deaf.sh', ignores) as deaf:
+    with monkeypatch.context() as impatient, run_script(built, 'deaf.sh', ignores) as deaf:
+        impatient.setattr(processes, 'STOP_TIMEOUT_S', 0.3)
         assert deaf.wait_for('up') == 'up and running'
     assert deaf.wait() == -signal.SIGKILL
     with run_script(built, 'leaving.sh', f'({ignores}) & sleep 60') as leaving:
@@ -469,7 +455,7 @@ def test_a_killed_kernel_takes_its_nodes_with_it(built):
         assert wait_until(lambda: processes_of(path) == [])
 
 
-def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch):
+def test_an_interrupt_while_a_process_starts_leaves_none(built, shell, monkeypatch):
     built.environment()
     started = []
 
@@ -485,10 +471,11 @@ def test_an_interrupt_while_a_process_starts_leaves_none(built, monkeypatch):
         built.environment,  # its shell starts once after each build
         lambda: Process('sleep', ['sleep', '60'], dict(os.environ), built.path),
     ):
-        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        with monkeypatch.context() as patch:
             patch.setattr(subprocess, 'Popen', Interrupted)
-            start()
-        built.close()  # as after each cell that was interrupted
+            shell.user_ns['start'] = start
+            cell = shell.run_cell('start()')
+        assert isinstance(cell.error_in_exec, KeyboardInterrupt)
     assert [process.poll() is None for process in started] == [False] * 4
 
 
@@ -607,14 +594,6 @@ def test_a_file_stays_in_its_workspace(other, path):
 
 
 # --- In a notebook -------------------------------------------------------------------------------
-
-
-@pytest.fixture
-def shell():
-    from IPython.core.interactiveshell import InteractiveShell
-
-    yield InteractiveShell.instance()
-    InteractiveShell.clear_instance()
 
 
 def test_two_cells_write_a_file_in_any_order_and_again(shell, capsys):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
 import re
@@ -29,12 +30,14 @@ if os.getppid() == parent:
     os.execv(sys.argv[2], sys.argv[2:])
 """
 
+_started: set[Process] = set()  # and not stopped
+
 
 class Process:
     """A running process and what it has printed. See `Workspace.run`.
 
-    A lesson gets one from `Workspace.run`. Who makes one has to `stop()` it, whatever happens. With
-    `ends_with_kernel=False` it goes on when the kernel is killed.
+    It ends with its `with` block, with `stop()`, when a cell is interrupted, and with the kernel.
+    With `ends_with_kernel=False` it goes on when the kernel is killed.
     """
 
     def __init__(
@@ -50,26 +53,23 @@ class Process:
         self.name = name
         # Not a pipe, which would need a thread that reads it.
         self._output = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
-        self._process = None
-        try:
-            with uninterrupted():
-                self._process = subprocess.Popen(
-                    command,
-                    env=environment,
-                    cwd=folder,
-                    stdin=subprocess.DEVNULL,
-                    stdout=self._output,
-                    stderr=subprocess.STDOUT,
-                    # What goes on when the kernel is killed, such as a build, keeps its workspace
-                    # claimed.
-                    pass_fds=locks(),
-                    # Interrupting the kernel must not reach it: its owner ends it in order.
-                    start_new_session=True,
-                )
-        except KeyboardInterrupt:  # it gets no owner
-            if self._process:
-                self.stop()
-            raise
+        if 'IPython' in sys.modules and (shell := sys.modules['IPython'].get_ipython()):
+            shell.events.register('post_run_cell', _after_cell)  # once, however often this is said
+        with uninterrupted():
+            self._process = subprocess.Popen(
+                command,
+                env=environment,
+                cwd=folder,
+                stdin=subprocess.DEVNULL,
+                stdout=self._output,
+                stderr=subprocess.STDOUT,
+                # What goes on when the kernel is killed, such as a build, keeps its workspace
+                # claimed.
+                pass_fds=locks(),
+                # Interrupting the kernel must not reach it: its owner ends it in order.
+                start_new_session=True,
+            )
+            _started.add(self)
 
     @property
     def lines(self) -> list[str]:
@@ -138,6 +138,7 @@ class Process:
         with uninterrupted():
             if self.running:
                 self._stop()
+            _started.discard(self)
 
     def _stop(self) -> None:
         for sent, timeout_s in (
@@ -157,3 +158,19 @@ class Process:
 
     def __exit__(self, *exception) -> None:
         self.stop()
+
+
+@atexit.register
+def _stop_all() -> None:
+    with uninterrupted():
+        for process in list(_started):
+            process.stop()
+
+
+def _after_cell(result) -> None:
+    """End the processes when a cell was interrupted, in its code or in IPython's (no result).
+
+    The Interrupt may have come before who started one could keep it.
+    """
+    if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
+        _stop_all()

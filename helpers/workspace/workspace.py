@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import os
 import re
 import shutil
@@ -48,7 +47,8 @@ class Workspace:
                 f'Name a workspace with letters, digits, _ and -, such as lesson_08, not {name!r}.'
             )
         if underlay is None:
-            _close()
+            if _open_workspace is not None:
+                _open_workspace.close()
         elif name in underlay._overlays:
             underlay._overlays[name].close()
         self._underlay = underlay
@@ -148,19 +148,13 @@ class Workspace:
         main = 'import sys; from colcon_core.command import main; sys.exit(main())'
         command = [sys.executable, '-c', main, '--log-base', 'log', *arguments]
         environment = self._underlay.environment() if self._underlay else build_environment()
-        colcon = None
-        try:
-            with uninterrupted():
-                # Killed, it would leave compilers without an owner: rather it builds to its end.
-                colcon = Process('colcon', command, environment, self.path, ends_with_kernel=False)
+        # Killed, it would leave compilers without an owner: rather it builds to its end.
+        with Process('colcon', command, environment, self.path, ends_with_kernel=False) as colcon:
             started = time.monotonic()
             with ProgressBar(lambda: _packages_done(colcon.lines) / total) as bar:
                 while colcon.running:
                     time.sleep(POLL_S)
                     bar.update(time.monotonic() - started)
-        finally:
-            if colcon is not None:
-                colcon.stop()
         return colcon.lines
 
     # --- Use ---
@@ -208,9 +202,8 @@ class Workspace:
             command, found = _command(package, executable, environment), True
         except LookupError as error:
             command, found = ['/bin/sh', '-c', 'echo "$0"; exit 1', str(error)], False
-        with uninterrupted():
-            process = Process(executable, [*command, *arguments], environment, self.path)
-            self._processes[key] = process
+        process = Process(executable, [*command, *arguments], environment, self.path)
+        self._processes[key] = process
         if not found:
             process.wait()
         return process
@@ -227,16 +220,9 @@ class Workspace:
             'GIT_CONFIG_GLOBAL': os.devnull,
             'GIT_CONFIG_NOSYSTEM': '1',
         }
-        shell = None
-        try:
-            with uninterrupted():
-                bash = shutil.which('bash') or '/bin/bash'
-                command = [bash, '--norc', '-c', commands]
-                shell = Process('bash', command, environment, self.path)
+        command = [shutil.which('bash') or '/bin/bash', '--norc', '-c', commands]
+        with Process('bash', command, environment, self.path) as shell:
             shell.wait(60)
-        finally:
-            if shell is not None:
-                shell.stop()
         return without_folders('\n'.join(shell.lines), self.path)
 
     def close(self) -> None:
@@ -315,12 +301,6 @@ def write(line: str, cell: str) -> None:
     print(f'Wrote part {part} of {path}' if part else f'Wrote {path}')
 
 
-def _after_cell(result) -> None:
-    """End the processes when a cell was interrupted, in its code or in IPython's (no result)."""
-    if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
-        _close()
-
-
 def _register_in_ipython() -> None:
     try:
         from IPython import get_ipython
@@ -330,10 +310,3 @@ def _register_in_ipython() -> None:
     if shell is None or 'write' in shell.magics_manager.magics['cell']:
         return
     shell.register_magic_function(write, 'cell')
-    shell.events.register('post_run_cell', _after_cell)
-
-
-@atexit.register
-def _close() -> None:
-    if _open_workspace is not None:
-        _open_workspace.close()
