@@ -245,9 +245,7 @@ def _tell(kind: str, **what: object) -> None:
 def _hand(up: bool, text: str) -> None:
     known = None
     with suppress(OSError, sqlite3.Error):
-        if path := _file_of_class():
-            with closing(_open(path)) as db:
-                known = _class(db)
+        known = _known()
     _tell('hand', up=up)
     print(text if known else NOT_JOINED)
     _outbox.say_trouble()
@@ -262,7 +260,9 @@ def _join(address: str, code: str, name: str) -> str:
         raise ValueError("Copy it from the wall: join_class('192.0.2.5:8765', 'blue-otter-lamp').")
     url = hub or f'{"" if "://" in address else "http://"}{address.rstrip("/")}'
     address = address or 'the hub'
-    token = os.environ.get('JUPYTERHUB_API_TOKEN', '') if hub else ''
+    known = _known()
+    # Who joins again, as after a restart of the kernel, keeps the seat, and is counted once.
+    token = known.token if known and known.url == url else _hub_token()
     try:
         answer = _ask(Class(url, token), 'join', {'code': code, 'name': name})
     except OSError as problem:
@@ -271,7 +271,8 @@ def _join(address: str, code: str, name: str) -> str:
             'this computer in the same network?'
         ) from None
     with closing(_open(path)) as db, db:
-        db.execute('DELETE FROM waiting')
+        if answer['token'] != token:
+            db.execute('DELETE FROM waiting')
         db.execute('DELETE FROM class')
         if not hub:
             until_s = time.time() + JOINED_FOR_S
@@ -352,12 +353,25 @@ def _open(path: Path) -> sqlite3.Connection:
     return db
 
 
+def _known() -> Class | None:
+    """Return the class of this student, without making a file for one who has joined none."""
+    if path := _file_of_class():
+        with closing(_open(path)) as db:
+            return _class(db)
+    return None
+
+
 def _class(db: sqlite3.Connection) -> Class | None:
     row = db.execute('SELECT url, token, until_s FROM class').fetchone()
     if row and row[2] > time.time():
         return Class(*row[:2])
     hub = os.environ.get(HUB_VARIABLE)
-    return Class(hub, os.environ.get('JUPYTERHUB_API_TOKEN', '')) if hub and not row else None
+    return Class(hub, _hub_token()) if hub and not row else None
+
+
+def _hub_token() -> str:
+    """Return what says to a JupyterHub's class whose server this is; nothing elsewhere."""
+    return os.environ.get('JUPYTERHUB_API_TOKEN', '') if os.environ.get(HUB_VARIABLE) else ''
 
 
 def _first(db: sqlite3.Connection) -> list[tuple[int, str]]:

@@ -206,6 +206,21 @@ def test_a_code_that_is_wrong(opened, tmp_path):
 # --- When the class does not answer --------------------------------------------------------------
 
 
+def test_who_joins_again_keeps_the_seat_and_what_waits(tmp_path):
+    """As where the kernel is restarted, and all cells above are run again."""
+    with running_class(tmp_path / 'class') as opened:
+        said = in_kernel(tmp_path / 'ada', join(opened) + f'guess({QUESTION!r}, 1)')
+        opened.kill()
+        in_kernel(tmp_path / 'ada', f'guess({QUESTION!r}, 2)')
+        opened.start()
+        opened.go(1)
+        with kernel(tmp_path / 'ada', join(opened) + f'guess({QUESTION!r}, 3)') as again:
+            view = opened.wait_for(lambda view: opened.bars() == {'3': 1})
+        assert again == said
+        assert view['seats'] == 1
+        assert [line[-1] for line in opened.csv()[1:]] == ['1', '2', '3']
+
+
 def test_what_is_told_while_the_server_is_gone_is_counted_once(tmp_path):
     """The server is killed in the middle; kernels end and begin; a clock is a year behind."""
     behind = 'import time\nreal = time.time\ntime.time = lambda: real() - 3e7\n'

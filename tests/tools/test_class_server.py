@@ -131,23 +131,38 @@ def test_a_guess_is_shown_from_where_it_is_asked_to_where_it_is_compared(opened)
     assert opened.view()['guesses'][1]['given'] == '2, 10'  # a set, as students' computers send it
 
 
+def walk(opened, place):
+    """Write what presenter.js writes when the deck comes to a cell."""
+    path = f'presentation/02_{NAME}.ipynb'
+    began = {path: time.time() - 600} if place else {}  # the minutes begin after the first slide
+    deck = {'data': {'current': path, 'places': {path: place}, 'began': began}}
+    file = opened.folder / 'jupyter/lab/workspaces' / DECK
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps(deck))
+
+
 def test_the_page_follows_the_deck_and_the_instructor(opened):
-    workspaces = opened.folder / 'jupyter/lab/workspaces'
-    workspaces.mkdir(parents=True, exist_ok=True)
-
-    def walk(place):
-        path = f'presentation/02_{NAME}.ipynb'
-        began = {path: time.time() - 600}
-        deck = {'data': {'current': path, 'places': {path: place}, 'began': began}}
-        (workspaces / DECK).write_text(json.dumps(deck))
-
-    walk(7)
+    walk(opened, 7)
     opened.wait_for(lambda view: view['step'] == '2. Look')
     assert opened.view()['gone'] == 10
     opened.go(0)
     assert opened.view()['step'] == '02 Lose messages'
-    walk(2)
+    walk(opened, 0)
+    opened.wait_for(lambda view: view['gone'] == 0)
+    walk(opened, 2)
     opened.wait_for(lambda view: view['step'] == '1. Count')
+
+
+def test_after_a_crash_the_page_is_where_the_slides_are(tmp_path):
+    opened = RunningClass(tmp_path)
+    opened.start()
+    opened.tell(opened.join(), event())
+    walk(opened, 7)
+    opened.kill()
+    opened.start()
+    view = opened.view()
+    opened.kill()
+    assert (view['step'], view['gone'], view['guesses'][0]['answered']) == ('2. Look', 10, 1)
 
 
 def test_a_seat_that_leaves_is_forgotten(opened):

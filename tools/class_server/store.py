@@ -111,8 +111,9 @@ class Class:
         return refused
 
     def lower(self, seat: int) -> None:
-        """Take the hand of a seat down."""
-        hand = {'id': secrets.token_hex(8), 'kind': 'hand', 'lesson': next(iter(self.lessons))}
+        """Take the hand of a seat down. Raises LookupError where it has raised none."""
+        lesson, _ = self._latest['', 'hand', ''][seat]
+        hand = {'id': secrets.token_hex(8), 'kind': 'hand', 'lesson': lesson}
         self.take(seat, [hand | {'up': False}])
 
     def _problem(self, event: object) -> str:

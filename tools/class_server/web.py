@@ -45,8 +45,9 @@ class Room:
         self.joins: list[str] = []  # what students type, for the wall
         self.present = next(iter(store.lessons)), 0
         self.follows_students = True  # until a deck or the instructor says where the class is
-        self._deck = self._place_of(deck())
-        self._began_s: dict[str, float] = {}  # by lesson, as the slides say, or when it was shown
+        # Slides of another day may be there. Those of a class that was broken off are its own.
+        self._deck = None if store.went_on else self._place_of(deck())
+        self._began_s: dict[str, float | None] = {}  # by lesson, as the slides say, or when shown
         self._limits: dict[tuple, Limit] = {}
 
     def limit(self, what: str, who: object, rate: float, burst: int) -> Limit:
@@ -60,23 +61,25 @@ class Room:
         self.store.lessons[lesson].starts[step]
         self.present, self.follows_students = (lesson, step), False
 
-    def _place_of(self, slides: dict) -> tuple[str, int] | None:
+    def _place_of(self, slides: dict) -> tuple[str, int, float | None] | None:
+        """Return lesson and step of the slides, and since when: None on the first slide."""
         path = slides.get('current', '')
         known = self.store.lessons.get(Path(path).stem[3:])
-        return known and (known.lesson.name, known.step_at(slides['places'].get(path, 0)))
+        step = known and known.step_at(slides['places'].get(path, 0))
+        return known and (known.lesson.name, step, slides['began'].get(path))
 
     def view(self) -> dict:
         """Return all that the page shows: where the slides have gone, or most students are."""
-        slides, now_s = deck(), time.time()
-        place = self._place_of(slides)
+        place = self._place_of(deck())
         if place and place != self._deck:
-            self.go_to(*place)
-            self._deck = place
-            self._began_s[place[0]] = slides['began'].get(slides['current'], now_s)
+            lesson, step, began_s = self._deck = place
+            self.go_to(lesson, step)
+            self._began_s[lesson] = began_s
         elif self.follows_students:
             self.present = self.store.busiest() or self.present
         lesson, step = self.present
-        gone = int(now_s - self._began_s.setdefault(lesson, now_s)) // 60
+        began_s = self._began_s.setdefault(lesson, time.time())
+        gone = int(time.time() - began_s) // 60 if began_s else 0
         shown = self.store.view(lesson, step) | self.store.lessons[lesson].notes[step]
         return shown | {'gone': gone, 'joins': self.joins}
 
