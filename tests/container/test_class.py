@@ -293,19 +293,11 @@ def start(make, service, folder):
         assert done.stdout == ('' if done.returncode else f'{service}\n')
         return done.stderr
 
-    @contextlib.contextmanager
-    def start(config: str = ''):
+    def start(config: str = '') -> Hub:
         assert check() == ''
         state = folder / 'hub'
         state.mkdir(exist_ok=True)
-        hub = Hub(state, config, make.checkout, CONTAINERS='yes', **variables)
-        try:
-            yield hub
-        except BaseException:
-            print(hub.log.read_text()[-5000:])
-            raise
-        finally:
-            hub.stop()
+        return Hub(state, config, make.checkout, CONTAINERS='yes', **variables)
 
     start.check = check
     return start

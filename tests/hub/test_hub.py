@@ -8,7 +8,6 @@ import asyncio
 import contextlib
 import os
 import re
-import shutil
 import socket
 import subprocess
 import sys
@@ -193,16 +192,9 @@ async def teach(hub: Hub) -> ClassHour:
 @pytest.fixture(scope='module')
 def hour(request) -> ClassHour:
     # A short name: the path of a socket file is limited to 107 bytes.
-    folder = Path(tempfile.mkdtemp(prefix='hub-', dir='/tmp'))
-    hub = Hub(folder, CONFIG)
-    try:
+    short = tempfile.TemporaryDirectory(prefix='hub-', dir='/tmp', ignore_cleanup_errors=True)
+    with short as folder, Hub(Path(folder), CONFIG) as hub:
         yield asyncio.run(teach(hub))
-    except BaseException:
-        print(hub.log.read_text()[-5000:])
-        raise
-    finally:
-        hub.stop()
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 # --- What is expected of it ----------------------------------------------------------------------

@@ -73,6 +73,8 @@ def free_ports(count: int) -> list[int]:
 class Hub:
     """A running JupyterHub: that of `make hub` in `root`, with its state in `folder`.
 
+    It ends with its `with` block. Where that fails, it prints what the hub said last.
+
     `config` is added to its configuration, and `variables` to its environment.
     """
 
@@ -171,8 +173,13 @@ class Hub:
                     found.append(process)
         return found
 
-    def stop(self) -> None:
+    def __enter__(self) -> 'Hub':
+        return self
+
+    def __exit__(self, failure: type | None, *_) -> None:
         """End the hub, its proxy and the servers, as Ctrl+C does. Whatever is left is killed."""
+        if failure:
+            print(self.log.read_text()[-5000:])
         self.process.send_signal(signal.SIGTERM)
         with contextlib.suppress(subprocess.TimeoutExpired):
             self.process.wait(END_S)
