@@ -135,7 +135,8 @@ def test_the_hints_of_a_second_try_are_not_compared():
         ('File ~/my env/site-packages/numpy/_core/numeric.py:12\n     10 import x', True),
         ('File <frozen importlib._bootstrap>:1176, in _find_and_load(name, import_)', True),
         ('File ~/env/numpy/_core/numeric.py:580, in ones(shape)\n    579 result', False),
-        ('Cell In[1], line 1\n----> 1 import numpy', False),
+        ('Cell In[1], line 1\n----> 1 import numpy', True),
+        ('Cell In[1], line 1\n----> 1 important = ones(3)', False),
     ],
 )
 def test_an_interrupted_import_is_seen_in_the_traceback(frame, import_):

@@ -35,8 +35,9 @@ ANSWER_TIMEOUT_S = 60.0  # of a kernel that is alive, on a busy machine
 # From the second try on, the check of an exercise also prints hints. A fresh run has none.
 HINTS = re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE)
 KERNEL_LOST = (Empty, RuntimeError, ValueError)  # no answer, a dead kernel, a broken message
-# In IPython's traceback: the top level of a module.
-IN_IMPORT = re.compile(r'^File (<frozen importlib|.+\.py:\d+$)', re.MULTILINE)
+# In IPython's traceback: the top level of a module, or the cell's own import where Python has left
+# out all frames below it.
+IN_IMPORT = re.compile(r'^File (<frozen importlib|.+\.py:\d+$)|^-+> \d+ (import|from) ', re.M)
 COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
 
 
@@ -141,6 +142,7 @@ class Interrupted(IPyNbCell):
         else:  # ipykernel does so by itself (CONTRIBUTING.md), a lesson that is wrong does it twice
             self.raise_cell_error(f'Run for {after_s:.3f} s. The kernel is lost: {why}')
         traceback = COLOURS.sub('', '\n'.join(error.get('traceback', [])))
+        self.user_properties.append(('traceback', traceback))  # for who asks why a later cell fails
         if IN_IMPORT.search(traceback):
             # Python cannot repeat a half-done import of NumPy: the reader restarts the kernel.
             self.user_properties.append(('in_import', True))
