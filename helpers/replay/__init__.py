@@ -183,7 +183,7 @@ def replay(
         made, first = _part_of(made, depth, part)
     setup = {
         'threads': names,
-        'groups': [{'name': group, 'exclusive': group == EXCLUSIVE}],
+        'groups': [{'name': 'the group', 'exclusive': group == EXCLUSIVE}],
         'callbacks': [{'name': 'subscription', 'group': 0, 'depth': depth}],
     }
     moves = [

@@ -9,7 +9,7 @@ const many = ({ setup }) => setup.callbacks.length > 1;
 const asks = ({ setup }) => setup.callbacks.some(({ does = [] }) => does.some(step => 'client' in step));
 
 // The lists of one run.
-function panel(run, record, picture, [from, until], [left, right, top, bottom]) {
+function panel(run, record, picture, [from, until], [left, right, top, bottom], grouped) {
   const list = name => element('ul', { 'aria-label': name, role: 'list', class: `replay-${name}` });
   const [threads, groups, queue, lost] = ['threads', 'groups', 'queue', 'lost'].map(list);
   const places = element('span', { 'aria-hidden': 'true' });
@@ -75,7 +75,7 @@ function panel(run, record, picture, [from, until], [left, right, top, bottom]) 
   const name = record.name || undefined;
   const node = element('div', { class: 'replay-run', role: name && 'group', 'aria-label': name },
     row(record.name || 'time', time),
-    row('threads', threads), row('groups', groups),
+    row('threads', threads), ...(grouped ? [row('groups', groups)] : []),
     row('queue', queue, places), ...(calls ? [row('circle', circle)] : many(record) ? [] : [row('lost', lost)]), shown);
   return { node, draw };
 }
@@ -102,7 +102,10 @@ function show(root, record) {
   let delay = 0;
 
   const pictures = [...root.querySelectorAll('figure > img')];
-  const panels = record.runs.map((one, i) => panel(runs[i], one, pictures[i], record.span, record.plots[i]));
+  // One thread that runs one callback needs no group to be understood.
+  const grouped = record.runs.some(one => many(one) || one.setup.threads.length > 1);
+  const panels = record.runs.map(
+    (one, i) => panel(runs[i], one, pictures[i], record.span, record.plots[i], grouped));
   const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
   const slider = element('input', {
     type: 'range', min: 0, max: last, step: 1, 'aria-label': 'step', oninput: () => go(+slider.value),
