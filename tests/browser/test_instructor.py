@@ -84,4 +84,6 @@ def test_run_and_change_a_cell_in_a_slide(deck):
     deck.wait_until_ran(check)
     assert complaints(deck.cells()[check]) == []
     assert 'All done.' in printed(deck.cells()[check])
+    number = deck.page.locator('.jp-deck-mod-visible .jp-InputPlaceholder .jp-InputPrompt').last
+    assert number.inner_text() == f'[{deck.cells()[check]["execution_count"]}]:'
     assert deck.page.evaluate(CUT_OFF) == []

@@ -1,7 +1,10 @@
 """In front of a class: what is typed stays where it was typed, and the deck where it was."""
 
-from lab_page import PANEL, SLIDES_SHOWN, printed
+import nbformat
+from lab_page import CUT_OFF, PANEL, SLIDES_SHOWN, printed
 from lab_server import ROOT
+
+from tools.lessons.slides import height, slide_types
 
 LESSON = '02_lose_messages.ipynb'
 START, NEXT = '00_start_here.ipynb', '01_publish_and_subscribe.ipynb'
@@ -21,9 +24,19 @@ TWO_SAVES = f"""async milliseconds => {{
     await Promise.all([first, context.save()]);
     return !context.model.dirty;
 }}"""
-LETTER = (
-    "() => parseFloat(getComputedStyle(document.querySelector('.cm-focused .cm-line')).fontSize)"
-)
+# The smallest letters in these parts of the slide, in pixels of a slide of 1280 x 720.
+LETTERS = """parts => {
+    const pixel = Math.min(innerHeight, 0.5625 * innerWidth) / 720;
+    const size = part => parseFloat(getComputedStyle(part).fontSize) / pixel;
+    return Math.min(...[...document.querySelectorAll(parts)].map(size));
+}"""
+# The same of the picture of a replay, whose letters are a part of its width.
+LABELS = """() => {
+    const pixel = Math.min(innerHeight, 0.5625 * innerWidth) / 720;
+    const picture = document.querySelector('.jp-deck-mod-onscreen .replay-on img');
+    const size = decodeURIComponent(picture.src).match(/font-size='(\\d+)'/)[1];
+    return size * picture.getBoundingClientRect().width / picture.naturalWidth / pixel;
+}"""
 # Of a traceback: it is cut, its end is not, and it is on the screen.
 LAST_LINE = """() => {
     const seen = document.querySelector('.jp-deck-mod-onscreen [data-mime-type$="jupyter.stderr"]');
@@ -33,6 +46,15 @@ LAST_LINE = """() => {
     const box = seen.getBoundingClientRect();
     return [seen.scrollHeight > box.height, end <= box.bottom + 1, box.bottom <= innerHeight];
 }"""
+END_IN_SIGHT = """() => [...document.querySelectorAll('.jp-deck-mod-onscreen .jp-OutputArea')]
+    .at(-1).getBoundingClientRect().bottom <= innerHeight"""
+SCROLLED = "() => document.querySelector('.jp-deck-mod-onscreen').getBoundingClientRect().top < 0"
+CALLS = ''.join(f'def f{n}():\n    f{n + 1}()\n' for n in range(9)) + 'f0()'
+PRINTS = """import time
+for number in range(60):
+    print(number)
+    time.sleep(0.05)"""
+IN_REPLAY = "() => document.activeElement.matches('.replay-on')"
 IN_SIGHT = f"""() => {{
     const box = {PANEL}.content.activeCell.node.getBoundingClientRect();
     return !document.body.dataset.jpDeckMode && box.height && box.top > 0 && box.top < innerHeight;
@@ -94,19 +116,47 @@ def test_a_save_during_a_save_asks_nothing(deck):
     assert deck.page.locator('.jp-Dialog').count() == 0
 
 
-def test_code_is_large_and_of_a_traceback_the_last_line_is_seen(deck):
+def test_letters_are_large_and_the_end_of_an_output_is_seen(deck):
     deck.present(LESSON)
-    code = walk_to_code(deck)
+    notebook = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4)
+    full, used = {}, 0
+    for index, (cell, kind) in enumerate(zip(notebook.cells, slide_types(notebook), strict=True)):
+        used = height(cell) + (used if kind in ('fragment', 'skip') else 0)
+        if (cell.cell_type, kind) == ('code', 'fragment'):
+            full[index] = used
+    code = max(full, key=full.get)
+    deck.page.evaluate(f'() => {{ {PANEL}.content.activeCellIndex = {code} }}')
+    deck.wait_for_slide(code)
+    assert deck.page.evaluate(LETTERS, '.jp-deck-mod-onscreen :is(td, th)') >= 18
+    assert not deck.page.evaluate(SCROLLED)
     deck.page.keyboard.press('Enter')
+    assert deck.page.evaluate(LETTERS, '.cm-focused .cm-line') >= 20
     deck.page.keyboard.press('Control+A')
-    deck.page.keyboard.insert_text(
-        ''.join(f'def f{n}():\n    f{n + 1}()\n' for n in range(9)) + 'f0()'
-    )
-    assert deck.page.evaluate(LETTER) >= 20
+    deck.page.keyboard.insert_text(CALLS)
     deck.page.keyboard.press('Control+Enter')
     deck.wait_until_ran(code)
     assert deck.page.evaluate(LAST_LINE) == [True, True, True]
+    assert deck.page.evaluate(SCROLLED)
     deck.screenshot('traceback')
+    deck.page.keyboard.press('Enter')
+    deck.page.keyboard.press('Control+A')
+    deck.page.keyboard.insert_text(PRINTS)
+    for scrolls in (True, False):
+        deck.page.keyboard.press('Control+Enter')
+        deck.page.wait_for_function(SCROLLED)
+        if scrolls:
+            deck.page.mouse.move(640, 300)
+            deck.page.mouse.wheel(0, -9000)
+            deck.page.wait_for_function(f'() => !({SCROLLED})()')
+        deck.wait_until_ran(code)
+        assert deck.page.evaluate(SCROLLED) != scrolls
+        assert deck.page.evaluate(END_IN_SIGHT) != scrolls
+    deck.page.keyboard.press('Enter')
+    deck.page.keyboard.press('Control+A')
+    deck.page.keyboard.insert_text('print(1)')
+    deck.page.keyboard.press('Control+Enter')
+    deck.wait_until_ran(code)
+    assert not deck.page.evaluate(SCROLLED)
 
 
 def test_a_key_walks_blackens_or_does_nothing(deck):
@@ -177,7 +227,16 @@ def test_a_clicker_steps_through_a_replay(deck):
     deck.page.keyboard.press('Control+A')
     deck.page.keyboard.insert_text(REPLAY)
     deck.page.keyboard.press('Control+Enter')
+    deck.wait_until_ran(code)
     says = deck.page.locator('.jp-deck-mod-onscreen .replay-on [aria-live]')
+    for width, tall in ((1024, 768), (1920, 1080), (1280, 720)):
+        deck.page.set_viewport_size({'width': width, 'height': tall})
+        assert deck.page.evaluate(LETTERS, '.replay-on :is(p, li, b, button, label)') >= 20
+        assert deck.page.evaluate(LABELS) >= 13.5
+        deck.page.keyboard.press('PageDown')
+        for key in ('End', 'Home'):
+            deck.page.locator('.replay-on').press(key)
+            assert deck.page.evaluate(CUT_OFF) == []
     first = says.inner_text()
     for key in ('PageDown', 'ArrowRight'):
         deck.page.keyboard.press(key)
@@ -185,6 +244,14 @@ def test_a_clicker_steps_through_a_replay(deck):
         deck.page.keyboard.press('PageUp')
         assert says.inner_text() == first
     assert deck.active() == code
+    deck.page.keyboard.press('PageDown')
+    deck.page.evaluate(f'() => {{ {PANEL}.context.model.dirty = true }}')
+    deck.page.evaluate(AUTOSAVE)
+    assert deck.page.evaluate(IN_REPLAY)
     deck.screenshot('replay')
+    deck.page.keyboard.press('Escape')
+    deck.wait_for_slide(code)
+    assert not deck.page.evaluate(IN_REPLAY)
+    deck.page.keyboard.press('PageDown')
     deck.page.keyboard.press('End')
     assert deck.press('PageDown') > code

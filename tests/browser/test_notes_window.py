@@ -1,5 +1,6 @@
 """The instructor's window: it follows the deck, and shows itself to nobody without the secret."""
 
+import json
 import re
 import urllib.error
 import urllib.request
@@ -9,6 +10,8 @@ import nbformat
 import psutil
 import pytest
 from lab_server import ROOT, server
+
+from tools.lessons.present import DECK
 
 LESSON = '02_lose_messages.ipynb'
 CELLS = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4).cells
@@ -28,6 +31,12 @@ def status(address):
         return urllib.request.urlopen(address).status
     except urllib.error.HTTPError as error:
         return error.code
+
+
+def began_at(running):
+    """Return when the minutes of the lesson began, as JupyterLab's server keeps it."""
+    file = running.folder / 'JUPYTER_CONFIG_DIR' / 'lab' / 'workspaces' / DECK
+    return json.loads(file.read_text())['data']['began'].get(f'presentation/{LESSON}')
 
 
 def words(text):
@@ -75,7 +84,14 @@ def test_the_window_follows_the_deck(deck, window):
 
 
 def test_both_windows_may_be_reloaded(deck, window):
-    place = [deck.press('PageDown') for _ in range(5)][-1]
+    assert began_at(deck.server) is None
+    place = deck.press('PageDown')
+    wait_for_place(window, place)
+    began = began_at(deck.server)
+    for key in ('PageUp', 'PageDown'):
+        wait_for_place(window, deck.press(key))
+        assert began_at(deck.server) == began  # a glance at the first slide
+    place = [deck.press('PageDown') for _ in range(4)][-1]
     window.reload()
     wait_for_place(window, place)
     deck.page.reload()
@@ -85,6 +101,8 @@ def test_both_windows_may_be_reloaded(deck, window):
     deck.page.keyboard.press('Home')
     deck.wait_for_slide(0)
     wait_for_place(window, 0)
+    assert began_at(deck.server) is None
+    assert '/state' not in Path(deck.server.folder, 'log').read_text()
 
 
 def test_a_tablet_needs_the_secret_and_reaches_the_notes_only(chromium, tmp_path):

@@ -37,6 +37,7 @@ def test_slides_and_minutes_only_grow_and_end_at_those_of_the_lesson(tmp_path, l
     )
     assert states[-1]['planned'] == states[-1]['all'] == lesson.minutes
     assert states[-1]['cells'] == ''
+    assert states[-1]['notes'] == ''  # those of an earlier step do not stay
     shown = ''.join(state['notes'] for state in states)
     for cell in cells:
         if 'notes' in cell.metadata.get('tags', []):
@@ -50,3 +51,6 @@ def test_nothing_but_a_copy_is_read(tmp_path):
     for path in ('', 'other.ipynb', '../other.ipynb', 'presentation/../other.ipynb'):
         assert notes_window.state(tmp_path, {'current': path, 'places': {}, 'began': {}}) == {}
     assert notes_window.state(tmp_path, {}) == {}
+    path = 'presentation/saved.ipynb'
+    (tmp_path / path).touch()  # as while JupyterLab saves it
+    assert notes_window.state(tmp_path, {'current': path, 'places': {}, 'began': {}}) == {}

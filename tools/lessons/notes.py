@@ -17,14 +17,23 @@ def of_step(cells: list[NotebookNode], at: int) -> dict:
     step = max((i for i in steps if i <= at), default=0)
     end = min((i for i in steps if i > at), default=len(cells))
     before = [i for i in notes if i < end]
-    for_it = [i for i in before if i > step] or before[-1:]  # a note may be for two steps
+    title = first_heading(cells[step].source)
+    own = [i for i in before if i > step]
+    for_it = own or [i for i in before[-1:] if _is_for(cells[i].source, title)]
     return {
         'lesson': first_heading(cells[0].source),
-        'step': first_heading(cells[step].source),
+        'step': title,
         'notes': ''.join(markdown2html(_with_breaks(cells[i].source)) for i in for_it),
         'planned': sum(minutes[i] for i in before),
         'all': sum(minutes.values()),
     }
+
+
+def _is_for(note: str, title: str) -> bool:
+    """Return whether a note of an earlier step is for this one, too: `for steps 1 and 2`."""
+    steps = re.search(r'for steps (\d+) and (\d+)', note)
+    number = re.match(r'(\d+)\. ', title)
+    return bool(steps and number and int(steps[1]) <= int(number[1]) <= int(steps[2]))
 
 
 def _with_breaks(source: str) -> str:

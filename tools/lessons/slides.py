@@ -39,7 +39,7 @@ MARKUP = re.compile(r'<[^>]+>|\]\([^)]*\)|[*`\[]')
 CODE = {8: 62.0, 18: 38.0, 999: 28.0}  # lines of code at most: the height of a figure
 LETTER = 2.78  # of code
 CODE_LINE, CODE_CHARACTER = 1.2, 0.61  # times the size of a letter
-REPLAY = 80.0  # one row of threads, and the picture that it makes smaller; a level is no higher
+REPLAY = 80.0  # about; the live deck scrolls to the end of a higher one
 PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 
 

@@ -53,7 +53,10 @@ def state(root: Path, deck: dict) -> dict:
     file = root / FOLDER / Path(deck.get('current', '')).name
     if not file.is_file():
         return {}
-    cells = _cells(file, file.stat().st_mtime_ns)
+    try:
+        cells = _cells(file, file.stat().st_mtime_ns)
+    except (OSError, ValueError):  # JupyterLab is writing it
+        return {}
     at = min(deck['places'].get(deck['current'], 0), len(cells) - 1)
     types = [cell.metadata.get('slideshow', {}).get('slide_type') for cell in cells]
     starts = [i for i, kind in enumerate(types) if kind in ('slide', 'subslide')]
@@ -120,7 +123,9 @@ class PageOfClass(JupyterHandler):
 def serve(root: Path, address: str) -> tuple[int, str]:
     """Serve the window on an address of this machine; return the port and the secret."""
     secret = secrets.token_hex(6)
-    application = web.Application([(r'/(\w+)/(.*)', Window, {'root': root, 'secret': secret})])
+    handlers = [(r'/(\w+)/(.*)', Window, {'root': root, 'secret': secret})]
+    # Two requests a second would push the addresses out of the terminal.
+    application = web.Application(handlers, log_function=lambda handler: None)
     for port in PORTS:
         try:
             sockets = bind_sockets(port, address, socket.AF_INET)

@@ -53,21 +53,26 @@ function activate(app, manager) {
       // A click on "Show" took the focus: the keys of the deck want it back.
       if (document.activeElement === frame) manager.activeWidget.content.activeCell.node.focus();
     });
-    // A replay takes its keys first. At its ends it lets the walking ones go on to the deck.
-    const inReplay = event => event.target.closest?.('.replay-on');
+    // A replay takes its keys first. At its ends it lets the walking ones go on to the deck. Escape
+    // leads out of it: a level does that itself.
+    const inReplay = ({ key, target }) =>
+      target.closest?.(key === 'Escape' ? '.level' : '.replay-on');
     const walk = event => onKey(event, manager, presenter);
     window.addEventListener('keydown', event => inReplay(event) || walk(event), true);
     window.addEventListener('keydown', event => inReplay(event) && walk(event));
   });
 }
 
-// The slideshow takes the focus out of the editor at each change of the state of the document: at
-// the first key after a save, because that makes it unsaved again.
+// The slideshow takes the focus out of the editor, and out of a replay, at each change of the state
+// of the document: at the first key after a save, because that makes it unsaved again.
 function keepEditing(presenter) {
   const show = presenter._onActiveCellChanged;
   presenter._onActiveCellChanged = async function (notebook) {
-    const editing = notebook.mode === 'edit';
-    if (editing && notebook.activeCell.hasClass('jp-deck-mod-visible')) return;
+    const { activeCell, mode } = notebook;
+    const editing = mode === 'edit';
+    const focus = document.activeElement;
+    const inside = editing || (focus !== activeCell?.node && activeCell?.node.contains(focus));
+    if (inside && activeCell.hasClass('jp-deck-mod-visible')) return;
     await show.call(this, notebook);
     if (editing) notebook.mode = 'edit';
   };
@@ -87,8 +92,8 @@ function keepPlace(presenter, { workspaces, serverSettings }) {
       deck.current = path;
       deck.places[path] = notebook.activeCellIndex;
       const now = Date.now() / 1000;
-      if (notebook.activeCellIndex === 0) delete deck.began[path];
-      else if (!(now - deck.began[path] < LESSON_S)) deck.began[path] = now;
+      if (notebook.activeCellIndex > 0 && !(now - deck.began[path] < LESSON_S))
+        deck.began[path] = now;
       const state = { data: deck, metadata: { id: STATE } };
       saved = saved.then(() => workspaces.save(STATE, state)).catch(console.warn);
       void showGuesses(notebook, serverSettings.baseUrl);
@@ -96,9 +101,12 @@ function keepPlace(presenter, { workspaces, serverSettings }) {
     if (!known.has(panel)) {
       known.add(panel);
       saveInTurn(panel.context);
+      followOutputs(panel.content);
+      panel.content.widgets.forEach(showNumber);
       if (path in deck.places) panel.content.activeCellIndex = deck.places[path];
       panel.content.activeCellChanged.connect(keep);
     }
+    presenter.beginAnew = () => delete deck.began[deck.current];
     keep(panel.content);
   };
 }
@@ -109,6 +117,38 @@ function saveInTurn(context) {
   const save = context.save.bind(context);
   let last = Promise.resolve();
   context.save = options => (last = last.catch(() => {}).then(() => save(options)));
+}
+
+// The number of a cell is folded with its code, and with it what says that the cell runs.
+function showNumber({ model, node }) {
+  const show = () => {
+    const place = node.querySelector('.jp-InputPlaceholder > .jp-Placeholder-prompt');
+    const number = model.executionState === 'running' ? '*' : (model.executionCount ?? ' ');
+    if (place) place.textContent = `[${number}]:`;
+  };
+  model.stateChanged.connect(show);
+  show();
+}
+
+// The end of an output comes into view when it is below the slide, as that of a traceback is. Who
+// has scrolled keeps the place until a cell is run or another slide is shown.
+function followOutputs(notebook) {
+  const { node } = notebook;
+  let scrolled = false;
+  const setScrolled = value => () => (scrolled = value);
+  for (const kind of ['wheel', 'touchmove'])
+    node.addEventListener(kind, setScrolled(true), { passive: true });
+  node.addEventListener('keydown', ({ key }) => key === 'Enter' && setScrolled(false)(), true);
+  notebook.activeCellChanged.connect(setScrolled(false));
+  const follow = changed => {
+    const place = changed.closest ? changed : changed.parentElement;
+    const output = place?.closest('.jp-Deck .jp-deck-mod-onscreen .jp-OutputArea');
+    if (!output || scrolled) return;
+    if (output.getBoundingClientRect().bottom > innerHeight) output.scrollIntoView({ block: 'end' });
+  };
+  const observer = new MutationObserver(changes => changes.forEach(({ target }) => follow(target)));
+  observer.observe(node, { childList: true, characterData: true, subtree: true });
+  node.addEventListener('load', ({ target }) => follow(target), true); // of a picture
 }
 
 async function showGuesses(notebook, baseUrl) {
@@ -151,6 +191,11 @@ function onKey(event, manager, presenter) {
     replay.dispatchEvent(new KeyboardEvent('keydown', event));
     return;
   }
+  if (key === 'Escape' && replay?.contains(event.target)) {
+    event.stopImmediatePropagation();
+    notebook.activeCell.node.focus(); // the next Escape leaves the slides
+    return;
+  }
   const action = black ? 'black' : ACTIONS[key];
   if (!action && HARMLESS.test(key) && !nowhere) return;
   event.stopImmediatePropagation(); // the browser's own keys, such as F5 and F11, still work
@@ -172,6 +217,7 @@ function act(action, manager, presenter) {
       return manager.go('up', 'back');
     case 'first':
       presenter._extents.delete(content.model); // each slide begins with its first part again
+      presenter.beginAnew();
       content.activeCellIndex = 0;
       return;
     case 'last': {
