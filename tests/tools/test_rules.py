@@ -120,6 +120,7 @@ CHANGED = [
     ('tagged', '    "jupyter": {\n     "source_hidden": true\n    },\n', ''),
     ('answers_have_reasons', '### Question 3', '### Question 4'),
     ('answers_have_reasons', '<summary>B. The same', '<summary>C. The same'),
+    ('answers_have_reasons', '<summary>B. The same', '<summary>B. The `same`'),
     ('answers_have_reasons', '**No.** On a busy machine it is not.', '**No.**'),
     ('answers_have_reasons', '**No.** On a', 'No: on a'),
     ('answers_have_reasons', '**No.** On a', '**Right.** On a'),

@@ -28,8 +28,8 @@ LABELS = ['You will do', 'At the end you can', 'You will learn', 'You need', 'Ti
 LABELS_OF_NO_LESSON = ['You will do', 'You need', 'Time']
 LAST_SECTIONS = ['Recap', 'Quiz', 'In practice']
 REASON = '# Not compared: '
-ANSWER = re.compile(
-    r'<details><summary>([A-D])\. \S.*</summary>\n\n\*\*(Right|No)\.\*\* \S.*\n\n</details>'
+ANSWER = re.compile(  # a summary is HTML, where backticks are shown as they are
+    r'<details><summary>([A-D])\. [^`\n]+</summary>\n\n\*\*(Right|No)\.\*\* \S.*\n\n</details>'
 )
 THIS_MACHINE = {str(Path(__file__).resolve().parents[2]), str(Path.home()), sys.prefix} - {'/'}
 PATH = re.compile(
@@ -384,7 +384,7 @@ def answers_have_reasons(lesson: Lesson) -> Iterator[str]:
         if letters not in ('ABC', 'ABCD') or not text.endswith('</details>'):
             yield f'Question {count} needs three or four answers, from A on, and no more.'
         if len(answers) != text.count('<details>'):
-            yield f'Question {count}: an answer is not of the form A. answer, Right or No, why.'
+            yield f'Question {count}: an answer is not A. text (<code>, no `), Right or No, why.'
         right += [letter for letter, verdict in answers if verdict == 'Right']
         if len(right) != count:
             yield f'Question {count} needs exactly one right answer.'
