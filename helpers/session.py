@@ -32,7 +32,10 @@ try:
     from rclpy.client import Client
     from rclpy.executors import Executor, ExternalShutdownException
     from rclpy.node import Node
+    from rclpy.publisher import Publisher
+    from rclpy.service import Service
     from rclpy.signals import SignalHandlerOptions
+    from rclpy.subscription import Subscription
 
     from helpers import connections, rclpy_private
     from helpers.progress_bar import ProgressBar
@@ -368,6 +371,9 @@ def destroy_nodes(context: rclpy.Context) -> None:
     with one_process_at_a_time():  # the last node ends the participant
         for node in nodes:
             _destroy(node)
+        for end in _without_node():
+            with contextlib.suppress(Exception):
+                end.destroy()
 
 
 def _destroy(node: Node) -> None:
@@ -388,6 +394,22 @@ def _destroy_actions(node: Node) -> None:
     for one in list(node.waitables):
         if isinstance(one, ActionClient | ActionServer):
             one.destroy()
+
+
+def _without_node() -> list:
+    """Return the ends of a node that nobody has kept, as in `Node('talker').create_publisher(...)`.
+
+    Python collects the node, and its ends keep the participant.
+    """
+    objects = gc.get_objects()
+    kinds = Publisher, Subscription, Client, Service
+    kept = {
+        id(end)
+        for node in objects
+        if issubclass(type(node), Node) and hasattr(node, 'handle')
+        for end in (*node.publishers, *node.subscriptions, *node.clients, *node.services)
+    }
+    return [end for end in objects if issubclass(type(end), kinds) and id(end) not in kept]
 
 
 def find(kind: type, context: rclpy.Context) -> Iterator:

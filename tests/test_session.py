@@ -21,6 +21,7 @@ from rclpy.exceptions import InvalidHandle, InvalidNodeNameException
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 from support.processes import run_python, running, traces
 from test_msgs.action import Fibonacci
@@ -493,6 +494,22 @@ def test_actions_leave_nothing():
             session.wait_until(goal.done, LIMIT_S)
         assert destroyed(node)
     del server  # until here it is held, as by a variable of a notebook
+
+
+@pytest.mark.parametrize(
+    'make',
+    [
+        lambda: Node('alone').create_publisher(String, 'topic', 10),
+        lambda: Node('alone').create_subscription(String, 'topic', print, 10),
+        lambda: Node('alone').create_client(Trigger, 'look'),
+        lambda: Node('alone').create_service(Trigger, 'look', print),
+    ],
+)
+def test_a_node_that_nobody_keeps_leaves_nothing(make):
+    with nothing_left(), ros_session():
+        end = make()
+        gc.collect()
+    del end  # until here it is held, as by a variable of a notebook
 
 
 def test_node_that_cannot_be_destroyed():
