@@ -1,7 +1,8 @@
-"""What a cell shows while it waits. Nothing of it is left in the saved output."""
+"""What a cell shows while it waits. Nothing of it is seen afterwards."""
 
 from __future__ import annotations
 
+import html
 from collections.abc import Callable
 
 from helpers.rclpy_private import can_ask
@@ -13,15 +14,15 @@ REFRESH_S = 0.2
 class ProgressBar:
     """Shows what `progress` returns (0 to 1), once the wait has taken `SHOW_AFTER_S`.
 
-    Without a `progress`, or where nobody watches, it shows nothing. To leave no trace it clears the
-    output of the cell: print after the wait, not before.
+    Without a `progress`, or where nobody watches, it shows nothing. At its end it becomes empty:
+    what the cell has printed before stays.
     """
 
     def __init__(self, progress: Callable[[], float] | None) -> None:
         self._watched = _somebody_watches()
         self._progress = progress if self._watched else None
         self._display = None
-        self._text: str | None = None
+        self._bar = self._text = ''
         self._next_s = SHOW_AFTER_S
 
     def __enter__(self) -> ProgressBar:
@@ -31,30 +32,33 @@ class ProgressBar:
         """Draw the bar if it is time to. `waited_s` is the time since the wait began."""
         if self._progress is None or waited_s < self._next_s:
             return
-        from IPython.display import HTML, display
-
         self._next_s = waited_s + REFRESH_S
         percent = round(100 * min(1.0, self._progress()))
-        bar = HTML(f'<progress value="{percent}" max="100"></progress> {percent} %')
-        if self._display is None:
-            self._display = display(bar, display_id=True)
-        else:
-            self._display.update(bar)
+        self._bar = f'<progress value="{percent}" max="100"></progress> {percent} %'
+        self._show()
 
     def say(self, text: str) -> None:
-        """Print a text where somebody watches. It stays where the wait does not end well."""
+        """Show a text where somebody watches. It stays where the cell is interrupted."""
         if self._watched:
-            print(text)
-            self._text = text
+            self._text = f'<pre>{html.escape(text)}</pre>'
+            self._show()
+
+    def _show(self) -> None:
+        from IPython.display import display
+
+        data = {'text/html': self._bar + self._text}
+        if self._display is None:
+            self._display = display(data, raw=True, display_id=True)
+        else:
+            self._display.update(data, raw=True)
 
     def __exit__(self, exception_type, *exception) -> None:
-        if self._display is None and self._text is None:
+        if self._display is None:
             return
-        from IPython.display import clear_output
-
-        clear_output()
-        if exception_type is KeyboardInterrupt and self._text is not None:
-            print(self._text)
+        self._bar = ''
+        if exception_type is not KeyboardInterrupt:
+            self._text = ''
+        self._show()
 
 
 def _somebody_watches() -> bool:

@@ -47,17 +47,31 @@ def test_a_long_wait_shows_a_bar_until_its_end(kernel):
         ('display_data', bar(25)),
         ('update', bar(50)),
         ('update', bar(100)),
-        'clear_output',
+        ('update', ''),
         'heard 41\n',
     ]
     assert shown(kernel, [2], then='raise KeyError') == [
         ('display_data', bar(25)),
-        'clear_output',
+        ('update', ''),
         'error',
     ]
 
 
-def test_a_bar_that_is_not_needed_shows_and_clears_nothing(kernel):
+def test_a_bar_that_is_not_needed_shows_nothing(kernel):
     assert shown(kernel, [0, 1.99]) == ['heard 41\n']
     assert shown(kernel, [100], progress=None) == ['heard 41\n']
-    assert shown(kernel, [100], progress='lambda: 1 / 0', watched=False) == ['heard 41\n']
+    assert shown(kernel, [100], progress='lambda: 1 / 0', watched=False) == [
+        'heard 41\n',
+    ]
+
+
+WHY = "bar.say('A node & no executor.')"
+
+
+def test_what_is_said_stays_where_the_cell_is_interrupted(kernel):
+    said = '<pre>A node &amp; no executor.</pre>'
+    first = [('display_data', bar(25)), ('update', bar(25) + said)]
+    assert shown(kernel, [2], then=WHY) == [*first, ('update', ''), 'heard 41\n']
+    then = f'{WHY}; raise KeyboardInterrupt'
+    assert shown(kernel, [2], then=then) == [*first, ('update', said), 'error']
+    assert shown(kernel, [2], then=WHY, watched=False) == ['heard 41\n']

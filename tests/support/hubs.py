@@ -246,6 +246,7 @@ class Kernel:
         }
         await self._socket.write_message(json.dumps(message))
         outputs, clear, waited_for = [], False, {'idle', 'execute_reply'}
+        displays: dict[str, NotebookNode] = {}
         async with asyncio.timeout(limit_s):
             while waited_for:
                 message = json.loads(await self._messages.get())
@@ -263,9 +264,13 @@ class Kernel:
                 elif kind in ('stream', 'display_data', 'execute_result', 'error'):
                     outputs = [] if clear else outputs
                     clear = False
-                    content.pop('transient', None)
+                    display = content.pop('transient', {}).get('display_id')
                     outputs.append(nbformat.from_dict({'output_type': kind} | content))
-        return outputs
+                    displays[display] = outputs[-1]
+                elif kind == 'update_display_data':
+                    displays[content['transient']['display_id']].data = content['data']
+        # A progress bar is empty at its end.
+        return [output for output in outputs if output.get('data') != {'text/html': ''}]
 
     async def text(self, source: str) -> str:
         """Run a cell that must not fail, and return what it printed."""
