@@ -432,7 +432,8 @@ def test_a_process_that_ignores_ctrl_c_is_killed_and_so_is_what_one_leaves(built
         impatient.setattr(processes, 'STOP_TIMEOUT_S', 0.3)
         assert deaf.wait_for('up') == 'up and running'
     assert deaf.wait() == -signal.SIGKILL
-    with run_script(built, 'leaving.sh', f'({ignores}) & sleep 60') as leaving:
+    # `wait`, because a SIGINT while dash starts a command, such as sleep, is lost.
+    with run_script(built, 'leaving.sh', f'({ignores}) & wait') as leaving:
         leaving.wait_for('up')
     assert leaving.wait() == -signal.SIGINT
     assert wait_until(lambda: processes_of(built.path) == [], timeout_s=2)
