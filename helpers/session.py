@@ -14,6 +14,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
+from itertools import chain
 from traceback import clear_frames
 
 from helpers.domain import (
@@ -51,6 +52,7 @@ LOG_NODE = '_session_log'
 POLL_S = 0.01
 QUIET_ROUNDS = 20
 SAY_AFTER_S = 5.0
+MADE_BY_NODES = Publisher, Subscription, Client, Service
 
 _open_session: Session | None = None
 
@@ -366,14 +368,25 @@ class Session:
 
 
 def destroy_nodes(context: rclpy.Context) -> None:
-    """Destroy all nodes of a context, also those that nobody knows any more."""
-    nodes = list(find(Node, context))
+    """Destroy all nodes of a context, also those that nobody knows any more.
+
+    Python collects the node of `Node('talker').create_publisher(...)`. What it has made stays, and
+    keeps the participant.
+    """
+    found = _objects(Node, *MADE_BY_NODES)
+    nodes = [thing for thing in found if isinstance(thing, Node)]
+    kept = {id(made) for node in nodes if hasattr(node, 'handle') for made in _made_by(node)}
     with one_process_at_a_time():  # the last node ends the participant
-        for node in nodes:
+        for node in _of(context, nodes):
             _destroy(node)
-        for end in _without_node():
-            with contextlib.suppress(Exception):
-                end.destroy()
+        for thing in found:
+            if isinstance(thing, MADE_BY_NODES) and id(thing) not in kept:
+                with contextlib.suppress(Exception):
+                    thing.destroy()
+
+
+def _made_by(node: Node) -> Iterator:
+    return chain(node.publishers, node.subscriptions, node.clients, node.services)
 
 
 def _destroy(node: Node) -> None:
@@ -396,27 +409,17 @@ def _destroy_actions(node: Node) -> None:
             one.destroy()
 
 
-def _without_node() -> list:
-    """Return the ends of a node that nobody has kept, as in `Node('talker').create_publisher(...)`.
-
-    Python collects the node, and its ends keep the participant.
-    """
-    objects = gc.get_objects()
-    kinds = Publisher, Subscription, Client, Service
-    kept = {
-        id(end)
-        for node in objects
-        if issubclass(type(node), Node) and hasattr(node, 'handle')
-        for end in (*node.publishers, *node.subscriptions, *node.clients, *node.services)
-    }
-    return [end for end in objects if issubclass(type(end), kinds) and id(end) not in kept]
-
-
 def find(kind: type, context: rclpy.Context) -> Iterator:
     """Yield all nodes or clients of a context."""
-    for thing in gc.get_objects():
-        if issubclass(type(thing), kind) and getattr(thing, 'context', None) is context:
-            yield thing
+    return _of(context, _objects(kind))
+
+
+def _of(context: rclpy.Context, things: list) -> Iterator:
+    return (thing for thing in things if getattr(thing, 'context', None) is context)
+
+
+def _objects(*kinds: type) -> list:
+    return [thing for thing in gc.get_objects() if issubclass(type(thing), kinds)]
 
 
 @atexit.register
