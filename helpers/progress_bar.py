@@ -1,4 +1,4 @@
-"""What a cell shows while it waits. Nothing of it is seen afterwards."""
+"""What a cell shows while it waits. Afterwards only what explains an interrupted wait is seen."""
 
 from __future__ import annotations
 

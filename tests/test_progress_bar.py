@@ -60,9 +60,7 @@ def test_a_long_wait_shows_a_bar_until_its_end(kernel):
 def test_a_bar_that_is_not_needed_shows_nothing(kernel):
     assert shown(kernel, [0, 1.99]) == ['heard 41\n']
     assert shown(kernel, [100], progress=None) == ['heard 41\n']
-    assert shown(kernel, [100], progress='lambda: 1 / 0', watched=False) == [
-        'heard 41\n',
-    ]
+    assert shown(kernel, [100], progress='lambda: 1 / 0', watched=False) == ['heard 41\n']
 
 
 WHY = "bar.say('A node & no executor.')"

@@ -115,7 +115,7 @@ def test_what_happened_is_a_walk(script, happening):
     assert_is_the_run(states, table, depth)
 
 
-@tries(60)
+@tries(100)
 @given(
     happenings(), st.lists(st.sampled_from([lose, hear, swap]), min_size=1, max_size=2), st.data()
 )
@@ -352,7 +352,7 @@ def test_of_each_step_the_numbers_are_known(script):
     assert [14, 4] in about
 
 
-@tries(50)
+@tries(150)
 @given(
     st.one_of(
         happenings(),

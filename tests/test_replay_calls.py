@@ -63,7 +63,7 @@ def watch(asker, answerer):
 @pytest.mark.parametrize('groups', [1, 2])
 @pytest.mark.parametrize('threads', [1, 2, 4])
 def test_what_rclpy_did_is_a_walk_and_waits_where_rclpy_waits(script, threads, groups, style):
-    for _ in range(2):
+    for _ in range(4):
         shown, calls, answer = record(threads, groups, style)
         assert [(c.style, c.caller, c.service) for c in calls.itertuples()] == [
             (style, 'tick', 'look')
