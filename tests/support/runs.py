@@ -108,7 +108,9 @@ def real_runs(threads, group, depth, count):
 def assert_is_the_run(states, table, depth, accuracy_s=1e-6):
     """Each state is what the counts of arrivals and takes so far make of the table."""
     published, taken_in_order = table['seq'].tolist(), heard(table)
-    rows = table.set_index('seq')
+    published_s, started_s, finished_s = (
+        dict(zip(published, table[name], strict=True)) for name in COLUMNS[1:4]
+    )
     arrived, taken, lost = 0, [], []
     for before, state in zip(states, states[1:], strict=False):
         assert before['now'] <= state['now']
@@ -116,12 +118,12 @@ def assert_is_the_run(states, table, depth, accuracy_s=1e-6):
             seq = published[arrived]
             arrived += 1
             assert state['says'].startswith(f'Message {seq} arrives.')
-            assert state['now'] >= rows.published_s[seq] - accuracy_s
-            assert (arrived == len(published)) or state['now'] <= rows.published_s[
+            assert state['now'] >= published_s[seq] - accuracy_s
+            assert (arrived == len(published)) or state['now'] <= published_s[
                 published[arrived]
             ] + accuracy_s
             out = published[arrived - 1 - depth] if arrived > depth else None
-            if out is not None and math.isnan(rows.started_s[out]):
+            if out is not None and math.isnan(started_s[out]):
                 lost.append([out, seq])
                 assert f', {out}, ' in state['says']
         elif 'takes' in state['says']:
@@ -129,11 +131,11 @@ def assert_is_the_run(states, table, depth, accuracy_s=1e-6):
             assert f', {seq}.' in state['says']
             assert seq not in before['threads']
             assert seq in state['threads']
-            assert state['now'] <= rows.started_s[seq] + accuracy_s
+            assert state['now'] <= started_s[seq] + accuracy_s
             taken.append(seq)
         else:
             (ended,) = set(before['threads']) - set(state['threads']) - {None}
-            assert state['now'] == pytest.approx(rows.finished_s[ended], abs=accuracy_s)
+            assert state['now'] == pytest.approx(finished_s[ended], abs=accuracy_s)
             assert f'message {ended} ends' in state['says']
         gone = {*taken, *(seq for seq, _ in lost)}
         assert state['queue'] == [seq for seq in published[:arrived] if seq not in gone]
