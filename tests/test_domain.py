@@ -81,8 +81,10 @@ def test_only_processes_that_agree_hear_each_other(shared_id):
         with running(other.format('', 0)) as stranger:
             elsewhere = int(stranger.stdout.readline())
             # The guest is heard, although it began later.
-            with running(other.format(shared_id, 10**5)):
+            with running(other.format(shared_id, 10**5)) as guest:
                 session.wait_until(lambda: len(listener.heard) >= 25, LIMIT_S)
+                # Not killed: Fast DDS may crash when this session closes, see environment.md.
+                guest.communicate('\n')
             assert stranger.poll() is None
         assert min(int(data.split()[-1]) for data in listener.heard) >= 10**5
     # Each kernel has a domain of its own, and keeps it.
