@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from helpers.interfaces import needed_packages
+from helpers.interfaces import share_folder
 from helpers.workspace import Workspace
 
 MESSAGE = 'geometry_msgs/TransformStamped[] transforms\n'
@@ -38,13 +38,12 @@ def provide_tf2_msgs(workspace: Workspace) -> None:
 
     Raises RuntimeError with what colcon says where the build fails.
     """
-    try:
-        needed_packages('tf2_msgs/msg/TFMessage')
-    except ValueError:  # it is not there
-        workspace.write('src/tf2_msgs/msg/TFMessage.msg', MESSAGE)
-        workspace.write('src/tf2_msgs/CMakeLists.txt', CMAKE_LISTS)
-        workspace.write('src/tf2_msgs/package.xml', PACKAGE_XML)
-        result = workspace.build('tf2_msgs')
-        if not result.ok:
-            raise RuntimeError(str(result)) from None
-        workspace.use()
+    if share_folder('tf2_msgs'):
+        return
+    workspace.write('src/tf2_msgs/msg/TFMessage.msg', MESSAGE)
+    workspace.write('src/tf2_msgs/CMakeLists.txt', CMAKE_LISTS)
+    workspace.write('src/tf2_msgs/package.xml', PACKAGE_XML)
+    result = workspace.build('tf2_msgs')
+    if not result.ok:
+        raise RuntimeError(str(result))
+    workspace.use()

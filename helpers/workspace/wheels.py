@@ -11,8 +11,8 @@ import sysconfig
 from pathlib import Path
 
 
-def fix_wheels(prefix: str | Path = sys.prefix) -> int:
-    """Make the CMake files of the ROS 2 wheels fit this machine. Return how many were changed.
+def fix_wheels(prefix: str | Path = sys.prefix) -> None:
+    """Make the CMake files of the ROS 2 wheels fit this machine.
 
     The wheels were built in a container, and 20 of their CMake files name its folders, such as
     /opt/python/cp311-cp311/include/python3.11. CMake stops at a folder that does not exist. Here
@@ -31,7 +31,6 @@ def fix_wheels(prefix: str | Path = sys.prefix) -> int:
         rb'BOOL:1>:OpenSSL': 'BOOL:0>:OpenSSL',
         rb'/usr/lib64/libtinyxml2\.so;': '',
     }
-    changed = 0
     share = Path(prefix, 'share')
     for file in [*share.glob('*/cmake/*Export.cmake'), *share.glob('fastrtps/cmake/*.cmake')]:
         old = new = file.read_bytes()
@@ -39,8 +38,6 @@ def fix_wheels(prefix: str | Path = sys.prefix) -> int:
             new = re.sub(pattern, lambda _, text=replacement: os.fsencode(text), new)
         if new != old:
             _replace(file, new)
-            changed += 1
-    return changed
 
 
 def _replace(file: Path, content: bytes) -> None:

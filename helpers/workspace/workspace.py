@@ -302,10 +302,8 @@ def write(line: str, cell: str) -> None:
 
 
 def _register_in_ipython() -> None:
-    try:
-        from IPython import get_ipython
-    except ImportError:
-        return
+    from IPython import get_ipython
+
     shell = get_ipython()
     if shell is None or 'write' in shell.magics_manager.magics['cell']:
         return
