@@ -29,7 +29,6 @@ from jupyter_client.manager import AsyncKernelManager
 from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
 from nbformat import NotebookNode
-from traitlets import default
 
 from helpers.progress import FILE_VARIABLE
 from tools.lessons import tables
@@ -47,12 +46,6 @@ class _ThisInterpreter(KernelSpecManager):
 
     def get_kernel_spec(self, kernel_name: str) -> KernelSpec:
         return self.kernel_spec_class(resource_dir=RESOURCES, **get_kernel_dict())
-
-
-class _KernelManager(AsyncKernelManager):
-    @default('kernel_spec_manager')
-    def _this_interpreter(self) -> KernelSpecManager:
-        return _ThisInterpreter()
 
 
 def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
@@ -79,8 +72,7 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     log.setLevel(logging.CRITICAL)  # a failure is told once, by the RuntimeError
     client = NotebookClient(
         notebook,
-        kernel_name='python3',
-        kernel_manager_class=_KernelManager,
+        km=AsyncKernelManager(kernel_spec_manager=_ThisInterpreter()),
         resources={'metadata': {'path': str(folder)}},
         timeout=CELL_TIMEOUT_S,
         force_raise_errors=True,
@@ -99,7 +91,9 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     }
     try:
         with tempfile.TemporaryFile() as written:
-            client.execute(env=environment, stdout=subprocess.DEVNULL, stderr=written)
+            client.execute(
+                cleanup_kc=True, env=environment, stdout=subprocess.DEVNULL, stderr=written
+            )
             # Not what ZeroMQ may say when the kernel ends: nobody sees that.
             lines = os.pread(written.fileno(), said, 0).decode(errors='replace').splitlines(True)
             from_c = ''.join(line for line in lines if not line.startswith('[IPKernelApp]'))
