@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from lab_page import LIMIT_S, LabPage
 from lab_server import Server, server
-from playwright.sync_api import Browser, BrowserContext, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
 ARTEFACTS = Path(
     os.environ.get('BROWSER_ARTEFACTS') or Path(tempfile.gettempdir(), 'ros2_notebooks_browser')
@@ -29,6 +29,8 @@ CHROMIUM_OPTIONS = [
     '--disable-component-update',
     '--disable-sync',
 ]
+# The div stands for a cell, which takes the focus when Escape is pressed.
+PHONE = '<!doctype html><meta name="viewport" content="width=device-width"><div tabindex="0">'
 LOCAL = ('http://localhost:', 'http://127.0.0.1:', 'data:', 'blob:')
 
 
@@ -131,6 +133,21 @@ def file_page(chromium) -> Callable:
         assert [e for e in errors if not any(word in e for word in expected)] == []
 
     return opened
+
+
+@pytest.fixture
+def phone(file_page, tmp_path) -> Iterator[Callable]:
+    """Yield a function that opens what cells show on a page from a file, as wide as a phone."""
+    with file_page(360, 720) as tab:
+
+        def opened(*shown) -> Page:
+            html = ''.join(one._repr_mimebundle_()['text/html'] for one in shown)
+            file = tmp_path / 'page.html'
+            file.write_text(PHONE + html, encoding='utf-8')
+            tab.goto(file.as_uri())
+            return tab
+
+        yield opened
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

@@ -14,6 +14,7 @@ from playwright.sync_api import ElementHandle, Page
 
 LIMIT_S = 300  # to open a page, and for what a lesson computes; the rest has Playwright's 30 s
 PANEL = 'window.jupyterapp.shell.currentWidget'
+WIDER = '() => document.documentElement.scrollWidth > innerWidth'  # any page than its window
 
 READY = """name => {
     const panel = window.jupyterapp?.shell.currentWidget;

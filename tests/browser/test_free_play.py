@@ -1,6 +1,6 @@
 """Free play and a deadlock, on a phone and by keys alone, on a page from a file."""
 
-import pytest
+from lab_page import WIDER
 from support.nodes import LIMIT_S, Answerer, Asker, spin
 
 from helpers.recording import CallbackRecording
@@ -8,27 +8,9 @@ from helpers.replay.calls import replay_calls
 from helpers.replay.free import FreePlay
 from helpers.session import ros_session
 
-PAGE = '<!doctype html><meta name="viewport" content="width=device-width">'
-WIDER = '() => document.documentElement.scrollWidth > innerWidth'
 
-
-@pytest.fixture
-def page(file_page, tmp_path):
-    """Return a function that opens what a cell shows on a page from a file."""
-    with file_page(360, 720) as tab:
-
-        def open_page(shown):
-            file = tmp_path / 'page.html'
-            html = shown._repr_mimebundle_()['text/html']
-            file.write_text(PAGE + html, encoding='utf-8')
-            tab.goto(file.as_uri())
-            return tab
-
-        yield open_page
-
-
-def test_a_slider_draws_the_prediction_again(page, artefacts):
-    page = page(FreePlay())
+def test_a_slider_draws_the_prediction_again(phone, artefacts):
+    page = phone(FreePlay())
     root = page.get_by_role('group', name='free play')
     says, picture = root.locator('[aria-live=polite]'), root.get_by_role('img')
     assert says.inner_text() == '20 of 41 messages are heard. The oldest waits 1.80 s.'
@@ -47,7 +29,7 @@ def test_a_slider_draws_the_prediction_again(page, artefacts):
     page.screenshot(path=artefacts / 'free_play.png')
 
 
-def test_a_circle_is_read_where_it_closes(page, artefacts):
+def test_a_circle_is_read_where_it_closes(phone, artefacts):
     with ros_session() as session:
         asker, answerer = Asker(), Answerer()
         recording = CallbackRecording(tick=asker.timer, look=answerer.service, client=asker.client)
@@ -55,7 +37,7 @@ def test_a_circle_is_read_where_it_closes(page, artefacts):
         session.wait_until(asker.timer.is_canceled, LIMIT_S)
         session.wait_until_quiet(executor)
         shown = replay_calls(recording, 2)
-    page = page(shown)
+    page = phone(shown)
     root = page.get_by_role('group', name='replay')
     root.focus()
     circle = root.get_by_role('list', name='circle').get_by_role('listitem')

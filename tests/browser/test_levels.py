@@ -1,36 +1,21 @@
 """Levels as they are played: by keys alone, on a phone, in JupyterLab."""
 
 import nbformat
-import pytest
+from lab_page import WIDER
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from helpers.replay.levels import level
 from tools.lessons.clean import NOTEBOOK_METADATA
 
 START = 'Choose what happens next'
-PAGE = '<!doctype html><meta name="viewport" content="width=device-width"><div tabindex="0">'
-
-
-@pytest.fixture
-def page(file_page, tmp_path):
-    """Return a function that opens levels on a page from a file."""
-    with file_page(360, 720) as tab:
-
-        def open_page(*names):
-            file = tmp_path / 'levels.html'
-            file.write_text(PAGE + ''.join(level(name).html() for name in names), encoding='utf-8')
-            tab.goto(file.as_uri())
-            return tab
-
-        yield open_page
 
 
 def items(root, name):
     return root.get_by_role('list', name=name).get_by_role('listitem').all_inner_texts()
 
 
-def test_the_first_level_by_keys_alone(page, artefacts):
-    page = page('save')
+def test_the_first_level_by_keys_alone(phone, artefacts):
+    page = phone(level('save'))
     root = page.get_by_role('group', name='level')
     says = root.locator('[aria-live=polite]')
     assert says.inner_text().startswith(START)
@@ -69,8 +54,8 @@ def test_the_first_level_by_keys_alone(page, artefacts):
     assert root.evaluate('root => !root.contains(document.activeElement)')
 
 
-def test_a_deadlock_lights_up_and_other_groups_end_it(page, artefacts):
-    page = page('save', 'deadlock')
+def test_a_deadlock_lights_up_and_other_groups_end_it(phone, artefacts):
+    page = phone(level('save'), level('deadlock'))
     root = page.get_by_role('group', name='level').nth(1)
     threads, groups = root.get_by_label('threads').first, root.locator('select').nth(1)
     threads.select_option('2')
@@ -92,9 +77,9 @@ def test_a_deadlock_lights_up_and_other_groups_end_it(page, artefacts):
     assert root.locator('.replay-stuck').count() == 0
 
 
-def test_on_a_phone(page):
-    page = page('save', 'starve', 'threads', 'deadlock')
-    assert page.evaluate('() => document.documentElement.scrollWidth <= innerWidth')
+def test_on_a_phone(phone):
+    page = phone(*map(level, ('save', 'starve', 'threads', 'deadlock')))
+    assert not page.evaluate(WIDER)
     for button in page.locator('.level button, .level select').all():
         box = button.bounding_box()
         assert box['height'] >= 44

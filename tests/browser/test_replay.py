@@ -2,7 +2,7 @@
 
 import nbformat
 import pytest
-from lab_page import PANEL
+from lab_page import PANEL, WIDER
 from nbconvert.exporters import HTMLExporter
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, output_from_msg
 from support.runs import assert_is_the_run, real_runs
@@ -16,7 +16,7 @@ from helpers.replay import replay
 replay(predict(0.05, 0.2, 10, 1, 41), 10)"""
 PUSHED_OUT = 'Message 14 arrives. Ten wait, so the oldest, 4, is pushed out.'
 # What a screen reader is told at each step, from the first to the last.
-READ = """([index, again]) => {
+READ = """index => {
     const replay = document.querySelectorAll('.replay')[index];
     const press = key => replay.dispatchEvent(
         new KeyboardEvent('keydown', { key, bubbles: true, cancelable: true }));
@@ -36,7 +36,6 @@ READ = """([index, again]) => {
     }
     return found;
 }"""
-WIDER = '() => document.documentElement.scrollWidth > innerWidth'
 # The least contrast of the texts of a replay to what is behind them (WCAG 2.2, 1.4.3).
 CONTRAST = """() => {
     const numbers = colour => colour.match(/[\\d.]+/g).map(Number);
@@ -111,7 +110,7 @@ def test_recorded_runs_are_read_back_step_by_step(exported, threads, group, dept
     tables = real_runs(threads, group, depth, 7)
     page = exported(*(replay(table, depth, threads, group) for table in tables))
     for index, table in enumerate(tables):
-        read = states(page.evaluate(READ, [index, False]))
+        read = states(page.evaluate(READ, index))
         assert_is_the_run(read, table, depth, accuracy_s=1e-3)
 
 
@@ -119,7 +118,7 @@ def test_two_runs_go_together(exported, artefacts):
     slow, fast = predict(0.05, 0.2, 10, 1, 41), predict(0.05, 0.2, 10, 8, 41)
     both = {'A': replay(slow, 10), 'D': replay(fast, 10, 8, 'reentrant')}
     page = exported(side_by_side(both))
-    read = page.evaluate(READ, [0, False])
+    read = page.evaluate(READ, 0)
     for before, after in zip(read, read[1:], strict=False):
         changed = [b != {**a, 'says': b['says']} for b, a in zip(before, after, strict=True)]
         assert sum(changed) <= 1
