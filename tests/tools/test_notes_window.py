@@ -7,7 +7,7 @@ import pytest
 from nbconvert.filters import markdown2html
 
 from tools import notes_window
-from tools.lessons.lesson import GLOSSARY, ROOT, lessons
+from tools.lessons.lesson import GLOSSARY, ROOT, lessons, tags
 
 LESSONS = [lesson for lesson in lessons() if lesson.number != GLOSSARY]
 
@@ -40,7 +40,7 @@ def test_slides_and_minutes_only_grow_and_end_at_those_of_the_lesson(tmp_path, l
     assert states[-1]['notes'] == ''  # those of an earlier step do not stay
     shown = ''.join(state['notes'] for state in states)
     for cell in cells:
-        if 'notes' in cell.metadata.get('tags', []):
+        if 'notes' in tags(cell):
             lines = [markdown2html(line)[3:-5] for line in cell.source.splitlines() if line]
             assert all(f'>{line}<' in shown or f'\n{line}<' in shown for line in lines)
 

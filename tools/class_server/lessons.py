@@ -75,5 +75,4 @@ class Known:
     @cached_property
     def exercises(self) -> list[int]:
         """The numbers of its exercises."""
-        text = '\n'.join(cell.source for cell in self.cells if cell.cell_type == 'markdown')
-        return sorted(set(map(int, re.findall(r'^### Exercise (\d+)', text, re.MULTILINE))))
+        return sorted({int(re.search(r'\d+', name)[0]) for name in self.lesson.exercises})

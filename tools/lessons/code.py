@@ -5,13 +5,15 @@ import ast
 from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
 
+from tools.lessons.lesson import tags
+
 
 def guess_of(cell: NotebookNode) -> tuple[str, str, object] | None:
     """Return the variable, the question and the value of a predict cell, None for other cells.
 
     It ends in `my_guess = guess('How many are heard?', 41)`.
     """
-    if 'predict' not in cell.metadata.get('tags', []):
+    if 'predict' not in tags(cell):
         return None
     try:
         plain = TransformerManager().transform_cell(cell.source)  # a magic becomes a call

@@ -21,7 +21,7 @@ import nbformat
 from packaging.requirements import Requirement
 
 from tools.lessons.clean import text_of
-from tools.lessons.lesson import ROOT
+from tools.lessons.lesson import ROOT, tags
 from tools.lessons.update import BASE
 
 NAME = 'ros2_notebooks'
@@ -52,9 +52,7 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
         left_out = {'notes'} if solutions else {'notes', 'solution'}
         for path in course.glob('notebooks/*.ipynb'):
             notebook = nbformat.read(path, as_version=4)
-            notebook.cells = [
-                cell for cell in notebook.cells if not left_out & {*cell.metadata.get('tags', [])}
-            ]
+            notebook.cells = [cell for cell in notebook.cells if not left_out & tags(cell)]
             path.write_text(text_of(notebook), encoding='utf-8')
         shutil.copytree(course, Path(folder, BASE))
         Path(folder, BASE).rename(course / BASE)

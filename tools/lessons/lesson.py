@@ -114,6 +114,12 @@ class Lesson:
             found['lang']: found['text'] for found in FOLDED.finditer(source)
         }
 
+    @property
+    def exercises(self) -> list[str]:
+        """The headings such as `Exercise 1: Two robots`, in their order."""
+        text = '\n'.join(c.source for c in self.notebook.cells if c.cell_type == 'markdown')
+        return re.findall(r'^### (Exercise \d.*)', text, re.MULTILINE)
+
     @cached_property
     def minutes_by_step(self) -> dict[str, int]:
         """The minutes of the instructor's notes: `1`, `2`, ..., `Exercises` to their sum."""
@@ -137,15 +143,14 @@ class Lesson:
         work: Counter[str] = Counter()
         part, given = '', set()
         for cell in self.notebook.cells:
-            tags = cell.metadata.get('tags', [])
             new = {line.strip() for line in cell.source.splitlines()} - given - {''}
             if cell.cell_type == 'markdown':
                 headings = re.findall(r'^###? (Exercise \d+|\w+)', cell.source, re.MULTILINE)
                 part = next((one for one in reversed(headings) if one != 'Question'), part)
                 words[part] += len(re.sub(r'<[^>]+>', ' ', cell.source).split())
-            elif 'exercise' in tags:
+            elif 'exercise' in tags(cell):
                 given |= new
-            elif 'solution' in tags:
+            elif 'solution' in tags(cell):
                 work[part] += sum(not line.startswith(('#', 'check_')) for line in new)
             if part.startswith('Exercise ') and part not in work:
                 work[part] = MINUTES_A_RUN
@@ -176,6 +181,11 @@ class Lesson:
         if found := re.search(pattern, text, re.MULTILINE):
             return found
         raise ValueError(f'{self.file} needs a {what}.')
+
+
+def tags(cell: NotebookNode) -> set[str]:
+    """Return the tags of a cell."""
+    return set(cell.metadata.get('tags', []))
 
 
 def minutes_of_note(source: str) -> int:

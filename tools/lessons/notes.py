@@ -5,14 +5,14 @@ import re
 from nbconvert.filters import markdown2html
 from nbformat import NotebookNode
 
-from tools.lessons.lesson import first_heading, minutes_of_note
+from tools.lessons.lesson import first_heading, minutes_of_note, tags
 from tools.lessons.slides import heading
 
 
 def of_step(cells: list[NotebookNode], at: int) -> dict:
     """Return the notes of the step of cell `at`, and the minutes planned to its end and in all."""
     steps = [i for i, cell in enumerate(cells) if heading(cell, '##? ')]
-    notes = [i for i, cell in enumerate(cells) if 'notes' in cell.metadata.get('tags', [])]
+    notes = [i for i, cell in enumerate(cells) if 'notes' in tags(cell)]
     minutes = {i: minutes_of_note(cells[i].source) for i in notes}
     step = max((i for i in steps if i <= at), default=0)
     end = min((i for i in steps if i > at), default=len(cells))

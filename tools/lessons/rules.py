@@ -15,7 +15,7 @@ from nbval.plugin import comment_markers, metadata_tags
 
 from helpers.progress import title_of
 from tools.lessons.code import guess_of
-from tools.lessons.lesson import FOLDED, FOLDER, GLOSSARY, LANGUAGES, NOTE, Lesson
+from tools.lessons.lesson import FOLDED, FOLDER, GLOSSARY, LANGUAGES, NOTE, Lesson, tags
 from tools.lessons.slides import PICTURE, SKIPPED, SLIDE, height
 
 MAX_CODE_LINES = 24  # what a slide has room for
@@ -54,10 +54,6 @@ def code_cells(lesson: Lesson) -> list[tuple[str, NotebookNode]]:
     """Return every code cell with its name for a reader: `code cell 1` and so on."""
     cells = [cell for cell in lesson.notebook.cells if cell.cell_type == 'code']
     return [(f'code cell {count}', cell) for count, cell in enumerate(cells, 1)]
-
-
-def tags(cell: NotebookNode) -> set[str]:
-    return set(cell.metadata.get('tags', []))
 
 
 def prose(lesson: Lesson) -> Iterator[tuple[int, str]]:

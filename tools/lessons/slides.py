@@ -23,6 +23,8 @@ from math import ceil
 
 from nbformat import NotebookNode
 
+from tools.lessons.lesson import tags
+
 SKIPPED = {'deck-skip', 'notes'}
 ALONE = {'deck-break', 'solution'}
 
@@ -61,7 +63,7 @@ def _groups(notebook: NotebookNode) -> list[list[NotebookNode]]:
     """Return the cells in groups: text, and the code that it leads to."""
     groups: list[list[NotebookNode]] = []
     for cell in notebook.cells:
-        follows = _tags(cell) & SKIPPED or cell.cell_type != 'markdown' and not _tags(cell) & ALONE
+        follows = tags(cell) & SKIPPED or cell.cell_type != 'markdown' and not tags(cell) & ALONE
         if groups and follows:
             groups[-1].append(cell)
         else:
@@ -70,11 +72,11 @@ def _groups(notebook: NotebookNode) -> list[list[NotebookNode]]:
 
 
 def _slide_type(cell: NotebookNode, first: bool, fits: bool) -> str:
-    if _tags(cell) & SKIPPED:
+    if tags(cell) & SKIPPED:
         return 'skip'
     if first or heading(cell, '##? '):
         return 'slide'
-    if not fits or heading(cell, '### (?!Explain)') or _tags(cell) & ALONE:
+    if not fits or heading(cell, '### (?!Explain)') or tags(cell) & ALONE:
         return 'subslide'
     return 'fragment'
 
@@ -84,13 +86,9 @@ def heading(cell: NotebookNode, form: str) -> bool:
     return cell.cell_type == 'markdown' and bool(re.match(form, cell.source))
 
 
-def _tags(cell: NotebookNode) -> set[str]:
-    return set(cell.metadata.get('tags', []))
-
-
 def height(cell: NotebookNode) -> float:
     """Return about how high a cell is with its outputs, in hundredths of the slide's height."""
-    if _tags(cell) & SKIPPED:
+    if tags(cell) & SKIPPED:
         return 0.0
     if cell.cell_type == 'markdown':
         source = UNFOLDED.sub(r'\1', cell.source)  # a reader unfolds one part at a time
@@ -110,7 +108,7 @@ def folded(cell: NotebookNode) -> bool:
     """Return whether a slide shows only the outputs of a cell: a check, imports, what is folded."""
     if cell.cell_type != 'code':
         return False
-    if 'check' in _tags(cell) or cell.metadata.get('jupyter', {}).get('source_hidden'):
+    if 'check' in tags(cell) or cell.metadata.get('jupyter', {}).get('source_hidden'):
         return True
     try:
         statements = ast.parse(cell.source).body

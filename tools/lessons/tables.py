@@ -60,13 +60,7 @@ def made(texts: Texts) -> Texts:
 
 def needs_run(lessons: list[Lesson]) -> bool:
     """Say whether the saved table of exercises in notebook 00 is not that of these lessons."""
-    table = progress.table(
-        [
-            progress.Lesson(one.number, one.name, one.title, exercises)
-            for one in lessons
-            if (exercises := len(headings_of_exercises(one)))
-        ]
-    )
+    table = progress.table(with_exercises(lessons))
     start = [lesson for lesson in lessons if lesson.number == START]
     return any(
         'progress.show()' in cell.source
@@ -77,10 +71,13 @@ def needs_run(lessons: list[Lesson]) -> bool:
     )
 
 
-def headings_of_exercises(lesson: Lesson) -> list[str]:
-    """Return the headings such as `Exercise 1: Two robots`, in their order."""
-    text = '\n'.join(c.source for c in lesson.notebook.cells if c.cell_type == 'markdown')
-    return re.findall(r'^### (Exercise \d.*)', text, re.MULTILINE)
+def with_exercises(lessons: list[Lesson]) -> list[progress.Lesson]:
+    """Return the notebooks that have exercises, as `helpers.progress` knows them."""
+    return [
+        progress.Lesson(one.number, one.name, one.title, len(one.exercises))
+        for one in lessons
+        if one.exercises
+    ]
 
 
 def missing_translations(lessons: list[Lesson]) -> list[str]:

@@ -36,6 +36,7 @@ from tools.lessons.lesson import (
     Lesson,
     first_heading,
     lessons,
+    tags,
 )
 from tools.site.book import write as write_book
 
@@ -86,9 +87,8 @@ def _folded_note(source: str) -> NotebookNode:
 
 def _fold(cell: NotebookNode) -> None:
     """Fold the source of a solution, of a check, and of what is folded in JupyterLab."""
-    tags = set(cell.metadata.get('tags', []))
-    if 'check' in tags or cell.metadata.get('jupyter', {}).get('source_hidden'):
-        what = next(iter(tags & {'solution', 'check'}), 'code')
+    if 'check' in tags(cell) or cell.metadata.get('jupyter', {}).get('source_hidden'):
+        what = next(iter(tags(cell) & {'solution', 'check'}), 'code')
         cell.metadata['mystnb'] = {
             f'code_prompt_{verb}': f'{verb.capitalize()} the {what}' for verb in ('show', 'hide')
         }
