@@ -13,9 +13,9 @@ import time
 from pathlib import Path
 
 import pytest
+from support.checkouts import copy_checkout
 from support.containers import IMAGE, LIMITS, leave_out
 
-ROOT = Path(__file__).resolve().parents[2]
 SUITE = 'trixie'  # the base that the Containerfile names
 CERTIFICATES = Path('/etc/ssl/certs/ca-certificates.crt')
 ROOM = 6e9  # bytes on the disk, for base, image and layers
@@ -94,12 +94,7 @@ def podman(folder, base) -> list[str]:
 def make(folder, podman):
     """Return `make` in a checkout of its own, with the files that git knows."""
     checkout = folder / 'checkout'
-    command = ['git', '-C', ROOT, 'ls-files', '-z', '--cached', '--others', '--exclude-standard']
-    files = subprocess.run(command, check=True, capture_output=True, text=True).stdout.split('\0')
-    for name in filter(None, files):
-        if (ROOT / name).exists():
-            (checkout / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / name, checkout / name, follow_symlinks=False)
+    copy_checkout(checkout)
 
     def make(*arguments: str) -> subprocess.CompletedProcess:
         return subprocess.run(

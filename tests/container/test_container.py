@@ -2,7 +2,6 @@
 
 import json
 import shutil
-import socket
 import subprocess
 import time
 import urllib.error
@@ -11,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from support.containers import IMAGE, LIMITS
+from support.hubs import free_ports
 
 # One that compiles, for the class in containers runs others. environment.md says what was tried.
 LESSON = 'use_a_message_in_your_own_interface'
@@ -19,9 +19,8 @@ START_S = 180
 
 @pytest.fixture(scope='module')
 def port() -> int:
-    with socket.socket() as one:
-        one.bind(('127.0.0.1', 0))
-        return one.getsockname()[1]
+    [port] = free_ports(1)
+    return port
 
 
 @pytest.fixture

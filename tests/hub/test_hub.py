@@ -7,7 +7,6 @@ to the kernels over their websockets.
 import asyncio
 import contextlib
 import os
-import re
 import socket
 import subprocess
 import sys
@@ -18,7 +17,6 @@ from pathlib import Path
 
 import domain_coordinator
 import domain_coordinator.impl
-import psutil
 import pytest
 from nbformat import NotebookNode
 from support.hubs import (
@@ -37,6 +35,7 @@ from support.hubs import (
     talk,
     told_to_the_class,
 )
+from support.processes import segments
 
 STUDENTS = [f'student{number:02}' for number in range(1, 13)]
 LATE = 'student101'
@@ -47,13 +46,6 @@ c.SimpleLocalProcessSpawner.home_dir_template = str(folder / 'home' / '{username
 c.Spawner.args.append('--allow-root')
 c.Spawner.environment['TMPDIR'] = str(folder)
 """
-
-
-def shared_memory(processes: list[psutil.Process]) -> set[str]:
-    """Return the files of shared memory that belong to these processes alone."""
-    found = {mapped.path for process in processes for mapped in process.memory_maps()}
-    # A file that is named after a port stays for the next one who takes the domain.
-    return {path for path in found if re.fullmatch(r'/dev/shm/fastrtps_[0-9a-f]{16}', path)}
 
 
 # --- The class -----------------------------------------------------------------------------------
@@ -118,7 +110,7 @@ async def everybody_talks(students: list[Student], hour: ClassHour) -> None:
     }
     hour.domains = [int(await kernel.text(DOMAIN)) for kernel in kernels.values()]
     await talk(kernels)
-    hour.segments = shared_memory(students[0].hub.processes())
+    hour.segments = set().union(*(segments(one.pid) for one in students[0].hub.processes()))
     guest = subprocess.Popen([sys.executable, '-c', GUEST, str(hour.domains[0]), str(os.getpid())])
     try:
         hour.heard = await listen(kernels, {next(iter(kernels)): {'guest'}})

@@ -1,12 +1,12 @@
 """A lesson is added and taken out in a copy of this checkout, where all rules still hold."""
 
 import os
-import shutil
 import subprocess
 import sys
 
 import nbformat
 import pytest
+from support.checkouts import copy_checkout
 
 from tools.lessons import new, run
 from tools.lessons.lesson import ROOT, lessons
@@ -24,11 +24,7 @@ def git(folder, *arguments):
 
 def copied(folder):
     """Copy this checkout with its changes, and commit them there; return the folder."""
-    known = git(ROOT, 'ls-files', '-z', '--cached', '--others', '--exclude-standard')
-    for path in known.split('\0'):
-        if path and (ROOT / path).is_file():
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(ROOT / path, folder / path)
+    copy_checkout(folder)
     git(folder, 'init', '-q')
     commit(folder)
     return folder
