@@ -30,6 +30,7 @@ from support.runs import (
 
 from helpers.queue_model import explain, predict
 from helpers.replay import replay, side_by_side
+from helpers.replay.free import FreePlay
 from helpers.replay.levels import level
 from tools.lessons.lesson import lessons
 
@@ -455,10 +456,10 @@ def test_what_nbval_compares_does_not_move():
     assert 'function queueModel' in pages[0]
 
 
-def test_size():
-    page = html(replay(predict(0.05, 0.2, 10, 1, 41), 10))
+@pytest.mark.parametrize('shown', [replay(predict(0.05, 0.2, 10, 1, 41), 10), FreePlay()])
+def test_size(shown):
+    page = html(shown)
     assert len(page) <= 30_000
-    assert sum(map(len, re.findall('<script>(.*?)</script>', page, re.DOTALL))) <= 40_000
     assert not re.search(r'https?://(?!www\.w3\.org)', page)
 
 

@@ -13,7 +13,6 @@ from support.javascript import Script
 from support.nodes import LIMIT_S, Answerer, Asker, spin
 
 from helpers.recording import CallbackRecording
-from helpers.replay import side_by_side
 from helpers.replay.calls import replay_calls
 from helpers.session import ros_session
 
@@ -145,11 +144,6 @@ def test_the_picture_shows_who_waits_for_an_answer():
     assert all(f'>{name} 0<' in drawn for name in ('tick', 'look', 'client'))
     assert 'function circleOf' in page
     assert len(page) <= 30_000
-
-
-def test_two_runs_side_by_side():
-    runs = {name: record(2, groups, 'call')[0] for groups, name in ((1, 'one'), (2, 'two'))}
-    assert str(side_by_side(runs)).endswith('two: 2 threads. Nobody waits for ever.')
 
 
 # Bad input
