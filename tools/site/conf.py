@@ -3,13 +3,10 @@
 from tools.site.lexer import CellLexer
 
 project = 'ROS 2 in notebooks'
-language = 'en'
 extensions = ['myst_nb']
-exclude_patterns = []
 
 nb_execution_mode = 'off'  # the outputs are the saved ones
 nb_merge_streams = True
-nb_number_source_lines = False
 myst_heading_anchors = 4
 suppress_warnings = ['mystnb.unknown_mime_type']
 
