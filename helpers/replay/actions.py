@@ -71,7 +71,6 @@ def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) 
     tables, runs = recording.tables(), recording.runs
     if any(len(runs[one]) != 1 for one in ('execute_callback', 'cancel_goal')):
         raise ValueError('A replay shows one job and its cancel: record the run of one goal.')
-    zero = runs['send_goal'][0][0]
     names = list(recording.group_of)
     groups: dict = {}
     for one, group in recording.group_of.items():
@@ -104,11 +103,22 @@ def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) 
             for one, group in recording.group_of.items()
         ],
     }
+    moves = _moves(recording, names, thread_names, cancelled_s)
+    summary = f'{"One thread" if threads == 1 else f"{threads} threads"}. The cancel {taken}.'
+    return Replay((Run('', summary, False, setup, moves, 0, TIME_LABEL),))
+
+
+def _moves(
+    recording: ActionRecording, names: list[str], threads: list[str], cancelled_s: float
+) -> list:
+    """Return the moves of model.js that make the recorded run, in their order."""
+    tables, runs = recording.tables(), recording.runs
+    zero = runs['send_goal'][0][0]
     moves = []
     for one, table in tables.items():
         callback = names.index(one)
         for run in table.itertuples():
-            thread = thread_names.index(run.thread)
+            thread = threads.index(run.thread)
             arrived_s = run.started_s
             if one == 'execute_callback':  # the request for the goal has made it
                 arrived_s = min(arrived_s, runs['send_goal'][0][1] - zero)
@@ -121,6 +131,4 @@ def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) 
             if run.finished_s == run.finished_s:
                 moves.append((run.finished_s, END, callback, thread))
     moves.sort(key=lambda move: (move[0], SAME_TIME.index(move[1])))
-    moves = [[round(1e6 * at_s), KINDS.index(do), one, other] for at_s, do, one, other in moves]
-    summary = f'{"One thread" if threads == 1 else f"{threads} threads"}. The cancel {taken}.'
-    return Replay((Run('', summary, False, setup, moves, 0, TIME_LABEL),))
+    return [[round(1e6 * at_s), KINDS.index(do), one, other] for at_s, do, one, other in moves]

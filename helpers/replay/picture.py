@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from html import escape
+from typing import NamedTuple
 from urllib.parse import quote
 
 from matplotlib.ticker import MaxNLocator
@@ -49,75 +50,103 @@ def picture(
     It is `width` pixels wide; `left` of them are for the names, one for each message. The plot is
     where time is shown: its left, right, top and bottom, as parts of the width and of the height.
     """
-    from_s, until_s = span_s
-    rows = {(one['callback'], one['seq']): row for row, one in enumerate(messages)}
-    step = max(4.0, min(14.0, 260 / max(len(rows), 1)))
-    bottom = step * len(rows)
-    scale = (width - left - RIGHT) / (until_s - from_s)
-
-    def x(at_s: float) -> str:
-        return f'{left + scale * (max(at_s, from_s) - from_s):.1f}'.removesuffix('.0')
-
-    def y(row: int) -> str:
-        return f'{step * (row + 0.5):.1f}'.removesuffix('.0')
-
-    def lines(row: int, phases: list, end_s: float) -> Iterator[tuple[str, str]]:
-        """Yield of each phase its cause, and its line."""
-        for (start, cause), (end, _) in zip(phases, [*phases[1:], (end_s, '')], strict=False):
-            begin, stop = max(start, from_s), min(end, end_s)
-            if begin < stop:
-                yield cause, f'M{x(begin)} {y(row)}H{x(stop)}'
-
-    waits, runs = defaultdict(list), defaultdict(list)
-    crosses, pushed = [], []
-    for row, one in enumerate(messages):
-        left_s = one.get('left', until_s)
-        for cause, line in lines(row, one['waits'], left_s):
-            waits[cause].append(line)
-        for cause, line in lines(row, one['runs'], one.get('ended', until_s)):
-            runs[cause].append(line)
-        if 'by' in one:
-            crosses.append(f'M{x(left_s)} {y(row)}m-3-3l6 6m0-6l-6 6')
-            if (by := rows.get((one['callback'], one['by']))) is not None:
-                pushed.append(f'M{x(left_s)} {y(row)}V{y(by)}')
-
-    thin, thick = max(1.5, step * 0.3), max(3.0, step * 0.7)
-    parts, texts, legend = [], [], []
-    for found, looks, line in ((waits, WAITS, thin), (runs, RUNS, thick)):
-        for cause, (colour, dashes, words) in looks.items():
-            if cause in found:
-                parts.append(_path(found[cause], colour, line, dashes))
-                legend.append((colour, line, dashes, words))
-    if pushed:
-        parts.append(_path(pushed, LOST, 0.8, '1 2'))
-    if crosses:
-        parts.append(_path(crosses, LOST, 1.6))
-        legend.append((LOST, 0, '', 'pushed out'))
-    for tick in MaxNLocator(max(2, width // 110)).tick_values(from_s, until_s):
-        if from_s <= tick <= until_s:
-            parts.append(_path([f'M{x(tick)} {bottom:g}v5'], INK, 1))
-            texts.append(
-                f'<text x="{x(tick)}" y="{bottom + 18:g}" text-anchor="middle">{tick:g}</text>'
-            )
-    every = next(n for n in (1, 2, 5, 10, 20, 50, 100) if n * step >= 13)
-    texts += [
-        f'<text x="{left - 6}" y="{float(y(row)) + 4:g}" text-anchor="end">{escape(name)}</text>'
-        for row, name in enumerate(names)
-        if row % every == 0
-    ]
-    middle = (width + left) // 2
-    texts.append(f'<text x="{middle}" y="{bottom + 34:g}" text-anchor="middle">{time_label}</text>')
-    parts.append(_path([f'M{left} {bottom:g}H{width - RIGHT}'], INK, 1))
-    above, top = _legend(legend, width)
-    height = top + bottom + BOTTOM
+    frame = _Frame(*span_s, width, left, len(messages))
+    drawn, entries = _runs(frame, messages)
+    above, top = _legend(entries, width)
+    height = top + frame.bottom + BOTTOM
     svg = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height:g}" '
         f'width="{width}" height="{height:g}" font-family="sans-serif" font-size="12" '
-        f'fill="{INK}"><rect width="100%" height="100%" fill="#fff"/>{"".join(above)}'
-        f'<g transform="translate(0 {top})">{"".join(parts)}{"".join(texts)}</g></svg>'
+        f'fill="{INK}"><rect width="100%" height="100%" fill="#fff"/>{above}'
+        f'<g transform="translate(0 {top})">{drawn}{_axes(frame, names, time_label)}</g></svg>'
     )
-    plot = left / width, 1 - RIGHT / width, top / height, (top + bottom) / height
+    plot = left / width, 1 - RIGHT / width, top / height, (top + frame.bottom) / height
     return svg, [round(part, 4) for part in plot]
+
+
+class _Frame(NamedTuple):
+    """Where a time and a row stand, in pixels."""
+
+    from_s: float
+    until_s: float
+    width: int
+    left: int
+    rows: int
+
+    @property
+    def step(self) -> float:
+        """The height of a row."""
+        return max(4.0, min(14.0, 260 / max(self.rows, 1)))
+
+    @property
+    def bottom(self) -> float:
+        return self.step * self.rows
+
+    def x(self, at_s: float) -> str:
+        scale = (self.width - self.left - RIGHT) / (self.until_s - self.from_s)
+        at = self.left + scale * (max(at_s, self.from_s) - self.from_s)
+        return f'{at:.1f}'.removesuffix('.0')
+
+    def y(self, row: int) -> str:
+        return f'{self.step * (row + 0.5):.1f}'.removesuffix('.0')
+
+    def lines(self, row: int, phases: list, end_s: float) -> Iterator[tuple[str, str]]:
+        """Yield of each phase its cause, and its line."""
+        for (start, cause), (end, _) in zip(phases, [*phases[1:], (end_s, '')], strict=False):
+            begin, stop = max(start, self.from_s), min(end, end_s)
+            if begin < stop:
+                yield cause, f'M{self.x(begin)} {self.y(row)}H{self.x(stop)}'
+
+
+def _runs(frame: _Frame, messages: Sequence[dict]) -> tuple[str, list]:
+    """Return what became of the messages, and the entries of the legend."""
+    rows = {(one['callback'], one['seq']): row for row, one in enumerate(messages)}
+    waits, runs = defaultdict(list), defaultdict(list)
+    crosses, pushed = [], []
+    for row, one in enumerate(messages):
+        left_s = one.get('left', frame.until_s)
+        for cause, line in frame.lines(row, one['waits'], left_s):
+            waits[cause].append(line)
+        for cause, line in frame.lines(row, one['runs'], one.get('ended', frame.until_s)):
+            runs[cause].append(line)
+        if 'by' in one:
+            crosses.append(f'M{frame.x(left_s)} {frame.y(row)}m-3-3l6 6m0-6l-6 6')
+            if (by := rows.get((one['callback'], one['by']))) is not None:
+                pushed.append(f'M{frame.x(left_s)} {frame.y(row)}V{frame.y(by)}')
+    thin, thick = max(1.5, frame.step * 0.3), max(3.0, frame.step * 0.7)
+    paths, legend = [], []
+    for found, looks, line in ((waits, WAITS, thin), (runs, RUNS, thick)):
+        for cause, (colour, dashes, words) in looks.items():
+            if cause in found:
+                paths.append(_path(found[cause], colour, line, dashes))
+                legend.append((colour, line, dashes, words))
+    if pushed:
+        paths.append(_path(pushed, LOST, 0.8, '1 2'))
+    if crosses:
+        paths.append(_path(crosses, LOST, 1.6))
+        legend.append((LOST, 0, '', 'pushed out'))
+    return ''.join(paths), legend
+
+
+def _axes(frame: _Frame, names: Sequence[str], time_label: str) -> str:
+    """Return the names of the rows, and the axis of time."""
+    left, width = frame.left, frame.width
+    marks, texts = [], []
+    for tick in MaxNLocator(max(2, width // 110)).tick_values(frame.from_s, frame.until_s):
+        if frame.from_s <= tick <= frame.until_s:
+            x = frame.x(tick)
+            marks.append(_path([f'M{x} {frame.bottom:g}v5'], INK, 1))
+            texts.append(
+                f'<text x="{x}" y="{frame.bottom + 18:g}" text-anchor="middle">{tick:g}</text>'
+            )
+    every = next(n for n in (1, 2, 5, 10, 20, 50, 100) if n * frame.step >= 13)
+    for row in range(0, len(names), every):
+        y, name = float(frame.y(row)) + 4, escape(names[row])
+        texts.append(f'<text x="{left - 6}" y="{y:g}" text-anchor="end">{name}</text>')
+    middle, below = (width + left) // 2, frame.bottom + 34
+    texts.append(f'<text x="{middle}" y="{below:g}" text-anchor="middle">{time_label}</text>')
+    marks.append(_path([f'M{left} {frame.bottom:g}H{width - RIGHT}'], INK, 1))
+    return ''.join(marks + texts)
 
 
 def _path(lines: list[str], colour: str, line: float, dashes: str = '') -> str:
@@ -125,7 +154,7 @@ def _path(lines: list[str], colour: str, line: float, dashes: str = '') -> str:
     return f'<path d="{"".join(lines)}" stroke="{colour}" stroke-width="{line:g}"{dashed}/>'
 
 
-def _legend(entries: list[tuple[str, float, str, str]], width: int) -> tuple[list[str], int]:
+def _legend(entries: list[tuple[str, float, str, str]], width: int) -> tuple[str, int]:
     """Return marks and texts of entries, and the height that they take.
 
     An entry is its colour, the width of its line (0 for a cross), its dashes, its words.
@@ -139,7 +168,7 @@ def _legend(entries: list[tuple[str, float, str, str]], width: int) -> tuple[lis
         parts.append(_path([mark], colour, line or 1.6, dashes))
         parts.append(f'<text x="{at + MARK:g}" y="{y}">{escape(words)}</text>')
         at += needed + RIGHT
-    return parts, y + TOP
+    return ''.join(parts), y + TOP
 
 
 def address(svg: str) -> str:
