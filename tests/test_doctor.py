@@ -146,16 +146,25 @@ def test_shared_memory_that_is_full_or_cannot_be_written_is_reported(monkeypatch
     assert row.found == '31 MiB free'
     assert row.to_do.startswith('run `.venv/bin/fastdds shm clean`, remove files from /dev/shm, or')
     assert not row.required
+    monkeypatch.setattr(shutil, 'disk_usage', lambda path: SimpleNamespace(free=32 * 2**20))
+    assert doctor.check_shared_memory().to_do == ''
     monkeypatch.undo()
     monkeypatch.setattr(doctor, 'SHARED_MEMORY', Path('/proc/self'))
     assert doctor.check_shared_memory().found == '/proc/self cannot be written'
 
 
-def test_a_compiler_without_its_library_is_reported(monkeypatch, tmp_path):
-    compiler = tmp_path / 'c++'
-    compiler.write_text('#!/bin/sh\n[ $1 = --version ] && echo clang 14')
-    compiler.chmod(0o755)
-    monkeypatch.setenv('CXX', str(compiler))
+@pytest.mark.parametrize(
+    'compiler',
+    [
+        '#!/bin/sh\n[ $1 = --version ] && echo clang 14',  # it has no standard library
+        'of another machine',
+    ],
+)
+def test_a_compiler_that_does_not_work_is_reported(monkeypatch, tmp_path, compiler):
+    file = tmp_path / 'c++'
+    file.write_text(compiler)
+    file.chmod(0o755)
+    monkeypatch.setenv('CXX', str(file))
     rows = {row.name: row for row in doctor.check_build_tools()}
     assert rows['C++ compiler'].found == 'none that works'
     assert not rows['C++ compiler'].required
