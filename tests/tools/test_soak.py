@@ -49,7 +49,7 @@ LEFT_AFTER_RUN = """
     from pathlib import Path
     # Its parent ends at once.
     _ = subprocess.run(['sh', '-c', 'setsid sleep 61 > /dev/null 2>&1 &'])
-    Path('/dev/shm/fastrtps_left').touch()
+    _ = Path('/dev/shm/fastrtps_left').write_text('left')
     Path.home().joinpath('left').touch()
 """
 
@@ -147,6 +147,8 @@ def test_an_interrupted_import_is_seen_in_the_traceback(frame, import_):
 def test_a_full_shared_memory_is_full(failures):
     fill = ("_ = open('/dev/shm/more', 'wb').write(bytes(10**5))", '')
     assert 'No space left on device' in failures('shm-full', fill)['code cell 1']
+    session = 'from helpers.session import ros_session\nwith ros_session():\n    pass'
+    assert failures('shm-full', (session, '')) == {}
 
 
 @needs_root

@@ -147,7 +147,8 @@ def soak(notebooks: list[Path], conditions: list[Condition], rounds: int) -> Non
             except ValueError as error:
                 print(f'{condition.name}: skipped. {error}', flush=True)
                 continue
-            for group in [notebooks] if condition.at_once > 1 else [[path] for path in notebooks]:
+            possible = [path for path in notebooks if condition.process_pools or not _pools(path)]
+            for group in [possible] if condition.at_once > 1 else [[path] for path in possible]:
                 started = time.monotonic()
                 rows = run(group, condition, python)
                 with RUNS.open('a', encoding='utf-8') as file:
@@ -157,6 +158,10 @@ def soak(notebooks: list[Path], conditions: list[Condition], rounds: int) -> Non
                 ended = f'failed: {failed[0]}' if failed else 'passed'
                 seconds = time.monotonic() - started
                 print(f'{condition.name:<13} {names} {seconds:6.0f} s  {ended}', flush=True)
+
+
+def _pools(notebook: Path) -> bool:
+    return 'ProcessPoolExecutor' in notebook.read_text('utf-8')
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -27,6 +27,7 @@ class Condition:
 
     `mode` is one of tools/soak/plugin.py, `at_once` how many notebooks run, `version` a Python of
     which there may be none, `before` the words before the command, `mounts` shell commands.
+    `process_pools` says whether Python can make one: its semaphores are in /dev/shm.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Condition:
     before: tuple[str, ...] = ()
     variables: dict[str, str] = field(default_factory=dict)
     mounts: str = SHM_OF_ITS_OWN
+    process_pools: bool = True
 
     def python(self) -> str:
         """Return the interpreter, of an environment that is made where there is none yet.
@@ -74,7 +76,7 @@ CONDITIONS = [
     Condition('twice', mode='twice'),
     Condition('interrupt', mode='interrupt'),
     Condition('kill', mode='kill'),
-    Condition('shm-full', mounts=SHM_FULL),
-    Condition('shm-read-only', mounts='mount -t tmpfs -o ro tmpfs /dev/shm'),
+    Condition('shm-full', mounts=SHM_FULL, process_pools=False),
+    Condition('shm-read-only', mounts='mount -t tmpfs -o ro tmpfs /dev/shm', process_pools=False),
     Condition('home', mounts=f'{SHM_OF_ITS_OWN}\nmount -t tmpfs -o ro tmpfs "$0/home"'),
 ]
