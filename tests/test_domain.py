@@ -93,9 +93,9 @@ def test_only_processes_that_agree_hear_each_other(shared_id):
 
 
 def test_no_kernel_reserves_a_domain_that_is_shared(shared_id):
-    with ros_session(domain_id=shared_id):
+    with ros_session(domain_id=shared_id) as session:
         assert not is_free(shared_id)
-    assert is_free(shared_id)
+    assert is_free(shared_id), session  # also while a notebook keeps it
 
 
 def test_domain_of_somebody_else(shared_id):
