@@ -19,8 +19,11 @@ OF_PROCESS = ('dds.shm.wdog', 'dds.log')
 OF_ZMQ = 'GarbageCollectorThread'  # frees what Jupyter has sent, from its first picture on
 # Of Python: it comes with the first pool of processes, and lives until the kernel ends.
 TRACKER = 'from multiprocessing.resource_tracker import main'
-# Where /dev/shm cannot be written, LTTng, which rclpy is linked with, forks a child of a kernel
-# every 5 s. It tries once more to write, and ends.
+# Fast DDS's watchdog lets go of the memory of another process up to a second after the participant
+# has ended. Where /dev/shm cannot be written, LTTng, which rclpy is linked with, forks a child of a
+# kernel every 5 s, which tries to write once more, and ends. LTTng waits for any child: where that
+# was another one, its own is a zombie until the next round.
+ENDS_LATER = re.compile(rf'{SHARED_MEMORY.pattern}|zombie \d+')
 MOMENT_S = 1.0
 END_TIMEOUT_S = 10.0
 
@@ -34,15 +37,11 @@ def look() -> None:
     now = state_of_process()
     if _before is None:
         _before = now
-    # Fast DDS lets go of the memory of another process up to a second after the participant has
-    # ended: its watchdog does it, once a second.
-    while (new := now.keys() - _before.keys()) and all(map(SHARED_MEMORY.fullmatch, new)):
-        if time.monotonic() > deadline:
-            break
+    left = now.keys() - _before.keys()
+    while left and all(map(ENDS_LATER.fullmatch, left)) and time.monotonic() < deadline:
         time.sleep(0.01)
-        now = state_of_process()
-    left = [now[key] for key in sorted(new)]
-    assert not left, ' '.join(left)
+        left &= state_of_process().keys()
+    assert not left, ' '.join(now[key] for key in sorted(left))
 
 
 def state_of_process() -> dict[str, str]:
@@ -88,11 +87,12 @@ def processes_that_stay(processes: list[psutil.Process], timeout_s: float) -> di
     found = {}
     for process in processes:
         with suppress(psutil.NoSuchProcess):
+            kind = 'process'
             try:
                 what = ' '.join(process.cmdline())[:100] or process.name()
             except psutil.ZombieProcess:
-                what = f'{process.name()} (nobody has waited for its end)'
-            found[f'process {process.pid}'] = f'The process {process.pid} still runs: {what}.'
+                kind, what = 'zombie', f'{process.name()} (nobody has waited for its end)'
+            found[f'{kind} {process.pid}'] = f'The process {process.pid} still runs: {what}.'
     return found
 
 
