@@ -17,6 +17,7 @@ TABLE = ROOT / 'licences.md'
 LOCKS = sorted(ROOT.glob('requirements*.lock'))
 # What these say in a text or in their source only.
 STATED = {
+    'docutils': 'Public Domain, BSD License',  # its file for Emacs, GPL, is not in the wheel
     'empy': 'LGPL',
     'jupyterhub-idle-culler': 'BSD-3-Clause',
     'quickjs-ng': 'MIT',
@@ -37,7 +38,6 @@ with their licences, `make site` the letters of Urdu (OFL-1.1) and the scripts o
 
 Most licences here ask for one thing: to stay beside the package. Who passes on the following ones
 must also offer their source, with all changes. Programs that only use them keep their own licence.
-Under the GPL is one file of docutils, for Emacs, which its wheel leaves out.
 
 {copyleft}
 
