@@ -77,7 +77,7 @@ def check_python() -> Check:
 def check_platform(has_rclpy: bool) -> Check:
     """Check the machine. Where rclpy is there, any machine will do."""
     fits = has_rclpy or (sys.platform, platform.machine()) == ('linux', 'x86_64')
-    to_do = 'the ROS 2 wheels are for x86-64 Linux only: see "Other machines" in environment.md'
+    to_do = 'ROS 2 wheels are for x86-64 Linux: see "A door for every machine" in environment.md'
     return Check('platform', f'{platform.system()} {platform.machine()}', '' if fits else to_do)
 
 
