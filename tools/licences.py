@@ -36,8 +36,9 @@ them from a package index. So their licences matter to those who pass the packag
 in an image of a machine for a class. `make slides` copies reveal.js and MathJax beside the slides,
 with their licences, `make site` the letters of Urdu (OFL-1.1) and the scripts of Sphinx and furo.
 
-Most licences here ask for one thing: to stay beside the package. Who passes on the following ones
-must also offer their source, with all changes. Programs that only use them keep their own licence.
+Most licences here ask for one thing: to stay beside the package. Whoever passes on the following
+ones must also offer their source, with all changes. Programs that only use them keep their own
+licence.
 
 {copyleft}
 
