@@ -29,7 +29,7 @@ RUN_TIMEOUT_S = 1800.0
 STATE = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR', 'IPYTHONDIR')
 STATE += ('ROS_LOG_DIR', 'MPLCONFIGDIR')
 LONGEST_TEXT = 1600
-EVENTS = ['interrupted_after_s', 'killed_after_s', 'in_import', 'kernel_lost']
+EVENTS = ['interrupted_after_s', 'killed_after_s', 'in_import', 'in_tracker', 'kernel_lost']
 # $0 is the folder of the run, $1 the interpreter, the rest is the command.
 INSIDE = """
 set -e

@@ -38,6 +38,8 @@ KERNEL_LOST = (Empty, RuntimeError, ValueError)  # no answer, a dead kernel, a b
 # In IPython's traceback: the top level of a module, or the cell's own import where Python has left
 # out all frames below it.
 IN_IMPORT = re.compile(r'^File (<frozen importlib|.+\.py:\d+$)|^-+> \d+ (import|from) ', re.M)
+# Python's helper of a pool of processes: its child that was not yet noted is a zombie.
+IN_TRACKER = re.compile(r'resource_tracker\.py:\d+, in ResourceTracker\.(ensure_running|_launch)')
 COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
 
 
@@ -146,6 +148,9 @@ class Interrupted(IPyNbCell):
         if IN_IMPORT.search(traceback):
             # Python cannot repeat a half-done import of NumPy: the reader restarts the kernel.
             self.user_properties.append(('in_import', True))
+            fresh_kernel(self, self.cell_num)
+        elif IN_TRACKER.search(traceback):
+            self.user_properties.append(('in_tracker', True))
             fresh_kernel(self, self.cell_num)
         elif error.get('ename', 'KeyboardInterrupt') != 'KeyboardInterrupt':
             self.raise_cell_error(f'Interrupted after {after_s:.3f} s, it fails', traceback)
