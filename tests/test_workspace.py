@@ -514,6 +514,10 @@ def test_a_terminal_is_a_new_one_in_the_workspace(other, monkeypatch):
     assert other.terminal('pwd; false; echo two >&2') == '.\ntwo'
 
 
+def test_git_in_a_workspace_never_finds_the_repository_of_the_checkout(other):
+    assert 'not a git repository' in other.terminal('cd src; git status')
+
+
 def test_a_new_workspace_is_empty_and_git_does_not_see_it(other):
     other.write('src/a/b.txt', 'text')
     again = Workspace(other.path.name)

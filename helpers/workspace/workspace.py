@@ -211,7 +211,8 @@ class Workspace:
     def terminal(self, commands: str) -> str:
         """Run commands in a new terminal, a bash in the folder of this workspace.
 
-        Nothing of the workspace is sourced in it, and the user's settings of git do not count.
+        Nothing of the workspace is sourced in it. The user's settings of git do not count, and git
+        sees no repository above the workspace.
         Return what the commands print, without this machine's folders.
 
         Raises TimeoutError where they take longer than 60 s.
@@ -219,6 +220,8 @@ class Workspace:
         environment = build_environment() | {
             'GIT_CONFIG_GLOBAL': os.devnull,
             'GIT_CONFIG_NOSYSTEM': '1',
+            # Where the workspace has no repository, git would find that of this checkout.
+            'GIT_CEILING_DIRECTORIES': str(self.path.parent),
         }
         command = [shutil.which('bash') or '/bin/bash', '--norc', '-c', commands]
         with Process('bash', command, environment, self.path) as shell:
