@@ -22,7 +22,6 @@ from support.classes import (
     OTHER,
     QUESTION,
     STEP,
-    RunningClass,
     event,
     running_class,
     student,
@@ -388,15 +387,6 @@ def test_who_can_reach_it(opened, tmp_path):
         socket.create_connection((host, wide.port), timeout=5).close()
         with pytest.raises(OSError, match='refused'):
             socket.create_connection((host, opened.port), timeout=5)
-
-
-def test_the_end_from_the_page_deletes_everything(tmp_path):
-    opened = RunningClass(tmp_path)
-    opened.start()
-    opened.tell(opened.join(), event(value='what was said'))
-    assert opened.do('end') == 200
-    assert opened.wait().endswith('The class is over. What it was told is deleted.\n')
-    assert [path.name for path in (tmp_path / 'jupyter').rglob('*')] == ['class']
 
 
 def test_forgetting_leaves_nothing_in_the_file(store):
