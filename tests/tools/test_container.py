@@ -91,7 +91,7 @@ def label(run):
 
 
 @pytest.mark.parametrize('words', PORT)
-def test_a_port_in_use(run, tmp_path, words):
+def test_a_port_in_use(run, words):
     own = label(run)
     done = run('lab', f'image) echo {own} ;; run) echo "{words}" >&2; exit 126 ;;', PORT='8931')
     assert done.returncode == 126
