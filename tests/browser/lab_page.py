@@ -127,12 +127,12 @@ class LabPage:
         """Return the cells as they are now."""
         return self.page.evaluate(f'() => {PANEL}.content.model.toJSON().cells')
 
-    def find(self, tag: str, source: str = '') -> int:
-        """Return the index of the first cell with this tag and this in its source."""
+    def find(self, source: str = '', tag: str = '') -> int:
+        """Return the index of the first cell with this in its source, and this tag."""
         for index, cell in enumerate(self.cells()):
-            if tag in cell['metadata'].get('tags', []) and source in ''.join(cell['source']):
+            if source in cell['source'] and tag in ['', *cell['metadata'].get('tags', [])]:
                 return index
-        raise LookupError(f'There is no cell with the tag {tag} and {source!r} in it.')
+        raise LookupError(f'There is no cell with {source!r} in it and the tag {tag!r}.')
 
     def show(self, index: int) -> ElementHandle:
         """Scroll to a cell, and return it with its pictures loaded."""
@@ -166,6 +166,12 @@ class LabPage:
         """Wait until a cell has a number, and its kernel nothing to do."""
         self.page.wait_for_function(CELL_RAN, arg=index, timeout=LIMIT_S * 1000)
 
+    def write(self, source: str) -> None:
+        """Replace the source of the active cell with keys, and stay in it."""
+        self.page.keyboard.press('Enter')
+        self.page.keyboard.press('Control+A')
+        self.page.keyboard.insert_text(source)
+
     def active(self) -> int:
         """Return the index of the active cell."""
         return self.page.evaluate(f'() => {PANEL}.content.activeCellIndex')
@@ -198,6 +204,11 @@ class LabPage:
     def wait_for_slide(self, index: int) -> None:
         """Wait until a cell is revealed and has the focus, and all of its slide is drawn."""
         self.page.wait_for_function(SLIDE_DRAWN, arg=index)
+
+    def walk_to(self, index: int) -> None:
+        """Press Space until a cell is shown."""
+        while self.active() < index:
+            self.press('Space')
 
     # What a test keeps
 

@@ -32,38 +32,44 @@ class Server(NamedTuple):
 
 
 @contextmanager
-def server(folder: Path, *make: str) -> Iterator[Server]:
-    """Run a command of the Makefile that starts JupyterLab, as a process group of its own."""
-    shutil.copytree(ROOT / 'notebooks', folder / 'notebooks', dirs_exist_ok=True)
+def made(folder: Path, printed: str, *make: str) -> Iterator[tuple[subprocess.Popen, re.Match]]:
+    """Run a command of the Makefile beside the block, as a process group of its own.
+
+    It yields the process, and what it has printed by which one sees that it has started.
+    """
     # Two workers start servers at the same moment, and would both find the first free port. The
     # system gives each a port of its own.
     command = ['make', *make, 'PORT=0', 'BROWSER=no', f'ROOT={folder}']
     state = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR')
     command += [f'{name}={folder / name}' for name in state]
-    command += ['LAB_ARGS=--LabApp.expose_app_in_browser=True']
-    with Path(folder, 'log').open('w') as log:
+    log = folder / f'{make[0]}.log'
+    with log.open('w') as file:
         process = subprocess.Popen(
             # If this test is killed, the server is told, and ends its kernels.
             ['setpriv', '--pdeathsig', 'TERM', *command],
             cwd=ROOT,
             stdin=subprocess.DEVNULL,
-            stdout=log,
-            stderr=log,
+            stdout=file,
+            stderr=file,
             start_new_session=True,
         )
-        try:
-            yield _address(process, folder)
-        finally:
+    try:
+        end = time.monotonic() + START_LIMIT_S
+        while not (found := re.search(printed, log.read_text())):
+            if process.poll() is not None or time.monotonic() > end:
+                raise RuntimeError(f'{make[0]} did not start:\n{log.read_text()}')
+            time.sleep(0.05)
+        yield process, found
+    finally:
+        if process.poll() is None:
             os.killpg(process.pid, signal.SIGTERM)
-            process.wait(START_LIMIT_S)
+        process.wait(START_LIMIT_S)
 
 
-def _address(process: subprocess.Popen, folder: Path) -> Server:
-    """Wait until the server has printed its address."""
-    end = time.monotonic() + START_LIMIT_S
-    while time.monotonic() < end and process.poll() is None:
-        printed = Path(folder, 'log').read_text()
-        if found := re.search(r'(http://localhost:\d+/)\S+token=(\w+)\n', printed):
-            return Server(found[0].strip(), found[1], found[2], folder)
-        time.sleep(0.05)
-    raise RuntimeError(f'JupyterLab did not start:\n{Path(folder, "log").read_text()}')
+@contextmanager
+def server(folder: Path, *make: str) -> Iterator[Server]:
+    """Run a command of the Makefile that starts JupyterLab, on a copy of the notebooks."""
+    shutil.copytree(ROOT / 'notebooks', folder / 'notebooks', dirs_exist_ok=True)
+    exposed = 'LAB_ARGS=--LabApp.expose_app_in_browser=True'
+    with made(folder, r'(http://localhost:\d+/)\S+token=(\w+)\n', *make, exposed) as (_, found):
+        yield Server(found[0].strip(), *found.groups(), folder)

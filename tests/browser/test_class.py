@@ -1,14 +1,11 @@
 """A class of three pages of JupyterLab, the instructor's page, and the slides with the guesses."""
 
-import os
 import re
-import signal
-import subprocess
-from contextlib import contextmanager
 
 import nbformat
-import pytest
-from lab_server import ROOT, server
+from lab_server import ROOT, made, server
+from support.classes import student
+from support.processes import run_python
 
 LESSON = '02_lose_messages.ipynb'
 NAMES = {'ada': 41, 'bob': 14, 'cyd': 14}
@@ -16,35 +13,8 @@ CELLS = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4).cells
 [GUESS] = [i for i, cell in enumerate(CELLS) if 'my_guess = guess(' in cell.source]
 [COMPARED] = [i for i, cell in enumerate(CELLS) if 'my_guess, ' in cell.source]
 QUESTION = re.search(r"guess\('(.*)', ", CELLS[GUESS].source)[1]
-STARTED = re.compile(r"(join_class\('.*', '.*'\))[\s\S]*?(http://localhost:\d+/\w+/)[\s\S]*Ctrl\+C")
-
-
-@contextmanager
-def held_class(folder):
-    """Run `make class`; yield its process, the line for the wall and the address of the page."""
-    command = ['make', 'class', 'PORT=0', 'BROWSER=no', f'ROOT={folder}']
-    command += [f'JUPYTER_CONFIG_DIR={folder / "JUPYTER_CONFIG_DIR"}']
-    process = subprocess.Popen(
-        ['setpriv', '--pdeathsig', 'INT', *command],
-        cwd=ROOT,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    said = ''
-    for line in process.stdout:
-        said += line
-        if found := STARTED.search(said):
-            break
-    else:
-        pytest.fail(said)
-    try:
-        yield process, *found.groups()
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGINT)
-        process.wait(60)
+# The line for the wall, and the address of the page.
+STARTED = r"(join_class\('.*', '.*'\))[\s\S]*?(http://localhost:\d+/\w+/)[\s\S]*Ctrl\+C"
 
 
 def write_lesson_of(folder, name, join):
@@ -67,7 +37,8 @@ def write_lesson_of(folder, name, join):
 
 def test_from_join_to_forget_everything(lab_page, tabs, student_server, artefacts):
     folder = student_server.folder
-    with held_class(folder) as (process, join, address):
+    with made(folder, STARTED, 'class') as (process, started):
+        join, address = started.groups()
         page = tabs.new_page()
         asked = []
         page.on('request', lambda request: asked.append(request.url))
@@ -120,25 +91,21 @@ def test_from_join_to_forget_everything(lab_page, tabs, student_server, artefact
 def test_a_slide_with_a_guess_shows_how_many_have_answered_and_the_bars(
     lab_page, tmp_path, artefacts
 ):
-    with server(tmp_path, 'present', 'LESSON=02') as running, held_class(tmp_path) as (_, join, _):
-        address, code = re.search(r"'(.*)', '(.*)'", join).groups()
+    with (
+        server(tmp_path, 'present', 'LESSON=02') as running,
+        made(tmp_path, STARTED, 'class') as (_, started),
+    ):
         tell = f"""
-import os, time
+import time
 from helpers.classroom import *
-join_class({address!r}, {code!r})
+{started[1]}
 guess({QUESTION!r}, 14)
 time.sleep(2)
 """
-        student = {
-            'ROS2_NOTEBOOKS_PROGRESS': str(tmp_path / 'progress.txt'),
-            'JPY_SESSION_NAME': LESSON,
-        }
-        python = ROOT / '.venv/bin/python'
-        subprocess.run([python, '-c', tell], env=os.environ | student, check=True, cwd=ROOT)
+        run_python(tell, **student(tmp_path / 'ada', LESSON))
         with lab_page(running, 'class_deck') as deck:
             deck.present(LESSON)
-            while deck.active() < GUESS:
-                deck.press('Space')
+            deck.walk_to(GUESS)
             frame = deck.page.frame_locator('#deck-guesses')
             frame.get_by_text('1 of 1 have answered').wait_for()
             deck.screenshot('class_deck_hidden')
@@ -151,7 +118,6 @@ time.sleep(2)
             deck.screenshot('class_deck_shown')
             assert deck.press('Space') > GUESS
             assert deck.page.locator('#deck-guesses').count() == 0
-            while deck.active() < COMPARED:
-                deck.press('Space')
+            deck.walk_to(COMPARED)
             frame.locator('.bars').wait_for()
             deck.screenshot('class_deck_compared')

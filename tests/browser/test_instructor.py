@@ -70,16 +70,12 @@ def test_every_slide_is_reached_and_nothing_is_cut_off(deck, path):
 def test_run_and_change_a_cell_in_a_slide(deck):
     deck.present('00_start_here.ipynb')
     deck.command('notebook:clear-all-cell-outputs')
-    starter, check = deck.find('exercise', 'robots'), deck.find('check', 'robots')
-    while deck.active() < starter:
-        deck.press('Space')
-    deck.page.keyboard.press('Enter')
-    deck.page.keyboard.press('Control+A')
-    deck.page.keyboard.insert_text('robots = 2')
+    starter, check = (deck.find('robots', tag) for tag in ('exercise', 'check'))
+    deck.walk_to(starter)
+    deck.write('robots = 2')
     deck.page.keyboard.press('Control+Enter')
     deck.wait_until_ran(starter)
-    while deck.active() < check:
-        deck.press('Space')
+    deck.walk_to(check)
     deck.page.keyboard.press('Control+Enter')
     deck.wait_until_ran(check)
     assert complaints(deck.cells()[check]) == []

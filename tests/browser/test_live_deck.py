@@ -69,8 +69,7 @@ def walk_to_code(deck):
         for i, cell in enumerate(cells)
         if cell['cell_type'] == 'code' and cell['metadata']['slideshow'] == slide
     )
-    while deck.active() < code:
-        deck.press('Space')
+    deck.walk_to(code)
     return code
 
 
@@ -138,9 +137,7 @@ def test_letters_are_large_and_the_end_of_an_output_is_seen(deck):
     assert deck.page.evaluate(LAST_LINE) == [True, True, True]
     assert deck.page.evaluate(SCROLLED)
     deck.screenshot('traceback')
-    deck.page.keyboard.press('Enter')
-    deck.page.keyboard.press('Control+A')
-    deck.page.keyboard.insert_text(PRINTS)
+    deck.write(PRINTS)
     for scrolls in (True, False):
         deck.page.keyboard.press('Control+Enter')
         deck.page.wait_for_function(SCROLLED)
@@ -151,9 +148,7 @@ def test_letters_are_large_and_the_end_of_an_output_is_seen(deck):
         deck.wait_until_ran(code)
         assert deck.page.evaluate(SCROLLED) != scrolls
         assert deck.page.evaluate(END_IN_SIGHT) != scrolls
-    deck.page.keyboard.press('Enter')
-    deck.page.keyboard.press('Control+A')
-    deck.page.keyboard.insert_text('print(1)')
+    deck.write('print(1)')
     deck.page.keyboard.press('Control+Enter')
     deck.wait_until_ran(code)
     assert not deck.page.evaluate(SCROLLED)
@@ -223,9 +218,7 @@ def test_from_the_first_slide_all_come_again(deck):
 def test_a_clicker_steps_through_a_replay(deck):
     deck.present(LESSON)
     code = walk_to_code(deck)
-    deck.page.keyboard.press('Enter')
-    deck.page.keyboard.press('Control+A')
-    deck.page.keyboard.insert_text(REPLAY)
+    deck.write(REPLAY)
     deck.page.keyboard.press('Control+Enter')
     deck.wait_until_ran(code)
     says = deck.page.locator('.jp-deck-mod-onscreen .replay-on [aria-live]')

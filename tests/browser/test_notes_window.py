@@ -2,14 +2,12 @@
 
 import json
 import re
-import urllib.error
-import urllib.request
-from pathlib import Path
 
 import nbformat
 import psutil
 import pytest
 from lab_server import ROOT, server
+from playwright.sync_api import Error
 
 from tools.lessons.present import DECK
 
@@ -22,15 +20,8 @@ SHOWS = """([slide, notes]) => document.querySelector('#slide').textContent === 
 
 
 def addresses(running):
-    printed = Path(running.folder, 'log').read_text().partition('Your notes:\n')[2]
+    printed = (running.folder / 'present.log').read_text().partition('Your notes:\n')[2]
     return re.findall(r'^ +(http://\S+:\d+/\w+/)$', printed, re.MULTILINE)
-
-
-def status(address):
-    try:
-        return urllib.request.urlopen(address).status
-    except urllib.error.HTTPError as error:
-        return error.code
 
 
 def began_at(running):
@@ -102,7 +93,7 @@ def test_both_windows_may_be_reloaded(deck, window):
     deck.wait_for_slide(0)
     wait_for_place(window, 0)
     assert began_at(deck.server) is None
-    assert '/state' not in Path(deck.server.folder, 'log').read_text()
+    assert '/state' not in (deck.server.folder / 'present.log').read_text()
 
 
 def test_a_tablet_needs_the_secret_and_reaches_the_notes_only(chromium, tmp_path):
@@ -113,15 +104,13 @@ def test_a_tablet_needs_the_secret_and_reaches_the_notes_only(chromium, tmp_path
             pytest.skip('This machine is in no network.')
         page = tablet.new_page()
         page.goto(others[0])
-        page.wait_for_function(
-            "() => document.querySelector('#trouble').innerText.includes('Wait')"
-        )
+        page.locator('#trouble', has_text='Wait').wait_for()
         own, secret = others[0].rstrip('/').rsplit('/', 1)
         refused = [own, f'{own}/{secret[:-1]}/', f'{own}/x/state', f'{others[0]}lab', f'{own}/lab']
-        assert [status(address) for address in refused] == [404] * 5
+        assert [page.request.get(address).status for address in refused] == [404] * 5
         lab = own.rpartition(':')[0] + ':' + running.url.split(':')[2]
-        with pytest.raises(urllib.error.URLError, match='refused'):
-            urllib.request.urlopen(lab)
+        with pytest.raises(Error, match='ECONNREFUSED'):
+            page.request.get(lab)
 
 
 def test_without_a_tablet_nobody_else_reaches_the_notes(deck):

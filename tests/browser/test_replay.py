@@ -79,11 +79,11 @@ def exported(file_page, tmp_path):
     # The page asks for its mathematics and its own loader in vain; replays ask for nothing.
     with file_page(1280, 720, expected=('require', 'MathJax')) as page:
 
-        def open_page(*shown, query=''):
+        def open_page(*shown):
             html, _ = HTMLExporter().from_notebook_node(notebook(*shown))
             file = tmp_path / 'exported.html'
             file.write_text(html)
-            page.goto(file.as_uri() + query, wait_until='domcontentloaded')
+            page.goto(file.as_uri(), wait_until='domcontentloaded')
             page.wait_for_selector('.replay-on')
             return page
 

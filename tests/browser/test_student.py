@@ -22,8 +22,7 @@ def test_run_all_and_move_a_slider(lab):
         assert all(image.get_attribute('alt') for image in images)
         shown = [o for o in cell.get('outputs', []) if '<img ' in str(o.get('data', {}))]
         assert len(images) >= len(shown)
-    slider = next(i for i, c in enumerate(cells) if 'interactive_output' in ''.join(c['source']))
-    cell = lab.show(slider)
+    cell = lab.show(lab.find('interactive_output'))
     picture = cell.query_selector('.jp-RenderedHTML img')
     before = picture.get_attribute('src')
     lab.screenshot('slider_before')
@@ -40,8 +39,7 @@ def test_run_all_and_move_a_slider(lab):
 
 def test_interrupt_an_experiment_and_run_it_again(lab):
     lab.open('02_lose_messages.ipynb')
-    sources = [''.join(cell['source']) for cell in lab.cells()]
-    experiment = next(i for i, source in enumerate(sources) if source.startswith('def run('))
+    experiment = lab.find('def run(')
     for index in range(experiment):
         if lab.cells()[index]['cell_type'] == 'code':
             lab.run(index)

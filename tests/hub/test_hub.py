@@ -5,7 +5,6 @@ to the kernels over their websockets.
 """
 
 import asyncio
-import contextlib
 import os
 import socket
 import subprocess
@@ -15,8 +14,6 @@ import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import domain_coordinator
-import domain_coordinator.impl
 import pytest
 from nbformat import NotebookNode
 from support.hubs import (
@@ -38,7 +35,6 @@ from support.hubs import (
 from support.processes import segments
 
 STUDENTS = [f'student{number:02}' for number in range(1, 13)]
-LATE = 'student101'
 # The accounts are folders, and all run as whoever runs this test.
 CONFIG = """
 c.JupyterHub.spawner_class = 'simple'
@@ -66,7 +62,6 @@ class ClassHour:
     kernels_left: list[dict] = field(default_factory=list)
     segments: set[str] = field(default_factory=set)
     segments_left: set[str] = field(default_factory=set)
-    late: list[str] = field(default_factory=list)
     told: list[list[str]] = field(default_factory=list)
     refused: list[int] = field(default_factory=list)
     processes_left: list[str] = field(default_factory=list)
@@ -87,7 +82,6 @@ if _d['started_s'].isna().any() and most_at_once(_d) >= CALLBACK_S / PERIOD_S:
     print(f"waited {(_d['started_s'] - _d['published_s']).max():.2f} s")
 """
 DOMAIN = 'import helpers.domain; print(helpers.domain.reserve_domain_id())'
-SESSION = 'from helpers.session import ros_session; _session = ros_session().__enter__()'
 # Somebody in the domain of a student, as no session does it.
 GUEST = """
 import os, sys, time, rclpy
@@ -117,35 +111,6 @@ async def everybody_talks(students: list[Student], hour: ClassHour) -> None:
     finally:
         guest.terminate()
         guest.wait(END_S)
-
-
-@contextlib.contextmanager
-def all_domains_taken(first_port: int):
-    """Reserve all 100 ids as 100 kernels would, in another range of ports than the class."""
-    with pytest.MonkeyPatch.context() as patch, contextlib.ExitStack() as stack:
-        patch.setattr(domain_coordinator.impl, 'PORT_BASE', first_port)
-        with pytest.raises(RuntimeError):
-            while True:
-                stack.enter_context(domain_coordinator.domain_id())
-        yield stack
-
-
-async def one_too_many(hub: Hub) -> list[str]:
-    """Somebody comes when all ids are taken, and tries again when a kernel has ended."""
-    student = Student(hub, LATE)
-    await student.log_in()
-    kernel = await student.open(LESSONS[0])
-    first_port = 22000
-    await kernel.text(f'import domain_coordinator.impl as i; i.PORT_BASE = {first_port}')
-    said = []
-    with all_domains_taken(first_port) as taken:
-        for _ in range(2):
-            outputs = await kernel.run(SESSION)
-            said += [output.get('evalue', 'no error') for output in outputs] or ['open']
-            taken.close()
-    await kernel.text('_session.__exit__(None, None, None)')
-    await student.log_out()
-    return said
 
 
 async def teach(hub: Hub) -> ClassHour:
@@ -182,7 +147,6 @@ async def teach(hub: Hub) -> ClassHour:
             await kernel.end()
         hour.kernels_left += await student.ask('api/kernels')
     await asyncio.gather(*(student.log_out() for student in students))
-    hour.late = await one_too_many(hub)
     limit = time.monotonic() + END_S
     while (left := hub.processes()) and time.monotonic() < limit:
         await asyncio.sleep(0.2)
@@ -268,14 +232,6 @@ def test_costs(hour):
         f'{processor[0]:.1f} to {processor[-1]:.1f} s of a core'
     )
     assert 30 * memory[-1] < 24e3, 'thirty students need more than 24 GB'
-
-
-def test_the_student_after_the_hundredth(hour):
-    assert hour.late == [
-        'All 100 ROS domain ids of this machine are in use: '
-        'shut down the kernels that you no longer need, then run this cell again.',
-        'open',
-    ]
 
 
 def test_a_port_in_use(tmp_path):

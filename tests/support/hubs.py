@@ -14,14 +14,16 @@ import socket
 import subprocess
 import sys
 import time
-import uuid
 from dataclasses import dataclass, field
 from pathlib import Path
-from queue import Empty
 
 import nbformat
 import psutil
+from jupyter_client.jsonutil import json_default
+from jupyter_client.session import Session
+from nbclient import NotebookClient
 from nbformat import NotebookNode
+from nbformat.v4 import new_code_cell, new_notebook
 from nbval.plugin import IPyNbFile, NbCellError
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
 from tornado.websocket import websocket_connect
@@ -198,7 +200,7 @@ class Kernel:
 
     def __init__(self, student: 'Student', id_: str) -> None:
         self.student, self.id = student, id_
-        self._session = uuid.uuid4().hex
+        self._session = Session(username=student.name)
         self._messages = asyncio.Queue()
 
     async def connect(self) -> None:
@@ -215,62 +217,32 @@ class Kernel:
             max_message_size=2**26,
         )
 
-    async def run(self, source: str, limit_s: float = CELL_S) -> list[NotebookNode]:
+    async def run(self, source: str) -> list[NotebookNode]:
         """Run a cell as JupyterLab does. Return its outputs as JupyterLab shows them.
 
         Raises KernelEndedError.
         """
-        id_ = uuid.uuid4().hex
-        content = {
-            'code': source,
-            'silent': False,
-            'store_history': True,
-            'user_expressions': {},
-            'allow_stdin': True,
-            'stop_on_error': True,
-        }
-        header = {
-            'msg_id': id_,
-            'msg_type': 'execute_request',
-            'session': self._session,
-            'username': self.student.name,
-            'version': '5.4',
-            'date': '',
-        }
-        message = {
-            'channel': 'shell',
-            'header': header,
-            'parent_header': {},
-            'metadata': {},
-            'content': content,
-        }
-        await self._socket.write_message(json.dumps(message))
-        outputs, clear, waited_for = [], False, {'idle', 'execute_reply'}
-        displays: dict[str, NotebookNode] = {}
-        async with asyncio.timeout(limit_s):
+        request = self._session.msg('execute_request', {'code': source, 'allow_stdin': True})
+        message = json.dumps(request | {'channel': 'shell'}, default=json_default)
+        await self._socket.write_message(message)
+        cell = new_code_cell(source)
+        shown = NotebookClient(new_notebook(cells=[cell]), record_timing=False)
+        shown.clear_before_next_output = False
+        waited_for = {'idle', 'execute_reply'}
+        async with asyncio.timeout(CELL_S):
             while waited_for:
                 message = json.loads(await self._messages.get())
-                if message['content'].get('execution_state') in ('restarting', 'dead'):
+                state = message['content'].get('execution_state')
+                if state in ('restarting', 'dead'):
                     raise KernelEndedError
-                if message['parent_header'].get('msg_id') != id_:
+                if message['parent_header'].get('msg_id') != request['msg_id']:
                     continue
-                kind, content = message['msg_type'], message['content']
-                if kind == 'execute_reply':
-                    waited_for.discard(kind)
-                elif kind == 'status':
-                    waited_for.discard(content['execution_state'])
-                elif kind == 'clear_output':
-                    outputs, clear = [] if not content['wait'] else outputs, content['wait']
-                elif kind in ('stream', 'display_data', 'execute_result', 'error'):
-                    outputs = [] if clear else outputs
-                    clear = False
-                    display = content.pop('transient', {}).get('display_id')
-                    outputs.append(nbformat.from_dict({'output_type': kind} | content))
-                    displays[display] = outputs[-1]
-                elif kind == 'update_display_data':
-                    displays[content['transient']['display_id']].data = content['data']
+                if message['msg_type'] in ('status', 'execute_reply'):
+                    waited_for -= {message['msg_type'], state}
+                else:
+                    shown.process_message(message, cell, 0)
         # A progress bar is empty at its end.
-        return [output for output in outputs if output.get('data') != {'text/html': ''}]
+        return [output for output in cell.outputs if output.get('data') != {'text/html': ''}]
 
     async def text(self, source: str) -> str:
         """Run a cell that must not fail, and return what it printed."""
@@ -428,14 +400,11 @@ class Replay:
     def await_idle(self, id_: str, timeout: float) -> None: ...
 
     def get_message(self, stream: str, timeout: float) -> dict:
-        output = next(self._messages, None)
-        if output is None:
-            raise Empty
-        content = {'metadata': {}, 'execution_count': None} | output
+        output = next(self._messages)
         return {
-            'msg_type': content.pop('output_type'),
+            'msg_type': output.output_type,
             'parent_header': {'msg_id': 'cell'},
-            'content': content,
+            'content': output,
         }
 
 

@@ -70,20 +70,17 @@ def test_another_failure_speaks_for_itself(run):
     assert (done.returncode, done.stdout, done.stderr) == (125, 'no such base\n', '')
 
 
-def test_no_image(run):
-    done = run('lab', 'image) exit 125 ;;')
-    assert (done.returncode, done.stderr) == (
-        1,
-        'There is no image yet: run `make image`, then try again.\n',
-    )
-
-
-def test_an_old_image(run):
-    done = run('lab', 'image) echo 123-456 ;;')
-    assert (done.returncode, done.stderr) == (
-        1,
-        'The image is not of these lessons: run `make image`, then try again.\n',
-    )
+@pytest.mark.parametrize(
+    ('answer', 'problem'),
+    [
+        ('exit 125', 'There is no image yet'),
+        ('echo 123-456', 'The image is not of these lessons'),
+    ],
+)
+def test_no_image_of_these_lessons(run, answer, problem):
+    done = run('lab', f'image) {answer} ;;')
+    said = f'{problem}: run `make image`, then try again.\n'
+    assert (done.returncode, done.stderr) == (1, said)
 
 
 def label(run):
@@ -94,7 +91,7 @@ def label(run):
 
 
 @pytest.mark.parametrize('words', PORT)
-def test_a_port_in_use(run, tmp_path, words):
+def test_a_port_in_use(run, words):
     own = label(run)
     done = run('lab', f'image) echo {own} ;; run) echo "{words}" >&2; exit 126 ;;', PORT='8931')
     assert done.returncode == 126

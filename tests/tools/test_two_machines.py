@@ -29,12 +29,12 @@ import os, sys, threading
 def end_with_input():
     sys.stdin.read()
     os._exit(1)
+threading.Thread(target=end_with_input, daemon=True).start()
 """
 
 TALKER = f"""{END}
 import time, rclpy
 from std_msgs.msg import String
-threading.Thread(target=end_with_input, daemon=True).start()
 rclpy.init()
 publisher = rclpy.create_node('talker').create_publisher(String, 'topic', 10)
 while True:
@@ -49,7 +49,6 @@ from helpers.session import ros_session
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
-threading.Thread(target=end_with_input, daemon=True).start()
 domain, discovery, wanted = int(sys.argv[1]), sys.argv[2], sys.argv[3]
 heard = set()
 with ros_session(domain, discovery) as session:
