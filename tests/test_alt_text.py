@@ -88,5 +88,5 @@ def test_losses_and_overlaps_in_words():
     assert 'Some callbacks overlap.' in said(plots.timeline, run(overlap=True))
     assert 'No two callbacks overlap.' in said(plots.timeline, run(lost=range(12)))
     groups = {'fast': run(), 'slow': run(overlap=True)}
-    assert 'The colours are: fast; slow. Some' in said(plots.timeline, groups)
+    assert 'The colours stand for: fast; slow. Some' in said(plots.timeline, groups)
     assert 'None is pushed out.' in said(plots.queue_length, run(), 3)

@@ -218,7 +218,7 @@ def timeline(
     ax.set_xlim(span_s or (0, 1.02 * last_s if math.isfinite(last_s) else 1))
     handles = [Patch(**look) for look in looks.values()] if isinstance(table, Mapping) else None
     label_axes(ax, title, time_label, 'thread', handles, grid='x')
-    named = f' The colours are: {in_words(groups)}.' if handles else ''
+    named = f' The colours stand for: {in_words(groups)}.' if handles else ''
     describe(
         ax,
         'One lane for each thread that ran a callback, one bar for each callback, with its '
