@@ -14,6 +14,7 @@ from pathlib import Path
 import psutil
 import pytest
 from ament_index_python import get_package_share_directory
+from support.nodes import Listener, spin
 from support.packages import (
     HOSTILE,
     SETUP_PY,
@@ -364,18 +365,10 @@ def test_without_a_build_one_sentence(other):
 
 @pytest.mark.parametrize('shared_id', [None, 101])
 def test_a_running_node_is_heard_by_this_kernel_and_ends(built, shared_id):
-    from rclpy.executors import SingleThreadedExecutor
-    from rclpy.node import Node
-    from std_msgs.msg import String
-
-    heard = []
     with ros_session(shared_id) as session, built.run('talker_pkg', 'talker') as talker:
-        node = Node('listener')
-        node.create_subscription(String, 'topic', heard.append, 10)
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        session.spin(executor)
-        session.wait_until(lambda: len(heard) > 2)
+        listener = Listener()
+        spin(session, listener)
+        session.wait_until(lambda: len(listener.heard) > 2)
         assert talker.wait_for('Publishing: 2') == '[INFO] [talker]: Publishing: 2'
         assert talker.running
         (process,) = processes_of(built.path)
