@@ -183,11 +183,10 @@ def test_more_threads_than_were_said():
 
 def test_a_call_from_outside_is_a_request_that_comes():
     with ros_session() as session:
-        node = Node('node')
-        client = node.create_client(Trigger, 'look')
-        service = node.create_service(Trigger, 'look', lambda request, response: response)
-        recording = CallbackRecording(look=service, client=client)
-        spin(session, node)
+        answerer = Answerer()
+        client = answerer.create_client(Trigger, 'look')
+        recording = CallbackRecording(look=answerer.service, client=client)
+        spin(session, answerer)
         client.call(Trigger.Request(), LIMIT_S)
         calls = recording.calls()
         shown = replay_calls(recording)

@@ -22,7 +22,7 @@ from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
-from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
+from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin, wait_for
 from support.processes import run_python, running, traces
 from test_msgs.action import Fibonacci
 
@@ -32,13 +32,6 @@ from helpers.domain import configure_discovery, reserve_domain_id
 from helpers.session import current_session, ros_session
 
 EXECUTORS = pytest.mark.parametrize('threads', [1, 3], ids=['single', 'multi'])
-
-
-def wait_for(predicate):
-    limit = time.monotonic() + LIMIT_S
-    while not predicate():
-        assert time.monotonic() < limit
-        time.sleep(0.01)
 
 
 def destroyed(node):
