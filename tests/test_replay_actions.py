@@ -51,36 +51,31 @@ class Robot(Node):
         return response
 
 
-@pytest.fixture
-def cancel():
-    """Return a function that cancels a job, waits, and lets it end. It returns what was found."""
+def cancel(threads, charges, own_group):
+    """Cancel a job, then let it end. Return its replay, whether it was heard, and accepted."""
+    with ros_session() as session:
+        robot, operator = Robot(own_group), Node('operator')
+        recording = ActionRecording(robot.server, robot.execute, charge=robot.charger)
+        executor, own = spin(session, robot, threads=threads), spin(session, operator)
+        client = ActionClient(operator, Fibonacci, 'job')
+        charger = operator.create_client(Trigger, 'charge')
 
-    def run(threads, charges=False, own_group=False):
-        with ros_session() as session:
-            robot, operator = Robot(own_group), Node('operator')
-            recording = ActionRecording(robot.server, robot.execute, charge=robot.charger)
-            executor, own = spin(session, robot, threads=threads), spin(session, operator)
-            client = ActionClient(operator, Fibonacci, 'job')
-            charger = operator.create_client(Trigger, 'charge')
-
-            ask = functools.partial(call_in_executor, session, own)
-            session.wait_until(client.server_is_ready, LIMIT_S)
-            goal = ask(client.send_goal_async, Fibonacci.Goal())
-            session.wait_until(lambda: goal.done() and robot.begun.is_set(), LIMIT_S)
-            if charges:
-                session.wait_until(charger.service_is_ready, LIMIT_S)
-                ask(charger.call_async, Trigger.Request())
-                session.wait_until(lambda: recording.runs['charge'], LIMIT_S)
-            cancelled_s = time.monotonic()
-            answer = ask(goal.result().cancel_goal_async)
-            session.wait_until_quiet(executor)
-            heard = answer.done()
-            robot.gate.set()
-            session.wait_until(lambda: robot.ended.is_set() and answer.done(), LIMIT_S)
-        accepted = len(answer.result().goals_canceling) == 1
-        return replay_action(recording, threads, cancelled_s), heard, accepted
-
-    return run
+        ask = functools.partial(call_in_executor, session, own)
+        session.wait_until(client.server_is_ready, LIMIT_S)
+        goal = ask(client.send_goal_async, Fibonacci.Goal())
+        session.wait_until(lambda: goal.done() and robot.begun.is_set(), LIMIT_S)
+        if charges:
+            session.wait_until(charger.service_is_ready, LIMIT_S)
+            ask(charger.call_async, Trigger.Request())
+            session.wait_until(lambda: recording.runs['charge'], LIMIT_S)
+        cancelled_s = time.monotonic()
+        answer = ask(goal.result().cancel_goal_async)
+        session.wait_until_quiet(executor)
+        heard = answer.done()
+        robot.gate.set()
+        session.wait_until(lambda: robot.ended.is_set() and answer.done(), LIMIT_S)
+    accepted = len(answer.result().goals_canceling) == 1
+    return replay_action(recording, threads, cancelled_s), heard, accepted
 
 
 @pytest.mark.parametrize(
@@ -93,7 +88,7 @@ def cancel():
         (3, True, True, ''),
     ],
 )
-def test_a_cancel_waits_for_what_rclpy_lets_it_wait(cancel, threads, charges, own_group, cause):
+def test_a_cancel_waits_for_what_rclpy_lets_it_wait(threads, charges, own_group, cause):
     shown, heard, accepted = cancel(threads, charges, own_group)
     steps = Script().call('steps', shown.runs[0].record())
     said = [step['says'] for step in steps]
