@@ -48,6 +48,7 @@ def said(draw, *arguments):
 
 
 def test_title_description_and_axes_of_a_figure():
+    assert alt_text(plt.figure()) == 'A figure without a title.'
     figure, ax = plt.subplots()
     ax.set(title='A drive', xlabel='x (m)', ylabel='y (m)')
     assert alt_text(figure) == 'A drive. Horizontal axis: x (m). Vertical axis: y (m).'
@@ -65,13 +66,6 @@ def test_each_of_several_axes_has_its_turn():
     assert alt_text(figure) == 'Two runs. Picture 1 of 2. A line. Picture 2 of 2. Which one?'
 
 
-def test_an_axes_that_is_gone_leaves_nothing_behind():
-    figure, ax = plt.subplots()
-    describe(ax, 'A line.')
-    plt.close(figure)
-    assert alt_text(plt.figure()) == 'A figure without a title.'
-
-
 @each_plot
 def test_the_result_of_a_run_is_said_and_not_what_moves_from_run_to_run(draw):
     text = said(draw, run(lost=[4, 5, 6]))
@@ -79,14 +73,7 @@ def test_the_result_of_a_run_is_said_and_not_what_moves_from_run_to_run(draw):
     assert said(draw, run(overlap=True)) != text
 
 
-def test_losses_and_overlaps_in_words():
-    assert 'None was lost.' in said(plots.sequence_gaps, run())
-    assert 'Some were lost: crosses.' in said(plots.sequence_gaps, run(lost=[3]))
-    assert '3 numbers later' in said(plots.sequence_gaps, run(lost=[3]), None, 3)
+def test_what_no_lesson_shows_in_words():
     assert 'None was heard: crosses.' in said(plots.sequence_gaps, run(lost=range(12)))
-    assert 'No two callbacks overlap.' in said(plots.timeline, run())
-    assert 'Some callbacks overlap.' in said(plots.timeline, run(overlap=True))
     assert 'No two callbacks overlap.' in said(plots.timeline, run(lost=range(12)))
-    groups = {'fast': run(), 'slow': run(overlap=True)}
-    assert 'The colours stand for: fast; slow. Some' in said(plots.timeline, groups)
     assert 'None is pushed out.' in said(plots.queue_length, run(), 3)

@@ -101,12 +101,6 @@ def tried(capsys, title, first=True, second=True):
     return capsys.readouterr().out
 
 
-def test_all_right(capsys, title):
-    lines = '[ok] the group is Reentrant\n[ok] no message is lost\n'
-    assert tried(capsys, title) == f'{lines}{title}: 2 of 2. All done.\n'
-    assert tried(capsys, 'Solution of exercise 1') == f'{lines}Solution of exercise 1: 2 of 2.\n'
-
-
 def test_hints_appear_at_the_second_wrong_try_of_this_exercise(capsys, title):
     assert tried(capsys, title, second=False) == (
         f'[ok] the group is Reentrant\n[not yet] no message is lost\n{title}: 1 of 2.\n'

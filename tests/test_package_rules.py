@@ -73,12 +73,6 @@ def edited(file, old, new=''):
     return {file: FILES[file].replace(old, new)}
 
 
-def test_the_good_package_lacks_nothing(package):
-    findings = check_package(package())
-    assert findings == ()
-    assert repr(findings) == '[ok] Nothing is missing.'
-
-
 # What is taken out, what check_package then asks for, and what Jazzy answered, or did.
 WITHOUT = [
     (
@@ -202,13 +196,6 @@ def test_a_file_that_is_not_listed(package):
     assert finding.error.startswith('it builds, but without this interface')
 
 
-def test_a_find_package_that_comes_too_late(package):
-    line = 'find_package(sensor_msgs REQUIRED)'
-    text = CMAKE.replace(line, '').replace('ament_package()', f'{line}\nament_package()')
-    (finding,) = check_package(package({'CMakeLists.txt': text}))
-    assert finding.missing == f'{line}, before rosidl_generate_interfaces()'
-
-
 def test_a_package_that_is_used_and_nowhere_named(package):
     files = {
         'action/Turn.action': 'nav_msgs/Path path\n---\n---\ngeometry_msgs/Point[<=2] corners\n'
@@ -241,12 +228,6 @@ def test_needed_to_build_and_to_use(package):
     files = edited('package.xml', '<depend>sensor_msgs</depend>', build)
     [finding] = check_package(package(files))
     assert finding.missing == '<depend>sensor_msgs</depend>'
-
-
-def test_a_message_of_the_package_itself(package):
-    files = edited('CMakeLists.txt', '"srv', 'msg/Goal.msg "srv')
-    files |= {'msg/Goal.msg': 'int8 x\n', 'srv/TurnCamera.srv': f'Goal goal\n{SRV}'}
-    assert check_package(package(files)) == ()
 
 
 @pytest.mark.parametrize('name', sorted({name.split('/')[0] for name in installed_names()}))

@@ -76,10 +76,6 @@ def bars_of(ax):
     }
 
 
-def arrows_of(ax):
-    return [text.arrow_patch for text in ax.texts if getattr(text, 'arrow_patch', None)]
-
-
 def overlap(texts):
     boxes = [text.get_window_extent() for text in texts]
     return any(a.count_overlaps([b]) for a, b in combinations(boxes, 2))
@@ -423,7 +419,7 @@ def test_topic_graph_has_boxes_and_arrows():
         'listener\nBEST_EFFORT, depth 5',
         'talker\nRELIABLE, depth 10',
     ]
-    assert len(arrows_of(ax)) == 2
+    assert len([text for text in ax.texts if getattr(text, 'arrow_patch', None)]) == 2
 
 
 def test_interface_tree():

@@ -18,8 +18,6 @@ from helpers.queue_model import REST, explain, predict
 from helpers.recording import COLUMNS, Recording, check_table
 from helpers.session import ros_session
 
-TUTORIAL = [0, 1, 2, 3, *range(7, 32, 4), *range(32, 41)]
-
 
 def tries(number):
     """This many examples in `make test`, and as much more as a profile asks for."""
@@ -27,18 +25,6 @@ def tries(number):
 
 
 # predict
-
-
-def test_the_tutorial():
-    table = predict(0.5, 2.0, depth=10, threads=1, messages=41)
-    pd.testing.assert_frame_equal(check_table(table), table)
-    assert list(table.columns) == COLUMNS
-    assert table['seq'].tolist() == list(range(41))
-    assert heard(table) == TUTORIAL
-    assert table['published_s'].tolist() == pytest.approx([i * 0.5 for i in range(41)])
-    threads = [table['thread'][seq] for seq in range(41)]
-    assert threads == ['thread 1' if seq in TUTORIAL else None for seq in range(41)]
-    assert table.attrs == {'period_s': 0.5, 'callback_s': 2.0, 'depth': 10}
 
 
 def slow_prediction(period, callback, depth, threads, messages):
@@ -84,13 +70,20 @@ def test_predict_is_what_a_queue_does(run):
     period, callback, depth, threads, messages = run
     table = predict(period / 1000, callback / 1000, depth, threads, messages)
     expected = slow_prediction(period, callback, depth, threads, messages)
+    pd.testing.assert_frame_equal(check_table(table), table)
+    assert list(table.columns) == COLUMNS
+    assert table['seq'].tolist() == list(range(messages))
     assert heard(table) == list(expected)
     # To the nanosecond, in milliseconds.
-    started, finished = (
-        table[name].dropna().mul(1000).round(6) for name in ('started_s', 'finished_s')
+    published, started, finished = (
+        table[name].dropna().mul(1000).round(6).tolist() for name in COLUMNS[1:4]
     )
-    assert started.tolist() == list(expected.values())
-    assert finished.tolist() == [start + callback for start in expected.values()]
+    assert published == [number * period for number in range(messages)]
+    assert started == list(expected.values())
+    assert finished == [start + callback for start in expected.values()]
+    assert [name is None for name in table['thread']] == table['started_s'].isna().tolist()
+    assert set(table['thread'].dropna()) <= {f'thread {n}' for n in range(1, threads + 1)}
+    assert table.attrs == {'period_s': period / 1000, 'callback_s': callback / 1000, 'depth': depth}
     # No worker does two things at a time.
     for _, work in table.dropna().groupby('thread'):
         assert (work['started_s'].iloc[1:].values >= work['finished_s'].iloc[:-1].values).all()

@@ -16,28 +16,10 @@ from helpers.recording import CallbackRecording
 from helpers.replay.calls import replay_calls
 from helpers.session import ros_session
 
-GLUE = """
-// Of each step of a record what a page shows.
-function steps(record) {
-  const { setup } = record;
-  const run = walk(record);
-  return run.times.map((_, step) => {
-    const { state, says } = run.seek(step + 1);
-    return {
-      says,
-      threads: state.runs.map(it => it && setup.callbacks[it.callback].name),
-      held: setup.groups.map((_, group) => Boolean(model.holderOf(setup, state, group))),
-      queues: state.queues.map(queue => queue.length),
-      circle: circleOf(setup, state).map(({ says: why }) => why),
-    };
-  });
-}
-"""
-
 
 @pytest.fixture(scope='module')
 def script():
-    return Script(glue=GLUE)
+    return Script()
 
 
 STYLES = {'call': 'call', 'await': 'wait', 'send': 'call_back'}  # methods of Asker
@@ -69,7 +51,7 @@ def test_what_rclpy_did_is_a_walk_and_waits_where_rclpy_waits(script, threads, g
         ]
         steps = script.call('steps', shown.runs[0].record())
         # Nothing else than what was recorded ran, and in no more threads than there are.
-        assert all(len(step['threads']) == threads for step in steps)
+        assert all(len(step['running']) == threads for step in steps)
         stuck = answer is None
         assert bool(steps[-1]['circle']) == stuck
         assert any(steps[-1]['held']) == stuck
@@ -98,8 +80,8 @@ def test_the_circle_closes_when_the_question_is_asked(script):
 def test_await_gives_the_thread_back_and_not_the_group(script):
     shown, *_ = record(1, 1, 'await')
     last = script.call('steps', shown.runs[0].record())[-1]
-    assert last['threads'] == [None]
-    assert last['held'] == [True, False]
+    assert last['running'] == [None]
+    assert last['held'] == ['tick', None]
 
 
 def test_a_chain_of_services_waits_for_a_thread(script):
@@ -201,11 +183,10 @@ def test_more_threads_than_were_said():
 
 def test_a_call_from_outside_is_a_request_that_comes():
     with ros_session() as session:
-        node = Node('node')
-        client = node.create_client(Trigger, 'look')
-        service = node.create_service(Trigger, 'look', lambda request, response: response)
-        recording = CallbackRecording(look=service, client=client)
-        spin(session, node)
+        answerer = Answerer()
+        client = answerer.create_client(Trigger, 'look')
+        recording = CallbackRecording(look=answerer.service, client=client)
+        spin(session, answerer)
         client.call(Trigger.Request(), LIMIT_S)
         calls = recording.calls()
         shown = replay_calls(recording)

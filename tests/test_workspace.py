@@ -8,12 +8,12 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from pathlib import Path
 
 import psutil
 import pytest
 from ament_index_python import get_package_share_directory
+from support.nodes import Listener, spin, wait_for
 from support.packages import (
     HOSTILE,
     SETUP_PY,
@@ -68,13 +68,6 @@ def shell():
 
     yield InteractiveShell.instance()
     InteractiveShell.clear_instance()
-
-
-def wait_until(predicate, timeout_s=60.0) -> bool:
-    end = time.monotonic() + timeout_s
-    while not predicate() and time.monotonic() < end:
-        time.sleep(0.01)
-    return predicate()
 
 
 # --- Build ---------------------------------------------------------------------------------------
@@ -150,7 +143,7 @@ def test_an_interrupted_build_leaves_no_process(other):
     started = other.path / 'build/slow/started'
 
     def interrupt() -> None:
-        wait_until(started.exists)
+        wait_for(started.exists, timeout_s=60)
         signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
 
     thread = threading.Thread(target=interrupt)
@@ -158,8 +151,7 @@ def test_an_interrupted_build_leaves_no_process(other):
     with pytest.raises(KeyboardInterrupt):
         other.build()
     thread.join()
-    assert started.exists()
-    assert wait_until(lambda: processes_of(other.path) == [], timeout_s=2)
+    wait_for(lambda: processes_of(other.path) == [], timeout_s=2)
 
 
 # --- The lines that matter -----------------------------------------------------------------------
@@ -364,18 +356,10 @@ def test_without_a_build_one_sentence(other):
 
 @pytest.mark.parametrize('shared_id', [None, 101])
 def test_a_running_node_is_heard_by_this_kernel_and_ends(built, shared_id):
-    from rclpy.executors import SingleThreadedExecutor
-    from rclpy.node import Node
-    from std_msgs.msg import String
-
-    heard = []
     with ros_session(shared_id) as session, built.run('talker_pkg', 'talker') as talker:
-        node = Node('listener')
-        node.create_subscription(String, 'topic', heard.append, 10)
-        executor = SingleThreadedExecutor()
-        executor.add_node(node)
-        session.spin(executor)
-        session.wait_until(lambda: len(heard) > 2)
+        listener = Listener()
+        spin(session, listener)
+        session.wait_until(lambda: len(listener.heard) > 2)
         assert talker.wait_for('Publishing: 2') == '[INFO] [talker]: Publishing: 2'
         assert talker.running
         (process,) = processes_of(built.path)
@@ -438,7 +422,7 @@ def test_a_process_that_ignores_ctrl_c_is_killed_and_so_is_what_one_leaves(built
     with run_script(built, 'leaving.sh', f'({ignores}) & wait') as leaving:
         leaving.wait_for('up')
     assert leaving.wait() == -signal.SIGINT
-    assert wait_until(lambda: processes_of(built.path) == [], timeout_s=2)
+    wait_for(lambda: processes_of(built.path) == [], timeout_s=2)
 
 
 def test_a_killed_kernel_takes_its_nodes_with_it(built):
@@ -455,7 +439,7 @@ def test_a_killed_kernel_takes_its_nodes_with_it(built):
         assert len(processes_of(path)) == 1
         kernel.kill()
         kernel.wait()
-        assert wait_until(lambda: processes_of(path) == [])
+        wait_for(lambda: processes_of(path) == [], timeout_s=60)
 
 
 def test_an_interrupt_while_a_process_starts_leaves_none(built, shell, monkeypatch):
@@ -568,7 +552,7 @@ def test_two_kernels_do_not_share_a_folder():
     """
     with running(script) as kernel:
         path = Path(kernel.stdout.readline().strip())
-        assert wait_until(lambda: processes_of(path))
+        wait_for(lambda: processes_of(path), timeout_s=60)
         build = processes_of(path)[0]
         kernel.kill()
         kernel.wait()

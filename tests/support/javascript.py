@@ -25,6 +25,25 @@ function states(record) {
   });
 }
 
+// Of each step what a page shows: the sentence, who runs, who waits and why, which groups are held
+// and by whom, and the circle that can never go on.
+function steps(record) {
+  const { setup } = record;
+  const run = walk(record);
+  const named = item => (item ? setup.callbacks[item.callback].name : null);
+  return run.times.map((_, step) => {
+    const { state, says } = run.seek(step + 1);
+    return {
+      says,
+      running: state.runs.map(named),
+      queues: state.queues.map(queue => queue.length),
+      causes: state.queues.map((queue, i) => queue.length && model.cause(setup, state, i)),
+      held: setup.groups.map((_, group) => named(model.holderOf(setup, state, group))),
+      circle: circleOf(setup, state).map(({ says: why }) => why),
+    };
+  });
+}
+
 // The states of some steps, asked for in this order.
 const seek = (record, steps) => {
   const run = walk(record);

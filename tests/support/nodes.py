@@ -2,6 +2,7 @@
 
 import contextlib
 import threading
+import time
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
@@ -116,6 +117,13 @@ class Gate:
 
     def open(self) -> None:
         self._open.set()
+
+
+def wait_for(predicate, timeout_s: float = LIMIT_S) -> None:
+    end = time.monotonic() + timeout_s
+    while not predicate():
+        assert time.monotonic() < end
+        time.sleep(0.01)
 
 
 def spin(session, *nodes, threads: int = 1):
