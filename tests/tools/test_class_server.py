@@ -14,7 +14,7 @@ import urllib.error
 import urllib.request
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.classes import (
     LATER,
@@ -37,8 +37,9 @@ from tools.class_server.web import EVENTS_AT_ONCE, WRONG_A_MINUTE
 from tools.lessons.lesson import lessons
 from tools.lessons.present import DECK
 
-# As much as the machine of the tests has time for. CUT_S=60 is the whole measure.
+# As much as the machine of the tests has time for. CUT_S=60 MESSAGES=2000 is the whole measure.
 CUT_S = float(os.environ.get('CUT_S', '12'))  # longer than a message waits for its answer
+MESSAGES = int(os.environ.get('MESSAGES', '200'))
 
 REAL = [Known(lesson) for lesson in lessons() if lesson.is_lesson]
 
@@ -53,10 +54,10 @@ def store(tmp_path):
     made.close()
 
 
-def refused(url):
+def refused(url, data=None, **headers):
     """Return the status with which an address refuses, and its sentence."""
     with pytest.raises(urllib.error.HTTPError) as answer:
-        urllib.request.urlopen(url)
+        urllib.request.urlopen(urllib.request.Request(url, data, headers))
     return answer.value.code, json.load(answer.value)['error']
 
 
@@ -215,6 +216,19 @@ def test_a_cell_belongs_to_the_step_above_it():
 
 # --- What is refused -----------------------------------------------------------------------------
 
+FIELDS = ['id', 'kind', 'lesson', 'question', 'value', 'exercise', 'solved', 'cell', 'up', 'seat']
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.sampled_from(FIELDS), inner),
+    max_leaves=3,
+)
+CHANGES = st.tuples(st.sampled_from(FIELDS), JSON).filter(
+    lambda change: change[0] != 'value' and change[1] != event().get(change[0])
+)
+VALUES = st.tuples(
+    st.just('value'),
+    st.none() | st.dictionaries(st.text(), JSON) | st.lists(st.lists(JSON), min_size=1),
+)
 BAD_IDS = ['', 'x' * 16, '0' * 15, '0' * 17, '0' * 16 + '\n', 0, None, ['0' * 16]]
 BAD_VALUES = ['x' * 201, None, 2**60, -1e300, [[1]], [None], [0] * 21, {'a': 1}]
 BAD_VALUES += ['a\u202eb', 'a\nb', '\0']
@@ -260,6 +274,23 @@ def test_attacks_on_the_form_of_an_event(store):
     assert store.view(NAME, 1)['guesses'][0]['answered'] == 0
 
 
+@settings(max_examples=MESSAGES)
+@given(JSON | (CHANGES | VALUES).map(lambda change: event() | {change[0]: change[1]}))
+def test_what_has_another_form_is_refused_with_a_sentence(one_class_store, message):
+    """Anything, or an event with a field that is another one or one too many."""
+    assert re.fullmatch(r'[A-Z][^.]*\.', one_class_store.take(1, [message]))
+    assert len(one_class_store.as_csv().splitlines()) == 1
+
+
+@pytest.fixture(scope='module')
+def one_class_store(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('store')
+    write_lesson(folder)
+    made = Class(folder / 'class.sqlite', [Known(one) for one in lessons(folder / 'notebooks')])
+    yield made
+    made.close()
+
+
 def test_attacks_on_the_form_of_a_message(opened):
     ada = opened.join()
     for body in BODIES:
@@ -279,6 +310,14 @@ def test_a_message_that_is_too_long_is_not_read(opened):
         assert status == 400
     assert opened.csv()[1:] == []
     assert opened.tell(ada, event()) == ''
+
+
+@pytest.mark.parametrize('token', ['', 'ada', '0' * 32, "' OR 1=1 --", '../', 'x' * 5000])
+def test_a_forged_seat(opened, token):
+    opened.tell(opened.join(), event())
+    status, answer = opened.post('events', {'events': [event(number=1)]}, token)
+    assert (status, answer['error'].startswith('The class that you joined is over.')) == (403, True)
+    assert len(opened.csv()) == 2
 
 
 def test_no_answer_tells_one_student_about_another(opened):
@@ -304,6 +343,12 @@ def test_the_page_needs_the_secret(opened):
     page = urllib.request.urlopen(opened.page)
     assert "default-src 'self'" in page.headers['Content-Security-Policy']
     assert page.headers['Cache-Control'] == 'no-store'
+
+
+@pytest.mark.parametrize('what', ['go', 'show', 'lower', 'nothing'])
+@pytest.mark.parametrize('body', [b'', b'{}', b'[]', b'{"step": 99}', b'{"seat": "x"}'])
+def test_what_the_page_never_asks(opened, what, body):
+    assert opened.post(f'{opened.page.rsplit("/", 2)[1]}/{what}', body)[0] in (400, 404)
 
 
 def test_a_full_class_and_a_seat_that_told_enough(store):
