@@ -133,14 +133,8 @@ def test_without_a_compiler_one_sentence_says_what_to_install(other, monkeypatch
         other.build()
 
 
-def test_an_interrupted_build_leaves_no_process(other):
-    other.write('src/slow/package.xml', package_xml('slow', 'cmake'))
-    other.write(
-        'src/slow/CMakeLists.txt',
-        'cmake_minimum_required(VERSION 3.8)\nproject(slow LANGUAGES NONE)\n'
-        'add_custom_target(slow ALL COMMAND touch started COMMAND sleep 60)\n',
-    )
-    started = other.path / 'build/slow/started'
+def interrupt_build(workspace, started, **options):
+    """Interrupt a build when a file is there, and check that it leaves no process."""
 
     def interrupt() -> None:
         wait_for(started.exists, timeout_s=60)
@@ -149,9 +143,36 @@ def test_an_interrupted_build_leaves_no_process(other):
     thread = threading.Thread(target=interrupt)
     thread.start()
     with pytest.raises(KeyboardInterrupt):
-        other.build()
+        workspace.build(**options)
     thread.join()
-    wait_for(lambda: processes_of(other.path) == [], timeout_s=2)
+    wait_for(lambda: processes_of(workspace.path) == [], timeout_s=2)
+
+
+def test_an_interrupted_build_leaves_no_process(other):
+    other.write('src/slow/package.xml', package_xml('slow', 'cmake'))
+    other.write(
+        'src/slow/CMakeLists.txt',
+        'cmake_minimum_required(VERSION 3.8)\nproject(slow LANGUAGES NONE)\n'
+        'add_custom_target(slow ALL COMMAND touch started COMMAND sleep 60)\n',
+    )
+    interrupt_build(other, other.path / 'build/slow/started')
+
+
+LINKS_WAIT = """\
+import sys, time
+if '--editable' in sys.argv:
+    open('started', 'w')
+    time.sleep(60)
+"""
+
+
+def test_a_build_goes_on_after_an_interrupt_between_copies_and_links(other):
+    write_talker(other)
+    assert other.build().ok
+    write_talker(other, setup=LINKS_WAIT + SETUP_PY)
+    interrupt_build(other, other.path / 'build/talker_pkg/started', symlink_install=True)
+    write_talker(other)
+    assert other.build(symlink_install=True).ok
 
 
 # --- The lines that matter -----------------------------------------------------------------------

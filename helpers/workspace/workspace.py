@@ -150,12 +150,33 @@ class Workspace:
         environment = self._underlay.environment() if self._underlay else build_environment()
         # Killed, it would leave compilers without an owner: rather it builds to its end.
         with Process('colcon', command, environment, self.path, ends_with_kernel=False) as colcon:
-            started = time.monotonic()
-            with ProgressBar(lambda: _packages_done(colcon.lines) / total) as bar:
-                while colcon.running:
-                    time.sleep(POLL_S)
-                    bar.update(time.monotonic() - started)
+            try:
+                started = time.monotonic()
+                with ProgressBar(lambda: _packages_done(colcon.lines) / total) as bar:
+                    while colcon.running:
+                        time.sleep(POLL_S)
+                        bar.update(time.monotonic() - started)
+            except KeyboardInterrupt:
+                with uninterrupted():
+                    colcon.stop()
+                    self._remove_half_built(colcon.lines)
+                raise
         return colcon.lines
+
+    def _remove_half_built(self, lines: Sequence[str]) -> None:
+        """Remove what colcon began and did not finish, apart from what CMake goes on with.
+
+        colcon 0.21.3 cannot build a Python package again where the change from copies to links was
+        broken off: `symlink_data` then finds the copies.
+        """
+        begun, finished = (
+            {line.split()[2] for line in lines if line.startswith(word)}
+            for word in ('Starting >>>', 'Finished <<<')
+        )
+        for package in begun - finished:
+            if not (self.path / 'build' / package / 'CMakeCache.txt').exists():
+                for folder in ('build', 'install'):
+                    shutil.rmtree(self.path / folder / package, ignore_errors=True)
 
     # --- Use ---
 
