@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import shutil
@@ -159,24 +160,23 @@ class Workspace:
             except KeyboardInterrupt:
                 with uninterrupted():
                     colcon.stop()
-                    self._remove_half_built(colcon.lines)
+                    self._note_half_built(colcon.lines)
                 raise
         return colcon.lines
 
-    def _remove_half_built(self, lines: Sequence[str]) -> None:
-        """Remove what colcon began and did not finish, apart from what CMake goes on with.
+    def _note_half_built(self, lines: Sequence[str]) -> None:
+        """Let colcon replace the copies of packages that it began and did not finish.
 
-        colcon 0.21.3 cannot build a Python package again where the change from copies to links was
-        broken off: `symlink_data` then finds the copies.
+        Where the change of a Python package from copies to links is broken off, colcon 0.21.3 has
+        removed its list of copies. Without the file it refuses to put links in their place.
         """
         begun, finished = (
             {line.split()[2] for line in lines if line.startswith(word)}
             for word in ('Starting >>>', 'Finished <<<')
         )
         for package in begun - finished:
-            if not (self.path / 'build' / package / 'CMakeCache.txt').exists():
-                for folder in ('build', 'install'):
-                    shutil.rmtree(self.path / folder / package, ignore_errors=True)
+            with contextlib.suppress(FileNotFoundError):  # it had no folder yet
+                (self.path / 'build' / package / 'install.log').touch()
 
     # --- Use ---
 
