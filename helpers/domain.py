@@ -15,6 +15,7 @@ POLL_S = 0.01
 
 _reserved = contextlib.ExitStack()
 _domain_id: int | None = None
+_in_vain = False  # this process has waited for its turn, and has had none since
 
 
 def reserve_domain_id() -> int:
@@ -98,18 +99,23 @@ def one_process_at_a_time() -> Iterator[None]:
     Fast DDS counts some ports in shared memory through all domains. It reports an error, in the
     middle of a cell, where one process wants the number that another one is just giving back, and
     takes the next number. After `TURN_TIMEOUT_S` it is nobody's turn: the error is better than to
-    wait for a process that was stopped.
+    wait for a process that was stopped. Who has waited in vain only asks, until it has a turn.
     """
+    global _in_vain
     try:
         folder = os.open(SHARED_MEMORY, os.O_RDONLY)
     except OSError:  # no shared memory, no such port
         yield
         return
     try:
-        deadline = time.monotonic() + TURN_TIMEOUT_S
-        while time.monotonic() < deadline:
+        deadline = time.monotonic() + (0.0 if _in_vain else TURN_TIMEOUT_S)
+        while True:
             with contextlib.suppress(BlockingIOError):
                 fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                _in_vain = False
+                break
+            if time.monotonic() >= deadline:
+                _in_vain = True
                 break
             time.sleep(POLL_S)
         yield

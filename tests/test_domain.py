@@ -225,3 +225,22 @@ def test_a_session_opens_without_a_turn(turn, folder, monkeypatch):
         monkeypatch.setattr(domain, 'SHARED_MEMORY', folder)
     with ros_session():
         assert rclpy.ok()
+
+
+def test_who_has_waited_in_vain_for_a_turn_only_asks(turn, monkeypatch):
+    lock, asked = fcntl.flock, []
+
+    def flock(folder, operation):
+        if operation & fcntl.LOCK_NB:
+            asked.append(folder)
+        lock(folder, operation)
+
+    lock(turn, fcntl.LOCK_EX)
+    with monkeypatch.context() as patch:
+        patch.setattr(domain, 'TURN_TIMEOUT_S', 0.02)
+        with ros_session():
+            assert rclpy.ok()
+    monkeypatch.setattr(fcntl, 'flock', flock)
+    with ros_session():
+        assert len(asked) == 1
+    assert len(asked) == 2
