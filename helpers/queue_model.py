@@ -18,8 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from helpers.recording import check_table
-from helpers.values import shown
+from helpers.values import check_table, shown
 
 # A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
 # long as callbacks and timers of the same run were late.

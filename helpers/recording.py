@@ -12,9 +12,8 @@ from collections.abc import Callable
 import pandas as pd
 from rclpy.callback_groups import ReentrantCallbackGroup
 
-from helpers.values import check_columns, column_of_numbers
+from helpers.values import COLUMNS
 
-COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']
 CALL_COLUMNS = ['client', 'service', 'caller', 'run', 'style', 'sent_s', 'answered_s', 'answer']
 CALL_COLUMNS += ['resumed_by']
 
@@ -356,21 +355,3 @@ def _surround(callback: Callable, start: Callable, finish: Callable) -> Callable
                 finish(row)
 
     return recorded_callback
-
-
-def check_table(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows of a recording in the order of their sequence numbers.
-
-    `seq` is then int, the times are float, and `thread` is a str, or None.
-
-    Raises TypeError or ValueError, with one clear sentence, where `table` is not a recording.
-    """
-    check_columns(table, COLUMNS)
-    times = {name: column_of_numbers(table, name) for name in COLUMNS[1:4]}
-    thread = table['thread'].astype(object)
-    thread = thread.where(thread.notna(), None)
-    table = table.assign(seq=table['seq'].astype(int), thread=thread, **times)
-    unknown = table.loc[table['published_s'].isna(), 'seq']
-    if len(unknown):
-        raise ValueError(f'It is not known when message {unknown.iloc[0]} was published.')
-    return table.sort_values('seq', ignore_index=True)

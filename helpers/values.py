@@ -1,12 +1,14 @@
-"""What is given to a function: how a sentence shows it, and does a table hold numbers?"""
+"""What is given to a function: how a sentence shows it, how it is sorted, is it a good table?"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
 
+COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']  # of the table of a run
 LONGEST = 200  # characters of a value that a sentence can hold
 
 
@@ -14,6 +16,11 @@ def shown(value: object) -> str:
     """Return how a value looks, for a sentence: its repr, or its type where that is long."""
     text = repr(value)
     return f'this {type(value).__name__}' if '\n' in text or len(text) > LONGEST else text
+
+
+def natural(name: str) -> list:
+    """Sort key that puts 'thread 2' before 'thread 10'."""
+    return [int(part) if part.isdecimal() else part for part in re.split(r'(\d+)', name)]
 
 
 def check_columns(table: pd.DataFrame, names: Iterable[str]) -> None:
@@ -33,3 +40,21 @@ def column_of_numbers(table: pd.DataFrame, name: str) -> np.ndarray:
         return table[name].to_numpy(float, na_value=np.nan)
     except (TypeError, ValueError):
         raise TypeError(f'The column {name} must hold numbers.') from None
+
+
+def check_table(table: pd.DataFrame) -> pd.DataFrame:
+    """Return the rows of a recording in the order of their sequence numbers.
+
+    `seq` is then int, the times are float, and `thread` is a str, or None.
+
+    Raises TypeError or ValueError, with one clear sentence, where `table` is not a recording.
+    """
+    check_columns(table, COLUMNS)
+    times = {name: column_of_numbers(table, name) for name in COLUMNS[1:4]}
+    thread = table['thread'].astype(object)
+    thread = thread.where(thread.notna(), None)
+    table = table.assign(seq=table['seq'].astype(int), thread=thread, **times)
+    unknown = table.loc[table['published_s'].isna(), 'seq']
+    if len(unknown):
+        raise ValueError(f'It is not known when message {unknown.iloc[0]} was published.')
+    return table.sort_values('seq', ignore_index=True)

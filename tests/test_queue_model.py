@@ -15,8 +15,9 @@ from support.nodes import LIMIT_S, Listener, Talker, spin
 from support.runs import CALLBACK, NOT_HEARD, happenings, hear, heard, lose, made_table, swap
 
 from helpers.queue_model import REST, explain, predict
-from helpers.recording import COLUMNS, Recording, check_table
+from helpers.recording import Recording
 from helpers.session import ros_session
+from helpers.values import COLUMNS, check_table
 
 
 def tries(number):

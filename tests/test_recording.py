@@ -11,8 +11,9 @@ from sensor_msgs.msg import Image, Imu
 from std_msgs.msg import Int64, String
 from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 
-from helpers.recording import COLUMNS, CallbackRecording, Recording, check_table
+from helpers.recording import CallbackRecording, Recording
 from helpers.session import ros_session
+from helpers.values import COLUMNS, check_table
 
 TIMES = ['published_s', 'started_s', 'finished_s']
 

@@ -8,7 +8,6 @@ was never heard counts as lost.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 
 import matplotlib.pyplot as plt
@@ -43,7 +42,7 @@ from helpers.plots.style import (
     new_axes,
     say,
 )
-from helpers.recording import check_table
+from helpers.values import check_table, natural
 
 MOST_SEQ_LABELS, MOST_GAP_LABELS = 25, 15
 TIME_LABEL = 'time since the first publish (s)'
@@ -196,7 +195,7 @@ def timeline(
     bars = pd.concat([t[t.started_s.notna()].assign(group=name) for name, t in groups.items()])
     # A callback that had not finished when the recording ended runs to the end of the picture.
     bars['finished_s'] = bars.finished_s.fillna(bars[['started_s', 'finished_s']].max().max())
-    threads = sorted(bars.thread.unique(), key=_natural)
+    threads = sorted(bars.thread.unique(), key=natural)
     bars['lane'] = bars.thread.map({thread: lane for lane, thread in enumerate(threads)})
 
     ax = ax or new_axes()
@@ -251,11 +250,6 @@ def _draw_waiting(ax: Axes, table: pd.DataFrame, depth: int, top: float) -> tupl
     ax.set_yticks([*ax.get_yticks(), lanes.mean()], [*names, 'waiting'])
     crossed = 'a cross ends those that were pushed out' if lost.any() else 'none is pushed out'
     return lanes[-1] + 0.3, f' Thin grey bars below: messages while they wait; {crossed}.'
-
-
-def _natural(name: str) -> list:
-    """Sort key that puts 'thread 2' before 'thread 10'."""
-    return [int(part) if part.isdecimal() else part for part in re.split(r'(\d+)', name)]
 
 
 def _label_bars(ax: Axes, bars: pd.DataFrame) -> None:

@@ -9,7 +9,6 @@ model.js decides what may happen, view.js shows it.
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -21,7 +20,6 @@ import numpy as np
 import pandas as pd
 
 from helpers.queue_model import check_count
-from helpers.recording import check_table
 from helpers.replay.events import ARRIVE, END, TAKE, Event, events
 from helpers.replay.model import stories
 from helpers.replay.picture import (
@@ -34,7 +32,7 @@ from helpers.replay.picture import (
     picture,
 )
 from helpers.replay.script import attribute, script, source
-from helpers.values import shown
+from helpers.values import check_table, natural, shown
 
 SCRIPT = 'model.js', 'walk.js', 'element.js', 'view.js'
 SCRIPT_OF_CALLS = 'circle.js', *SCRIPT
@@ -270,15 +268,10 @@ def fill_up(found: set[str], threads: int) -> list[str]:
         raise ValueError(f'Callbacks ran in {len(found)} threads, more than threads={threads}.')
     more = (f'thread {number}' for number in range(1, 2 * threads + 1))
     free = [name for name in more if name not in found]
-    return sorted([*found, *free[: threads - len(found)]], key=_natural)
+    return sorted([*found, *free[: threads - len(found)]], key=natural)
 
 
 def has_calls(setup: dict) -> bool:
     """Return whether a callback of a setup of model.js asks a service."""
     steps = chain(*(callback.get('does', []) for callback in setup['callbacks']))
     return any('client' in step for step in steps)
-
-
-def _natural(name: str) -> list:
-    """Sort key that puts 'thread 2' before 'thread 10'."""
-    return [int(part) if part.isdecimal() else part for part in re.split(r'(\d+)', name)]

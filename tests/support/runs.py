@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 
-from helpers.recording import COLUMNS, Recording
+from helpers.recording import Recording
 from helpers.session import ros_session
+from helpers.values import COLUMNS
 from support.nodes import LIMIT_S, Listener, Talker, spin
 
 CALLBACK = ['started_s', 'finished_s', 'thread']
