@@ -122,13 +122,13 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
         if moved:
             touched = [back.get(path, path) for path in changed] + [_path(old) for old in moved]
             _refuse_to_mix(root, touched)
+        # Where numbers grow the last notebook moves first, where they shrink the first one.
+        for old in sorted(moved, reverse=not options.remove):
+            new = moved[old]
+            _git(root, *(['mv', _path(old), _path(new)] if new else ['rm', '-q', _path(old)]))
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1
-    # Where numbers grow the last notebook moves first, where they shrink the first one.
-    for old in sorted(moved, reverse=not options.remove):
-        command = ['mv', _path(old), _path(moved[old])] if moved[old] else ['rm', '-q', _path(old)]
-        _git(root, *command)
     for path, text in changed.items():
         write(root / path, text)
         print(f'{path}: written')
