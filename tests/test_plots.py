@@ -1,4 +1,7 @@
-"""What the pictures show: the data of the artists, not pixels, which nbval never compares."""
+"""What the pictures show: the data of the artists, not pixels, which nbval never compares.
+
+It compares what is said about them. tests/tools/test_run.py shows figures in a real kernel.
+"""
 
 from itertools import combinations
 
@@ -13,6 +16,7 @@ from matplotlib.patches import Ellipse
 from matplotlib.text import Text
 
 from helpers import plots
+from helpers.alt_text import alt_text, describe
 from helpers.plots import style
 
 HEARD = [0, 1, 2, 3, 7, 11, 15, 19, 23, 27, *range(31, 41)]  # the slow subscriber of lesson 02
@@ -76,6 +80,10 @@ def bars_of(ax):
     }
 
 
+def said(draw, *arguments):
+    return alt_text(draw(*arguments).figure)
+
+
 def overlap(texts):
     boxes = [text.get_window_extent() for text in texts]
     return any(a.count_overlaps([b]) for a, b in combinations(boxes, 2))
@@ -85,7 +93,9 @@ def overlap(texts):
 
 DRAW = {
     'sequence_gaps': plots.sequence_gaps,
+    'sequence_gaps with depth': lambda table: plots.sequence_gaps(table, depth=10),
     'timeline': plots.timeline,
+    'timeline with depth': lambda table: plots.timeline(table, depth=10),
     'queue_length': lambda table: plots.queue_length(table, 10),
     'latency': lambda table: plots.latency(table, PERIOD_S),
     'before_and_after': lambda table: plots.before_and_after(table, table, ('a', 'b')).axes[0],
@@ -118,6 +128,44 @@ def test_black_numbers_stand_out_on_every_group_colour():
     linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
     contrast = (linear @ [0.2126, 0.7152, 0.0722] + 0.05) / 0.05  # as WCAG 2 defines it
     assert (contrast >= 4.5).all()
+
+
+# --- What is said about a figure ---
+
+
+def test_title_description_and_axes_of_a_figure():
+    assert alt_text(plt.figure()) == 'A figure without a title.'
+    figure, ax = plt.subplots()
+    ax.set(title='A drive', xlabel='x (m)', ylabel='y (m)')
+    assert alt_text(figure) == 'A drive. Horizontal axis: x (m). Vertical axis: y (m).'
+    describe(ax, 'A circle, twice.')
+    assert alt_text(figure).startswith('A drive. A circle, twice. Horizontal')
+    describe(ax, 'One circle.', title='Moves')
+    assert alt_text(figure).startswith('Moves. One circle. Horizontal')
+
+
+def test_each_of_several_axes_has_its_turn():
+    figure, (left, right) = plt.subplots(1, 2)
+    figure.suptitle('Two\nruns')
+    right.set_title('Which one?', loc='left')
+    describe(left, 'A line.')
+    assert alt_text(figure) == 'Two runs. Picture 1 of 2. A line. Picture 2 of 2. Which one?'
+
+
+@each_plot
+def test_the_result_of_a_run_is_said_and_not_what_moves_from_run_to_run(slow, parallel, draw):
+    started = slow.started_s
+    text = said(draw, table_of(started, callback_s=0.15))
+    other = table_of(started.mask(slow.seq == 7) + 0.01, callback_s=0.15)
+    assert said(draw, other) == text
+    assert said(draw, parallel) != text
+
+
+def test_what_no_lesson_shows_in_words(parallel):
+    unheard = table_of([np.nan] * 12)
+    assert 'None was heard: crosses.' in said(plots.sequence_gaps, unheard)
+    assert 'No two callbacks overlap.' in said(plots.timeline, unheard)
+    assert 'None is pushed out.' in said(plots.queue_length, parallel, 10)
 
 
 # --- Sequence gaps ---
