@@ -28,3 +28,11 @@ def opened(one_class):
     """Yield a class that was told nothing."""
     one_class.do('forget')
     return one_class
+
+
+@pytest.fixture(scope='module')
+def script():
+    """Return the script of the replays."""
+    from support.javascript import Script  # only what tests a replay loads its engine
+
+    return Script()

@@ -9,7 +9,6 @@ from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
-from support.javascript import Script
 from support.nodes import LIMIT_S, call_in_executor, spin
 from test_msgs.action import Fibonacci
 
@@ -88,9 +87,9 @@ def cancel(threads, charges, own_group):
         (3, True, True, ''),
     ],
 )
-def test_a_cancel_waits_for_what_rclpy_lets_it_wait(threads, charges, own_group, cause):
+def test_a_cancel_waits_for_what_rclpy_lets_it_wait(script, threads, charges, own_group, cause):
     shown, heard, accepted = cancel(threads, charges, own_group)
-    steps = Script().call('steps', shown.runs[0].record())
+    steps = script.call('steps', shown.runs[0].record())
     said = [step['says'] for step in steps]
     sent = next(i for i, says in enumerate(said) if 'of cancel_goal arrives' in says)
     assert steps[sent]['causes'][CANCEL] == cause

@@ -9,18 +9,11 @@ import pytest
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
-from support.javascript import Script
 from support.nodes import LIMIT_S, Answerer, Asker, spin
 
 from helpers.recording import CallbackRecording
 from helpers.replay.calls import replay_calls
 from helpers.session import ros_session
-
-
-@pytest.fixture(scope='module')
-def script():
-    return Script()
-
 
 STYLES = {'call': 'call', 'await': 'wait', 'send': 'call_back'}  # methods of Asker
 
@@ -84,7 +77,7 @@ def test_await_gives_the_thread_back_and_not_the_group(script):
     assert last['held'] == ['tick', None]
 
 
-def test_a_chain_of_services_waits_for_a_thread(script):
+def test_a_chain_of_services_waits_for_a_thread():
     with ros_session() as session:
         pilot, planner, camera = Node('pilot'), Node('planner'), Node('camera')
         groups = [MutuallyExclusiveCallbackGroup() for _ in range(2)]

@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pandas as pd
 import pytest
+from hypothesis import assume, settings
 from hypothesis import strategies as st
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -19,6 +20,22 @@ CALLBACK = ['started_s', 'finished_s', 'thread']
 NOT_HEARD = math.nan, math.nan, None
 # Two callbacks of a thread at one instant, without a duration, would have no order.
 DURATION = st.integers(1, 12)
+
+
+def tries(number):
+    """This many examples in `make test`, and as much more as a profile asks for."""
+    return settings(max_examples=number * settings.default.max_examples // 100)
+
+
+def runs(most_messages):
+    """What a run is predicted from: the milliseconds of a period and of a callback, and so on."""
+    return st.tuples(
+        st.integers(1, 12),  # period
+        st.integers(0, 60),  # callback
+        st.integers(1, 12),  # depth
+        st.integers(1, 9),  # threads
+        st.integers(1, most_messages),
+    )
 
 
 @st.composite
@@ -78,6 +95,17 @@ def swap(draw, table):
     """Each of two callbacks got the message of the other."""
     one, other = draw(st.sampled_from(heard(table))), draw(st.sampled_from(heard(table)))
     table.loc[[one, other], CALLBACK] = table.loc[[other, one], CALLBACK].to_numpy()
+
+
+@st.composite
+def changed_happenings(draw):
+    """A happening with one or two changes, after which it may be one that cannot happen."""
+    table, depth, threads = draw(happenings())
+    for change in draw(st.lists(st.sampled_from([lose, hear, swap]), min_size=1, max_size=2)):
+        assume(heard(table))
+        change(draw, table)
+    assume((table['started_s'].isna() | (table['started_s'] >= table['published_s'])).all())
+    return table, depth, threads
 
 
 def real_runs(threads, group, depth, count):
