@@ -1,17 +1,16 @@
 """`make handout`: what students get, and what they get with it where there is no network."""
 
 import re
-import subprocess
 import tarfile
-from pathlib import Path
 
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook, new_raw_cell
+from support.checkouts import git
 
 from tools.lessons import handout, update
+from tools.lessons.lesson import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb'}
 
 
@@ -29,8 +28,8 @@ def checkout(tmp_path):
     for name in ('README.md', 'Makefile', 'tests/test_a.py', 'tools/hub/set_up.sh'):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(name)
-    subprocess.run(['git', 'init', '--quiet'], cwd=root, check=True)
-    subprocess.run(['git', 'add', '.'], cwd=root, check=True)
+    git(root, 'init')
+    git(root, 'add', '.')
     (root / 'my draft').write_text('not in git')
     return root
 
@@ -87,7 +86,7 @@ def test_what_cannot_be_done_is_told_in_one_sentence(checkout, tmp_path, capsys)
     assert handout.main(['--root', str(tmp_path)]) == 1
     assert 'clone' in capsys.readouterr().err
     (checkout / 'requirements.lock').write_text('# Every wheel exists for Python 3.12 3.11\na==1\n')
-    subprocess.run(['git', 'add', '.'], cwd=checkout, check=True)
+    git(checkout, 'add', '.')
     assert handout.main(['--root', str(checkout), '--wheels', '3.9']) == 1
     assert capsys.readouterr().err.count('\n') == 1
     assert not (checkout / 'handout').exists()

@@ -6,20 +6,13 @@ import sys
 
 import nbformat
 import pytest
-from support.checkouts import copy_checkout
+from support.checkouts import copy_checkout, git
 
 from tools.lessons import new, run
 from tools.lessons.lesson import ROOT, lessons
 
 KNOWN = lessons()[2]
 CHEAP = ['tests/test_notebooks.py', 'tests/test_progress.py']
-
-
-def git(folder, *arguments):
-    who = ['-c', 'user.name=A', '-c', 'user.email=a@b.c', '-c', 'commit.gpgsign=false']
-    done = subprocess.run(['git', *who, *arguments], cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
 
 
 def copied(folder):

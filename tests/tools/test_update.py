@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import subprocess
 import tarfile
 from itertools import count
 
@@ -11,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nbformat.v4 import new_code_cell, new_notebook
+from support.checkouts import git
 
 from tools.lessons import update
 
@@ -148,30 +148,26 @@ def test_a_file_that_both_have_changed_is_set_aside(tmp_path, mine, capsys):
     assert read(mine / 'notebooks') == sources(notebook(NEWER).cells)
 
 
-def test_a_clone_follows_its_origin(tmp_path, mine, capsys):
-    def git(*command, cwd):
-        name = ['-c', 'user.name=a', '-c', 'user.email=a@b.c']
-        subprocess.run(['git', *name, *command], cwd=cwd, check=True, capture_output=True)
-
+def test_a_clone_follows_its_origin(tmp_path, capsys):
     origin, clone = tmp_path / 'origin', tmp_path / 'clone'
     fill(origin, '02', OLD, 'old')
-    git('init', cwd=origin)
-    git('add', '.', cwd=origin)
-    git('commit', '-m', 'old', cwd=origin)
-    git('clone', str(origin), str(clone), cwd=tmp_path)
+    git(origin, 'init')
+    git(origin, 'add', '.')
+    git(origin, 'commit', '-m', 'old')
+    git(tmp_path, 'clone', str(origin), str(clone))
     write(clone / 'notebooks', LESSON, WRITTEN)
     (origin / 'notebooks' / LESSON).unlink()
     fill(origin, '03', NEWER, 'newer')
-    git('add', '--all', '.', cwd=origin)
-    git('commit', '-m', 'newer', cwd=origin)
+    git(origin, 'add', '--all', '.')
+    git(origin, 'commit', '-m', 'newer')
     for _ in range(2):
         assert update.main(['--to', str(clone)]) == 0
         assert read(clone / 'notebooks', '03_lose.ipynb') == BOTH
         assert [path.name for path in (clone / 'notebooks').iterdir()] == ['03_lose.ipynb']
-        git('diff', '--exit-code', 'HEAD', '--', 'helper.py', cwd=clone)
-    git('commit', '-am', 'mine', cwd=clone)
+        git(clone, 'diff', '--exit-code', 'HEAD', '--', 'helper.py')
+    git(clone, 'commit', '-am', 'mine')
     fill(origin, '03', OLD, 'newest')
-    git('commit', '-am', 'newest', cwd=origin)
+    git(origin, 'commit', '-am', 'newest')
     before = read(clone / 'notebooks', '03_lose.ipynb')
     capsys.readouterr()
     assert update.main(['--to', str(clone)]) == 1
