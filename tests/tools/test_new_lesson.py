@@ -41,15 +41,15 @@ def test_a_number_at_the_end_of_a_sentence_is_renumbered():
 def test_added_and_taken_out(tmp_path, capsys):
     copy = copied(tmp_path / 'copy')
     before = lessons(copy / 'notebooks')
-    assert new.main(['count_the_losses'], copy) == 0
+    assert new.main(['lose_your_keys'], copy) == 0
     commit(copy)
-    assert new.main(['find_the_losses', '--after', '04'], copy) == 0
+    assert new.main(['find_your_keys', '--after', '04'], copy) == 0
     assert run.main(['00'], copy) == 0
-    assert '05_find_the_losses.ipynb: its summary is not yet in French' in capsys.readouterr().out
+    assert '05_find_your_keys.ipynb: its summary is not yet in French' in capsys.readouterr().out
     the_rules_hold(copy)
 
     after = lessons(copy / 'notebooks')
-    assert (titles(copy)[5], titles(copy)[-2]) == ('Find the losses', 'Count the losses')
+    assert (titles(copy)[5], titles(copy)[-2]) == ('Find your keys', 'Lose your keys')
     kept = [*after[:5], *after[6:-2], after[-1]]
     for old, one in zip(before, kept, strict=True):
         assert (old.name, old.title) == (one.name, one.title)
@@ -61,12 +61,12 @@ def test_added_and_taken_out(tmp_path, capsys):
                     f'{word}{old.number}'
                 )
     readme = (copy / 'README.md').read_text(encoding='utf-8')
-    assert '| 05 | [Find the losses](notebooks/05_find_the_losses.ipynb) |' in readme
+    assert '| 05 | [Find your keys](notebooks/05_find_your_keys.ipynb) |' in readme
 
     commit(copy)
-    assert new.main(['find_the_losses', '--remove'], copy) == 0
+    assert new.main(['find_your_keys', '--remove'], copy) == 0
     commit(copy)
-    assert new.main(['count_the_losses', '--remove'], copy) == 0
+    assert new.main(['lose_your_keys', '--remove'], copy) == 0
     git(copy, 'add', '-A')
     # Of all files, only the table of exercises in notebook 00 is still that of its last run.
     assert git(copy, 'diff', '--cached', '--name-only', 'HEAD~3').split() == [
