@@ -22,8 +22,9 @@ from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
-from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin, wait_for
+from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 from support.processes import run_python, running, traces
+from support.waits import wait_for
 from test_msgs.action import Fibonacci
 
 import helpers.session

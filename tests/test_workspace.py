@@ -13,7 +13,7 @@ from pathlib import Path
 import psutil
 import pytest
 from ament_index_python import get_package_share_directory
-from support.nodes import Listener, spin, wait_for
+from support.nodes import Listener, spin
 from support.packages import (
     HOSTILE,
     SETUP_PY,
@@ -24,6 +24,7 @@ from support.packages import (
     write_talker,
 )
 from support.processes import running
+from support.waits import wait_for
 
 from helpers.domain import reserve_domain_id
 from helpers.session import ros_session

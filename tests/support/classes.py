@@ -10,7 +10,6 @@ import os
 import re
 import signal
 import sys
-import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
@@ -21,13 +20,15 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_
 
 from helpers.classroom import HUB_VARIABLE
 from helpers.progress import FILE_VARIABLE
-from support.nodes import LIMIT_S
+from support.waits import LIMIT_S, wait_for
 from tools.class_server.__main__ import main
 
 LESSON = '02_lose_messages.ipynb'
 NAME = 'lose_messages'
 QUESTION = 'How many are heard?'
 OTHER = 'Which ones?'
+# What a class has said when it has started: how to join, the address of its page, and the port.
+STARTED = r"join_class\('(.*)', '(.*)'\)[\s\S]*?(http://localhost:(\d+)/\w+/)[\s\S]*Ctrl\+C"
 STEP, LATER = 'step-1', 'step-2'  # ids of cells
 PREDICT = {'tags': ['predict']}
 FORK = multiprocessing.get_context('fork')
@@ -92,13 +93,12 @@ class RunningClass:
         self.said = ''
         for line in self._stdout:
             self.said += line
-            if line.startswith('Ctrl+C'):
+            if found := re.search(STARTED, self.said):
                 break
         else:
             raise RuntimeError(f'The class did not start: {self.said}')
-        [self.address, self.code] = re.search(r"join_class\('(.*)', '(.*)'\)", self.said).groups()
-        self.page = re.search(r'http://localhost:(\d+)/\w+/', self.said)[0]
-        self.port = int(self.page.split(':')[2].split('/')[0])
+        self.address, self.code, self.page, port = found.groups()
+        self.port = int(port)
         self.url = f'http://127.0.0.1:{self.port}'
 
     def kill(self) -> None:
@@ -170,11 +170,7 @@ class RunningClass:
 
     def wait_for(self, condition) -> dict:
         """Wait until the page shows what fulfils a condition, and return it."""
-        end = time.monotonic() + LIMIT_S
-        while not condition(view := self.view()):
-            assert time.monotonic() < end, view
-            time.sleep(0.05)
-        return view
+        return wait_for(self.view, condition)
 
 
 def _hold(stdout: int, config: Path, *arguments: str) -> None:

@@ -9,12 +9,12 @@ import shlex
 import shutil
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 
 import pytest
 
-LIMIT_S = 60
+from support.waits import START_LIMIT_S, wait_for
+
 ADDRESSES = ('192.0.2.1', '192.0.2.2')  # reserved for documentation: nobody's
 
 
@@ -54,10 +54,8 @@ class Machine:
 
     def wait_for_cable(self) -> None:
         """Fast DDS knows the interfaces that are up when a participant starts, no later ones."""
-        limit = time.monotonic() + LIMIT_S
-        while ' UP ' not in self.run('ip -brief link show eth0'):
-            assert time.monotonic() < limit
-            time.sleep(0.05)
+        show = 'ip -brief link show eth0'
+        wait_for(lambda: ' UP ' in self.run(show), timeout_s=START_LIMIT_S)
 
     @contextlib.contextmanager
     def firewall(self, policy: str, rule: str) -> Iterator[None]:

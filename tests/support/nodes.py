@@ -2,7 +2,6 @@
 
 import contextlib
 import threading
-import time
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
@@ -10,7 +9,7 @@ from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-LIMIT_S = 20.0  # for every wait; never reached unless something is broken
+from support.waits import LIMIT_S
 
 
 class Talker(Node):
@@ -117,13 +116,6 @@ class Gate:
 
     def open(self) -> None:
         self._open.set()
-
-
-def wait_for(predicate, timeout_s: float = LIMIT_S) -> None:
-    end = time.monotonic() + timeout_s
-    while not predicate():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def spin(session, *nodes, threads: int = 1):

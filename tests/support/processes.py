@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 
-from support.nodes import LIMIT_S
+from support.waits import START_LIMIT_S
 from tools.soak.leftovers import threads_of_process
 
 HERE = Path(__file__).parents[1]  # for `import support` in a process
@@ -40,7 +40,7 @@ def running(script: str, **environment: str | None) -> Iterator[subprocess.Popen
 def run_python(script: str, **environment: str | None) -> str:
     """Run a script that must succeed without a word on stderr, and return its stdout."""
     with running(script, **environment) as process:
-        out, err = process.communicate(timeout=3 * LIMIT_S)
+        out, err = process.communicate(timeout=START_LIMIT_S)
     assert (process.returncode, err) == (0, '')
     return out
 

@@ -21,13 +21,15 @@ from support.classes import (
     NAME,
     OTHER,
     QUESTION,
+    STARTED,
     STEP,
     event,
     running_class,
     student,
     write_lesson,
 )
-from support.machines import ADDRESSES, LIMIT_S, ended, two_machines
+from support.machines import ADDRESSES, ended, two_machines
+from support.waits import START_LIMIT_S, wait_for
 
 from helpers.classroom import HUB_VARIABLE
 from tools.addresses import in_networks
@@ -44,14 +46,23 @@ MESSAGES = int(os.environ.get('MESSAGES', '200'))
 REAL = [Known(lesson) for lesson in lessons() if lesson.is_lesson]
 
 
-@pytest.fixture
-def store(tmp_path):
+def made_store(folder):
     """Yield the events of a class, without a server."""
-    write_lesson(tmp_path)
-    known = [Known(lesson) for lesson in lessons(tmp_path / 'notebooks')]
-    made = Class(tmp_path / 'class' / 'class.sqlite', known)
+    write_lesson(folder)
+    known = [Known(lesson) for lesson in lessons(folder / 'notebooks')]
+    made = Class(folder / 'class' / 'class.sqlite', known)
     yield made
     made.close()
+
+
+@pytest.fixture
+def store(tmp_path):
+    yield from made_store(tmp_path)
+
+
+@pytest.fixture(scope='module')
+def one_class_store(tmp_path_factory):
+    yield from made_store(tmp_path_factory.mktemp('store'))
 
 
 def refused(url, data=None, **headers):
@@ -282,15 +293,6 @@ def test_what_has_another_form_is_refused_with_a_sentence(one_class_store, messa
     assert len(one_class_store.as_csv().splitlines()) == 1
 
 
-@pytest.fixture(scope='module')
-def one_class_store(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('store')
-    write_lesson(folder)
-    made = Class(folder / 'class.sqlite', [Known(one) for one in lessons(folder / 'notebooks')])
-    yield made
-    made.close()
-
-
 def test_attacks_on_the_form_of_a_message(opened):
     ada = opened.join()
     for body in BODIES:
@@ -474,10 +476,10 @@ def test_what_is_told_while_the_network_is_cut_arrives_once(tmp_path):
         held = one.start(HELD, tmp_path, JUPYTER_CONFIG_DIR=str(tmp_path / 'jupyter'))
         stack.enter_context(ended(held))
         said = ''
-        while 'Ctrl+C' not in said:
+        while not (found := re.search(STARTED, said)):
             said += held.stdout.readline()
-        address, code = re.search(rf"join_class\('({ADDRESSES[0]}:8765)', '(.*)'\)", said).groups()
-        page = re.search(r'http://localhost:8765/\w+/', said)[0]
+        address, code, page, _ = found.groups()
+        assert address == f'{ADDRESSES[0]}:8765'
         kernel = student(tmp_path / 'ada') | {HUB_VARIABLE: ''}
         ada = two.start(TELLS, address, code, QUESTION, CUT_S / 50, **kernel)
         stack.enter_context(ended(ada))
@@ -488,13 +490,12 @@ def test_what_is_told_while_the_network_is_cut_arrives_once(tmp_path):
             while printed[-1] != '55\n':
                 printed.append(ada.stdout.readline())
         assert 'The class does not answer. What you tell is kept until it does.\n' in printed
-        end = time.monotonic() + LIMIT_S
-        while (rows := list(csv.reader(read_in(one, page))))[-1][-1] != '59':
-            assert time.monotonic() < end, rows
-            time.sleep(0.5)
+        rows = wait_for(
+            lambda: read_in(one, page), lambda rows: rows[-1][-1] == '59', START_LIMIT_S
+        )
     assert [int(row[-1]) for row in rows[1:]] == list(range(60))
 
 
 def read_in(machine, page):
     reader = machine.start(READS, page)
-    return reader.communicate(timeout=LIMIT_S)[0].splitlines()
+    return list(csv.reader(reader.communicate(timeout=START_LIMIT_S)[0].splitlines()))

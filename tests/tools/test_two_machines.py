@@ -5,7 +5,8 @@ import subprocess
 from collections.abc import Iterator
 
 import pytest
-from support.machines import ADDRESSES, LIMIT_S, Machine, ended, two_machines
+from support.machines import ADDRESSES, Machine, ended, two_machines
+from support.waits import START_LIMIT_S
 
 DOMAIN = 42
 # What a firewall must let in: discovery, then two ports for each of the first ten participants.
@@ -58,7 +59,7 @@ with ros_session(domain, discovery) as session:
     executor.add_node(node)
     session.spin(executor)
     print('open', flush=True)
-    session.wait_until(lambda: wanted in heard, {LIMIT_S})
+    session.wait_until(lambda: wanted in heard, {START_LIMIT_S})
     lines = Path('/proc/net/udp').read_text().splitlines()[1:]
     print(*sorted(heard))
     print(*(int(line.split()[1].partition(':')[2], 16) for line in lines), flush=True)
