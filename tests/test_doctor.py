@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from rclpy.executors import SingleThreadedExecutor
-from support.processes import traces
+from support.processes import put, traces
 
 from helpers import doctor
 
@@ -92,10 +92,7 @@ def test_only_a_required_check_decides(tmp_path):
     ],
 )
 def test_a_failed_import_gets_its_advice(monkeypatch, tmp_path, end, found, advice):
-    python = tmp_path / 'python'
-    python.write_text(f'#!/bin/sh\n{end}\n')
-    python.chmod(0o755)
-    monkeypatch.setattr(sys, 'executable', str(python))
+    monkeypatch.setattr(sys, 'executable', str(put(tmp_path, 'python', end)))
     monkeypatch.delitem(sys.modules, 'rclpy')
     row = doctor.check_rclpy()
     assert row.found == found

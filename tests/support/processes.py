@@ -67,3 +67,11 @@ def segments(pid: int | str = 'self') -> set[str]:
 def traces() -> set[str]:
     """Return what is in this process and can be left behind: threads and shared memory."""
     return threads_of_process().keys() | segments()
+
+
+def put(folder: Path, name: str, script: str) -> Path:
+    """Put a command into a folder, which does what a script in sh says."""
+    program = folder / name
+    program.write_text(f'#!/bin/sh\n{script}\n')
+    program.chmod(0o755)
+    return program

@@ -4,11 +4,12 @@ import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from support.processes import put
 
-ROOT = Path(__file__).resolve().parents[2]
+from tools.lessons.lesson import ROOT
+
 USED = ('cat', 'chown', 'cksum', 'cut', 'dirname', 'find', 'grep', 'id', 'mkdir', 'mktemp', 'rm',
         'sh', 'sort', 'tee', 'tr', 'uname')  # fmt: skip
 
@@ -23,9 +24,7 @@ def run(tmp_path):
 
     def run(what, podman=None, **variables):
         if podman is not None:
-            command = path / 'podman'
-            command.write_text(f'#!/bin/sh\ncase $1 in version | --version) ;; {podman} esac\n')
-            command.chmod(0o755)
+            put(path, 'podman', f'case $1 in version | --version) ;; {podman} esac')
         environment = {'PATH': str(path), 'LESSONS': str(tmp_path / 'lessons')} | variables
         return subprocess.run(
             [ROOT / 'tools/container/run.sh', what],

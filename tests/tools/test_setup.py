@@ -16,8 +16,10 @@ from importlib.metadata import distribution
 from pathlib import Path
 
 import pytest
+from support.processes import put
 
-ROOT = Path(__file__).resolve().parents[2]
+from tools.lessons.lesson import ROOT
+
 BASE_PYTHON = Path(sys._base_executable)
 HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
 
@@ -52,16 +54,9 @@ def path(tmp_path):
     """Return a folder that is the whole PATH, with the commands that the scripts use."""
     for command in ('cat', 'cksum', 'cp', 'dirname', 'env', 'flock', 'grep', 'head', 'mkdir', 'mv',
                     'rm', 'sed', 'sh', 'tr'):  # fmt: skip
-        where = shutil.which(command)
-        if where:
+        if where := shutil.which(command):
             (tmp_path / command).symlink_to(where)
     return tmp_path
-
-
-def put(folder: Path, name: str, script: str) -> None:
-    program = folder / name
-    program.write_text(f'#!/bin/sh\n{script}\n')
-    program.chmod(0o755)
 
 
 def find_python(path: Path, versions: str = '3.14 3.13 3.12 3.11') -> subprocess.CompletedProcess:
