@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 from support.javascript import Script
 
 from helpers.queue_model import predict
-from helpers.replay.free import FreePlay
 
 numbers = st.tuples(
     st.integers(1, 50),  # hundredths of a second, as the sliders have them
@@ -40,7 +39,3 @@ def test_what_is_drawn_is_the_prediction(script, drawn):
     assert [one.get('lost') is None for one in messages] == table['started_s'].notna().tolist()
     heard = table['started_s'].notna().sum()
     assert script.call('told', messages).startswith(f'{heard} of 41 messages are heard.')
-
-
-def test_the_page():
-    assert FreePlay()._repr_mimebundle_()['text/plain'] == str(FreePlay())

@@ -80,12 +80,12 @@ def test_a_broken_notebook_breaks_nothing(kept, capsys, folder, broken):
     assert kept.read_text() == 'lose_them 1\n'
 
 
-def test_elsewhere_the_notebooks_are_those_of_the_checkout(folder, monkeypatch, tmp_path):
+def test_elsewhere_the_notebooks_are_those_of_the_checkout(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     assert 'lose_messages' in {lesson.name for lesson in progress.lessons()}
 
 
-def test_a_check_that_passes_is_kept_and_no_other(kept, capsys):
+def test_a_check_that_passes_is_kept_and_no_other(kept):
     checks.check(TITLE, ('it is right', False, 'Try again.'))
     for other in ('Solution of exercise 2', 'Exercise 2', 'Exercise 2 of lesson 98'):
         checks.check(other, ('it is right', True, ''))
