@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 
 SHARED_MEMORY = '/dev/shm'
+MARK_ADDRESS = '127.0.0.2'  # of this machine, and nobody connects from it
 TURN_TIMEOUT_S = 5.0
 POLL_S = 0.01
 
@@ -46,11 +47,11 @@ def share_domain_id(domain_id: int) -> Iterator[None]:
     from domain_coordinator.impl import PORT_BASE
 
     # The coordinator holds the port of an id without this option. Two sockets can share a port
-    # only where both have it.
+    # only where both have it, or have other addresses: a connection may have the port by chance.
     with socket.socket() as mark:
         mark.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            mark.bind(('', PORT_BASE + domain_id))
+            mark.bind((MARK_ADDRESS, PORT_BASE + domain_id))
         except OSError:
             raise ValueError(
                 f'Domain {domain_id} is reserved on this machine: agree on another one. '

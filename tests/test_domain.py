@@ -4,10 +4,12 @@ import contextlib
 import fcntl
 import os
 import random
+import socket
 
 import pytest
 import rclpy
 from domain_coordinator import domain_id as reserved_domain_id
+from domain_coordinator.impl import PORT_BASE
 from rclpy.node import Node
 from support.nodes import LIMIT_S, Listener, spin
 from support.processes import run_python, running
@@ -151,6 +153,14 @@ def test_hostile_variables(monkeypatch, shared_id):
 def test_bad_domain_or_discovery(arguments, said):
     with pytest.raises(ValueError, match=said):
         ros_session(**arguments)
+
+
+def test_a_connection_that_has_the_port_by_chance(shared_id):
+    with socket.create_server(('127.0.0.1', 0)) as server, socket.socket() as client:
+        client.bind(('127.0.0.1', PORT_BASE + shared_id))
+        client.connect(server.getsockname())
+        with ros_session(domain_id=shared_id):
+            assert domain_of_session() == shared_id
 
 
 @pytest.mark.parametrize('free_for_all', [0, 101])
