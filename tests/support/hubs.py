@@ -312,6 +312,11 @@ class Lesson:
     outputs: list[list[NotebookNode]] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
 
+    @property
+    def explained(self) -> bool:
+        text = ''.join(output.get('text', '') for cell in self.outputs for output in cell)
+        return CLAIMS[self.path.stem[3:]] in text
+
 
 async def run_lesson(student: Student, path: Path) -> Lesson:
     """Run all cells of the student's own copy of a lesson."""
@@ -327,8 +332,43 @@ async def run_lesson(student: Student, path: Path) -> Lesson:
     return lesson
 
 
-async def run_lessons(student: Student, paths: list[Path]) -> list[Lesson]:
-    return [await run_lesson(student, path) for path in paths]
+@dataclass
+class Hour:
+    """What was seen of a class on a hub, from its first log-in."""
+
+    log_in_s: float = 0.0
+    lessons_s: float = 0.0
+    lessons: list[Lesson] = field(default_factory=list)
+    costs: list[tuple[float, float]] = field(default_factory=list)
+    heard: dict[str, set[str]] = field(default_factory=dict)
+    told: list[list[str]] = field(default_factory=list)
+
+    async def log_in(self, students: list[Student]) -> None:
+        """Log in all at once, as soon as the hub answers."""
+        start = time.monotonic()
+        await students[0].hub.until_ready()
+        await asyncio.gather(*(student.log_in() for student in students))
+        self.log_in_s = time.monotonic() - start
+
+    async def run_lessons(self, students: list[Student]) -> None:
+        """Let all run both lessons at once, every second student the later one first."""
+
+        async def run(student: Student, paths: list[Path]) -> list[Lesson]:
+            return [await run_lesson(student, path) for path in paths]
+
+        start = time.monotonic()
+        runs = (run(student, LESSONS[:: (-1) ** i]) for i, student in enumerate(students))
+        self.lessons = sum(await asyncio.gather(*runs), [])
+        self.lessons_s = time.monotonic() - start
+        self.costs = [student.cost() for student in students]
+
+    def print_costs(self) -> None:
+        memory, processor = (sorted(values) for values in zip(*self.costs, strict=True))
+        print(
+            f'\nLogged in after {self.log_in_s:.0f} s, two lessons each of {len(self.costs)} in '
+            f'{self.lessons_s:.0f} s\nA student with two kernels: {memory[0]:.0f} to '
+            f'{memory[-1]:.0f} MB, {processor[0]:.1f} to {processor[-1]:.1f} s of a core'
+        )
 
 
 # Everybody talks on one topic until everybody has heard something.
