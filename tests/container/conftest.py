@@ -92,7 +92,7 @@ def podman(folder, base) -> list[str]:
 
 @pytest.fixture(scope='session')
 def make(folder, podman):
-    """Return `make` in a checkout of its own, with the files that git knows."""
+    """Return `make` in a checkout of its own, with the files that git knows, and `make.image`."""
     checkout = folder / 'checkout'
     copy_checkout(checkout)
 
@@ -105,17 +105,20 @@ def make(folder, podman):
             stderr=subprocess.STDOUT,
         )
 
-    make.checkout = checkout
+    def image() -> None:
+        start = time.monotonic()
+        done = make('image', 'BASE=localhost/base', f'IMAGE_ARGS={LIMITS}')
+        if done.returncode and any(words in done.stdout for words in NO_NETWORK):
+            leave_out('its network does not reach a package index')
+        assert not done.returncode, done.stdout[-3000:]
+        print(f'\nbuilt in {time.monotonic() - start:.0f} s')
+
+    make.checkout, make.image = checkout, image
     return make
 
 
 @pytest.fixture(scope='session')
 def image(make, podman):
-    start = time.monotonic()
-    done = make('image', 'BASE=localhost/base', f'IMAGE_ARGS={LIMITS}')
-    if done.returncode and any(words in done.stdout for words in NO_NETWORK):
-        leave_out('its network does not reach a package index')
-    assert not done.returncode, done.stdout[-3000:]
-    print(f'\nbuilt in {time.monotonic() - start:.0f} s')
+    make.image()
     command = [*podman, 'image', 'inspect', IMAGE]
     return json.loads(subprocess.run(command, check=True, capture_output=True).stdout)[0]

@@ -1,10 +1,9 @@
 """The image of the lessons, used: `make test-container`."""
 
-import json
+import contextlib
 import shutil
 import subprocess
 import time
-import urllib.error
 import urllib.request
 from pathlib import Path
 
@@ -34,13 +33,11 @@ def lab(make, podman, image, folder, port):
         server = subprocess.Popen(command, cwd=make.checkout, stdout=log, stderr=log)
         start = time.monotonic()
         while time.monotonic() < start + START_S and server.poll() is None:
-            try:
+            with contextlib.suppress(OSError):
                 urllib.request.urlopen(f'http://127.0.0.1:{port}/api', timeout=5).close()
-            except (OSError, urllib.error.URLError):
-                time.sleep(0.2)
-            else:
                 print(f'\nanswers after {time.monotonic() - start:.1f} s')
                 return mine
+            time.sleep(0.2)
         raise AssertionError((folder / 'log').read_text())
 
     with (folder / 'log').open('w') as log:
@@ -79,30 +76,15 @@ def test_a_lesson(podman, image, make):
     assert ' passed' in done.stdout
 
 
-def test_a_new_version_keeps_what_was_written(lab, make, podman, port):
+def test_a_student_stops_and_goes_on(lab, make, podman, port):
     mine = lab()
     assert not subprocess.run([*podman, 'healthcheck', 'run', 'lab']).returncode
     # The port is the student's machine's only, and another container cannot have it.
     done = make('lab-container', f'PORT={port}', f'RUN_ARGS={LIMITS}', f'LESSONS={mine}-2')
     assert f'The port {port} is already in use' in done.stdout
-    subprocess.run([*podman, 'stop', 'lab'], capture_output=True, check=True)
-
-    name = next(make.checkout.glob(f'notebooks/??_{LESSON}.ipynb')).name
-    written, newer = mine / 'ros2_notebooks' / name, make.checkout / 'notebooks' / name
-    for path, words in (written, 'I have written this.'), (newer, 'This is newer.'):
-        notebook = json.loads(path.read_text())
-        at = 1 if path == written else 2
-        cell = {'cell_type': 'markdown', 'id': f'c{at}', 'metadata': {}, 'source': words}
-        notebook['cells'].insert(at, cell)
-        path.write_text(json.dumps(notebook))
-
-    done = make('lab-container', f'PORT={port}', f'RUN_ARGS={LIMITS}', f'LESSONS={mine}')
-    assert 'The image is not of these lessons: run `make image`, then try again.' in done.stdout
-    start = time.monotonic()
-    done = make('image', 'BASE=localhost/base', f'IMAGE_ARGS={LIMITS}')
-    assert not done.returncode, done.stdout[-3000:]
-    print(f'\nnewer lessons in {time.monotonic() - start:.0f} s')
+    [notebook] = mine.glob(f'ros2_notebooks/??_{LESSON}.ipynb')
+    written = notebook.read_text().replace('**You will do**', 'I have written this.')
+    notebook.write_text(written)
+    subprocess.run([*podman, 'rm', '--force', 'lab'], capture_output=True)
     lab()
-    text = written.read_text()
-    assert 'I have written this.' in text
-    assert 'This is newer.' in text
+    assert 'I have written this.' in notebook.read_text()
