@@ -88,9 +88,7 @@ def test_from_join_to_forget_everything(lab_page, tabs, student_server, artefact
         page.close()
 
 
-def test_a_slide_with_a_guess_shows_how_many_have_answered_and_the_bars(
-    lab_page, tmp_path, artefacts
-):
+def test_a_slide_with_a_guess_shows_how_many_have_answered_and_the_bars(lab_page, tmp_path):
     with (
         server(tmp_path, 'present', 'LESSON=02') as running,
         made(tmp_path, STARTED, 'class') as (_, started),
