@@ -12,8 +12,11 @@ from typing import Any
 from lab_server import Server
 from playwright.sync_api import ElementHandle, Page
 
+from tools.lessons.export import PACKAGES
+
 LIMIT_S = 300  # to open a page, and for what a lesson computes; the rest has Playwright's 30 s
 PANEL = 'window.jupyterapp.shell.currentWidget'
+AXE = PACKAGES / 'node_modules' / 'axe-core' / 'axe.min.js'
 WIDER = '() => document.documentElement.scrollWidth > innerWidth'  # any page than its window
 
 READY = """name => {

@@ -6,17 +6,14 @@ from html.parser import HTMLParser
 from urllib.parse import unquote, urlparse
 
 import pytest
-from lab_page import WIDER
+from lab_page import AXE, WIDER
 from lab_server import ROOT
-
-from tools.lessons.export import PACKAGES
 
 SITE = ROOT / 'site'
 PAGES = sorted(path.relative_to(SITE).as_posix() for path in SITE.rglob('*.html'))
 LESSONS = [name for name in PAGES if re.match(r'notebooks/\d\d_', name)]
 MEGABYTE = 1_000_000
 FOUND = "[...document.querySelectorAll('#search-results li a')].map(link => link.href)"
-AXE = PACKAGES / 'node_modules' / 'axe-core' / 'axe.min.js'
 SERIOUS = """async () => (await axe.run()).violations
     .filter(found => ['serious', 'critical'].includes(found.impact))
     .map(found => `${found.id}: ${found.nodes[0].html.slice(0, 100)}`)"""
