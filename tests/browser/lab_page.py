@@ -1,4 +1,4 @@
-"""A page of JupyterLab, used by keys, clicks and menus as a person does.
+"""A page of JupyterLab, used by keys and clicks as a person does.
 
 What a person sees is waited for, never a time: JupyterLab's own objects say when a kernel is idle,
 a cell has run, a slide is shown. `window.jupyterapp` gives them (--LabApp.expose_app_in_browser).
@@ -26,10 +26,6 @@ READY = """name => {
         && document.querySelector('#jp-main-statusbar').textContent.includes('| Idle');
 }"""
 IDLE = f"{PANEL}.sessionContext.session.kernel.status === 'idle'"
-CODE_CELLS = f"[...{PANEL}.content.model.cells].filter(cell => cell.type === 'code')"
-FAILED = "cell => cell.outputs.toJSON().some(output => output.output_type === 'error')"
-ALL_RAN = f"""() => {IDLE} && ({CODE_CELLS}.some({FAILED})
-    || {CODE_CELLS}.every(cell => cell.executionCount !== null))"""
 CELL_RAN = f"""index => {{
     const cell = {PANEL}.content.model.cells.get(index);
     return {IDLE} && cell.executionState === 'idle' && cell.executionCount !== null;
@@ -106,19 +102,6 @@ class LabPage:
         """End the kernels of this page's server."""
         self.page.evaluate('() => window.jupyterapp?.serviceManager.sessions.shutdownAll()')
 
-    # Menus and commands
-
-    def menu(self, menu: str, item: str) -> None:
-        """Click an item of JupyterLab's menu bar."""
-        self.page.locator('#jp-MainMenu').get_by_text(menu, exact=True).click()
-        self.page.locator('.lm-Menu').get_by_text(item, exact=True).click()
-
-    def run_all(self) -> None:
-        """Run all cells, and wait until they have run or one has failed."""
-        self.command('notebook:clear-all-cell-outputs')
-        self.menu('Run', 'Run All Cells')
-        self.page.wait_for_function(ALL_RAN, timeout=LIMIT_S * 1000)
-
     def command(self, name: str) -> None:
         """Execute a command of JupyterLab and wait for its end."""
         script = 'name => window.jupyterapp.commands.execute(name).then(() => null)'
@@ -164,6 +147,11 @@ class LabPage:
         self.start(index)
         self.wait_until_ran(index)
         return printed(self.cells()[index])
+
+    def run_here(self) -> None:
+        """Press Ctrl+Enter in the active cell, and wait for its end."""
+        self.page.keyboard.press('Control+Enter')
+        self.wait_until_ran(self.active())
 
     def wait_until_ran(self, index: int) -> None:
         """Wait until a cell has a number, and its kernel nothing to do."""

@@ -73,11 +73,9 @@ def test_run_and_change_a_cell_in_a_slide(deck):
     starter, check = (deck.find('robots', tag) for tag in ('exercise', 'check'))
     deck.walk_to(starter)
     deck.write('robots = 2')
-    deck.page.keyboard.press('Control+Enter')
-    deck.wait_until_ran(starter)
+    deck.run_here()
     deck.walk_to(check)
-    deck.page.keyboard.press('Control+Enter')
-    deck.wait_until_ran(check)
+    deck.run_here()
     assert complaints(deck.cells()[check]) == []
     assert 'All done.' in printed(deck.cells()[check])
     number = deck.page.locator('.jp-deck-mod-visible .jp-InputPlaceholder .jp-InputPrompt').last

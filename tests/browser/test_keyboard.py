@@ -53,8 +53,7 @@ def test_an_instructor_walks_and_runs(deck):
     forth = [deck.active()]
     while forth[-1] < code:
         forth.append(deck.press('Space'))
-    deck.page.keyboard.press('Control+Enter')
-    deck.wait_until_ran(code)
+    deck.run_here()
     back = [deck.active()]
     while back[-1] > 0:
         back.append(deck.press('Shift+Space'))

@@ -132,8 +132,7 @@ def test_letters_are_large_and_the_end_of_an_output_is_seen(deck):
     assert deck.page.evaluate(LETTERS, '.cm-focused .cm-line') >= 20
     deck.page.keyboard.press('Control+A')
     deck.page.keyboard.insert_text(CALLS)
-    deck.page.keyboard.press('Control+Enter')
-    deck.wait_until_ran(code)
+    deck.run_here()
     assert deck.page.evaluate(LAST_LINE) == [True, True, True]
     assert deck.page.evaluate(SCROLLED)
     deck.screenshot('traceback')
@@ -149,8 +148,7 @@ def test_letters_are_large_and_the_end_of_an_output_is_seen(deck):
         assert deck.page.evaluate(SCROLLED) != scrolls
         assert deck.page.evaluate(END_IN_SIGHT) != scrolls
     deck.write('print(1)')
-    deck.page.keyboard.press('Control+Enter')
-    deck.wait_until_ran(code)
+    deck.run_here()
     assert not deck.page.evaluate(SCROLLED)
 
 
@@ -219,8 +217,7 @@ def test_a_clicker_steps_through_a_replay(deck):
     deck.present(LESSON)
     code = walk_to_code(deck)
     deck.write(REPLAY)
-    deck.page.keyboard.press('Control+Enter')
-    deck.wait_until_ran(code)
+    deck.run_here()
     says = deck.page.locator('.jp-deck-mod-onscreen .replay-on [aria-live]')
     for width, tall in ((1024, 768), (1920, 1080), (1280, 720)):
         deck.page.set_viewport_size({'width': width, 'height': tall})

@@ -11,7 +11,8 @@ WITH_A_SLIDER = '04_choose_the_number_of_threads.ipynb'
 
 def test_run_all_and_move_a_slider(lab):
     lab.open(WITH_A_SLIDER)
-    lab.run_all()
+    lab.command('notebook:clear-all-cell-outputs')
+    lab.command('notebook:run-all-cells')
     cells = lab.cells()
     code = [cell for cell in cells if cell['cell_type'] == 'code']
     assert [text for cell in code for text in complaints(cell)] == []
