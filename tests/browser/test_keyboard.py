@@ -2,6 +2,9 @@
 
 from lab_page import HAS_FOCUS, PANEL, LabPage, printed
 
+from tools.lessons.lesson import lessons
+
+START, NEXT = lessons()[:2]
 FOCUSED = '() => document.activeElement.innerText'
 FOLDED = f'() => {PANEL}.content.activeCell.inputHidden'
 OPEN = '() => document.activeElement.parentElement.open'
@@ -25,7 +28,7 @@ def tab_to(lab: LabPage, text: str) -> None:
 
 def test_a_student_runs_solves_looks_at_a_solution_and_goes_on(lab):
     lab.page.goto(lab.server.address)
-    lab.wait_for_notebook('notebooks/00_start_here.ipynb')
+    lab.wait_for_notebook(f'notebooks/{START.file}')
     lab.command('notebook:clear-all-cell-outputs')
     starter, check, solution = (lab.find(tag=tag) for tag in ('exercise', 'check', 'solution'))
     run_to(lab, starter)
@@ -37,11 +40,11 @@ def test_a_student_runs_solves_looks_at_a_solution_and_goes_on(lab):
     assert not lab.page.evaluate(FOLDED)
     lab.screenshot('keyboard_solution')
     run_to(lab, solution + 1)
-    while '01 Publish and subscribe' not in lab.cells()[lab.active()]['source']:
+    while NEXT.next_link not in lab.cells()[lab.active()]['source']:
         lab.leave_with('ArrowUp')
-    tab_to(lab, '01 Publish and subscribe')
+    tab_to(lab, f'{NEXT.number} {NEXT.title}')
     lab.page.keyboard.press('Enter')
-    lab.wait_for_notebook('notebooks/01_publish_and_subscribe.ipynb')
+    lab.wait_for_notebook(f'notebooks/{NEXT.file}')
     run_to(lab, 4)
 
 

@@ -4,10 +4,11 @@ import nbformat
 from lab_page import CUT_OFF, PANEL, SLIDES_SHOWN, printed
 from lab_server import ROOT
 
+from tools.lessons.lesson import lessons
 from tools.lessons.slides import height, slide_types
 
 LESSON = '02_lose_messages.ipynb'
-START, NEXT = '00_start_here.ipynb', '01_publish_and_subscribe.ipynb'
+START, NEXT = lessons()[:2]
 SAVED = f'() => !{PANEL}.context.model.dirty'
 AUTOSAVE = f'() => {PANEL}.context.save()'  # what JupyterLab's timer does
 REPLAY = """from helpers.queue_model import predict
@@ -187,10 +188,10 @@ def test_the_deck_stays_where_it_was(deck):
 
 
 def test_the_next_lesson_is_shown_from_its_link_and_after_each_reload(deck):
-    deck.present(START)
+    deck.present(START.file)
     deck.press('End')
-    deck.page.locator('.jp-deck-mod-onscreen a', has_text='01 Publish').click()
-    deck.wait_for_notebook(f'presentation/{NEXT}')
+    deck.page.locator('.jp-deck-mod-onscreen a', has_text=NEXT.title).click()
+    deck.wait_for_notebook(f'presentation/{NEXT.file}')
     deck.page.wait_for_function(SLIDES_SHOWN)
     deck.page.keyboard.press('Home')
     deck.wait_for_slide(0)
@@ -198,11 +199,11 @@ def test_the_next_lesson_is_shown_from_its_link_and_after_each_reload(deck):
     assert not deck.page.locator('.jp-Deck-Remote-WidgetStack').is_visible()  # it covers code
     for _ in range(2):
         deck.page.reload()
-        deck.wait_for_notebook(f'presentation/{NEXT}')
+        deck.wait_for_notebook(f'presentation/{NEXT.file}')
         deck.wait_for_slide(place)
         deck.page.keyboard.press('Escape')
         deck.page.wait_for_function(IN_SIGHT)
-        assert deck.page.evaluate(f'() => {PANEL}.context.path') == f'presentation/{NEXT}'
+        assert deck.page.evaluate(f'() => {PANEL}.context.path') == f'presentation/{NEXT.file}'
         assert deck.active() == place
 
 
