@@ -154,6 +154,8 @@ ADDED = [
     ('pictures_described', shown(image_png='iVBO')),
     ('pictures_described', new_markdown_cell('![](images/b.png)')),
     ('pictures_described', new_markdown_cell('<img src="images/b.png">')),
+    ('names_stay', code('my_guess = 0')),
+    ('names_stay', code('%time 1\nfor my_guess in [0]:\n    run()')),
     ('exercises_are_checked', code('run()', 'check')),
     ('tagged', note('Ask first.')),
     ('tagged', new_markdown_cell('For the instructor: ask', metadata=note('').metadata)),
@@ -186,6 +188,7 @@ def test_every_rule_is_broken_once():
     [
         code('# Not compared: times.\nrun()', 'nbval-ignore-output'),
         code('run()\n' * rules.MAX_CODE_LINES),
+        code('def run(my_guess):\n    other = [my_guess for my_guess in other]'),
         printed('/dev/shm is empty; the topic /worker, 1/tmp, and/or\n'),
         printed('    python3/site-packages/my_pkg/\n'),
         shown(text_plain='<t>', text_html='t'),

@@ -1,6 +1,7 @@
 """What the code of a cell says."""
 
 import ast
+import symtable
 
 from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
@@ -29,3 +30,18 @@ def guess_of(cell: NotebookNode) -> tuple[str, str, object] | None:
     except (SyntaxError, ValueError):  # of a lesson that is being written
         pass
     return None
+
+
+def names_of(cell: NotebookNode) -> tuple[set[str], set[str]]:
+    """Return the names that a cell gives, and those that it takes from other cells."""
+    try:
+        plain = TransformerManager().transform_cell(cell.source)
+        top = symtable.symtable(plain, 'cell', 'exec')
+    except SyntaxError:  # of a lesson that is being written
+        return set(), set()
+    given = {symbol.get_name() for symbol in top.get_symbols() if symbol.is_assigned()}
+    taken, inside = set(), [top]
+    for table in inside:
+        taken |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
+        inside += table.get_children()
+    return given, taken - given

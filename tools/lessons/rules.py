@@ -14,7 +14,7 @@ from nbformat import NotebookNode
 from nbval.plugin import comment_markers, metadata_tags
 
 from helpers.progress import title_of
-from tools.lessons.code import guess_of
+from tools.lessons.code import guess_of, names_of
 from tools.lessons.lesson import FOLDED, FOLDER, GLOSSARY, LANGUAGES, NOTE, Lesson, tags
 from tools.lessons.slides import PICTURE, SKIPPED, SLIDE, height
 
@@ -185,6 +185,22 @@ def pictures_described(lesson: Lesson) -> Iterator[str]:
 
 
 # Cells
+
+
+def names_stay(lesson: Lesson) -> Iterator[str]:
+    """A cell that is run again, after the last one, takes from others what it took before."""
+    cells = [
+        (name, *names_of(cell)) for name, cell in code_cells(lesson) if 'solution' not in tags(cell)
+    ]
+    for place, (name, _, taken) in enumerate(cells):
+        for word in sorted(taken):
+            before = [one for one, given, _ in cells[:place] if word in given]
+            after = [one for one, given, _ in cells[place:] if word in given]
+            if before and after:
+                yield (
+                    f'{name} takes {word!r} from {before[-1]}, and {after[0]} gives the name to '
+                    f'something else: who runs {name} again gets that. Choose another name.'
+                )
 
 
 def tagged(lesson: Lesson) -> Iterator[str]:
@@ -469,6 +485,7 @@ EVERY: list[Rule] = [
     prints_what_stays,
     compared,
     pictures_described,
+    names_stay,
     tagged,
     fits_a_slide,
     opens,
