@@ -71,8 +71,8 @@ def test_what_is_left_is_named_and_ended(failures):
 
 
 @needs_root
-def test_twice_compares_the_second_pass_too(failures):
-    assert list(failures('twice', COUNT)) == ['code cell 1 again']
+def test_twice_compares_each_cell_again_at_once_and_after_the_last_one(failures):
+    assert list(failures('twice', COUNT)) == ['code cell 1 at once again', 'code cell 1 again']
 
 
 @needs_root

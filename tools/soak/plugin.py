@@ -3,7 +3,7 @@
 The comparison stays nbval's own, with the settings of pyproject.toml. `--soak-mode` says how:
 
 - `once`       as nbval does
-- `twice`      all cells, then all cells again in the same kernel
+- `twice`      each cell twice, then all cells again in the same kernel
 - `interrupt`  each cell is interrupted at a random time, then run again and compared
 - `kill`       the kernel is killed in the middle of a random cell, then all cells in a fresh one
 
@@ -95,10 +95,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
                     _look_after(cell, f'what {cell.name} left when interrupted'),
                     _like(cell, Again, cell.name),
                 ]
+        elif mode == 'twice':
+            for cell in cells:
+                items += [cell, _like(cell, Again, f'{cell.name} at once again')]
+            items += [_like(cell, Again, f'{cell.name} again') for cell in cells]
         else:
             items += cells
-        if mode == 'twice':
-            items += [_like(cell, Again, f'{cell.name} again') for cell in cells]
         items.append(_look_after(cells[-1], 'what is left in the kernel'))
 
 
