@@ -159,6 +159,8 @@ def _run(test: object) -> tuple[bool, str]:
 
 def _found(error: Exception) -> str:
     """Say in one sentence or two what an error says."""
+    if isinstance(error, SystemError) and error.__cause__:  # pybind11 hides a wrong field in one
+        error = error.__cause__
     lines = str(error).splitlines()
     if not lines:
         return f'{type(error).__name__} in {traceback.extract_tb(error.__traceback__)[-1].name}()'
@@ -166,5 +168,5 @@ def _found(error: Exception) -> str:
     text = ' '.join(lines[: 2 if isinstance(error, TimeoutError) else 1])
     found = re.sub(r' at 0x[0-9a-fA-F]+', '', f'{type(error).__name__}: {text}')
     if re.match(r'[A-Z]\w*\.\w+\(\) missing 1 required positional argument', text):
-        found += '. Does a class stand there without ()?'
+        found += '. Are () missing after a class, or too many after a callback?'
     return found

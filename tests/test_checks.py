@@ -134,6 +134,9 @@ def test_what_the_code_did_is_said(capsys, title):
     def late():
         raise TimeoutError('Waited 30 s in vain.\nNo publisher: /scans.\nmore')
 
+    def hidden():  # as publish() does for a float in an Int32
+        raise SystemError('returned a result with an exception set') from TypeError('a float')
+
     check(
         title,
         ('2, 4, 42', lambda: heard == [2, 4, 42] or f'your node published {heard}', ''),
@@ -143,6 +146,7 @@ def test_what_the_code_did_is_said(capsys, title):
         ('it ends', empty, ''),
         ('it is heard', late, ''),
         ('it is in a group', lambda: Group.add('a timer'), ''),
+        ('it publishes', hidden, ''),
         ('some', [], ''),
         ('equal', np.bool_(True), ''),
     )
@@ -160,11 +164,13 @@ def test_what_the_code_did_is_said(capsys, title):
         '[not yet] it is heard',
         '    Found: TimeoutError: Waited 30 s in vain. No publisher: /scans.',
         '[not yet] it is in a group',
-        "    Found: TypeError: Group.add() missing 1 required positional argument: 'timer'. Does a",
-        '          class stand there without ()?',
+        "    Found: TypeError: Group.add() missing 1 required positional argument: 'timer'. Are ()",
+        '          missing after a class, or too many after a callback?',
+        '[not yet] it publishes',
+        '    Found: TypeError: a float',
         '[not yet] some',
         '[ok] equal',
-        f'{title}: 2 of 9.',
+        f'{title}: 2 of 10.',
     ]
 
 
