@@ -10,6 +10,7 @@ QUOTED = r'"(?:\\.|[^"\\])*"'
 COMMENT = re.compile(rf'({QUOTED})|#[^\n]*', re.DOTALL)
 COMMAND = re.compile(rf'(\w+)\s*\(((?:{QUOTED}|[^()"])*)\)', re.DOTALL)
 ARGUMENT = re.compile(rf'{QUOTED}|[^\s;"]+', re.DOTALL)
+VARIABLE = re.compile(r'\$\{(\w+)\}')
 
 
 class CMakeLists(NamedTuple):
@@ -27,7 +28,7 @@ class CMakeLists(NamedTuple):
 
 
 def read_cmake_lists(text: str) -> CMakeLists:
-    """Read the text of a CMakeLists.txt, without following its variables.
+    """Read the text of a CMakeLists.txt. Of its variables, only those of set() are followed.
 
     Raises ValueError where a parenthesis is not closed, or closes nothing.
     """
@@ -36,10 +37,16 @@ def read_cmake_lists(text: str) -> CMakeLists:
     if unquoted.count('(') != unquoted.count(')'):
         raise ValueError("A parenthesis is not closed, or there is a ')' too many.")
     read = CMakeLists(set(), set(), [], [])
+    values: dict[str, list[str]] = {}
     for name, arguments in COMMAND.findall(text):
         command = name.lower()
-        words = [word.strip('"') for word in ARGUMENT.findall(arguments)]
-        if command == 'find_package' and GENERATE not in read.commands:
+        words = []
+        for word in (argument.strip('"') for argument in ARGUMENT.findall(arguments)):
+            variable = VARIABLE.fullmatch(word)
+            words += values.get(variable[1], [word]) if variable else [word]
+        if command == 'set' and words:
+            values[words[0]] = words[1:]
+        elif command == 'find_package' and GENERATE not in read.commands:
             read.found.update(words[:1])
         elif command == GENERATE:
             end = words.index('DEPENDENCIES') if 'DEPENDENCIES' in words else len(words)

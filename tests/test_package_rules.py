@@ -274,3 +274,14 @@ def test_how_a_file_may_be_written():
     assert read.files == ['msg/A.msg', 'srv/B.srv']
     assert read.dependencies == ['one', 'two', 'three']
     assert read_cmake_lists('rosidl_generate_interfaces(x a.msg)').files == ['a.msg']
+
+
+def test_variables_of_set_are_followed():
+    read = read_cmake_lists("""
+        set(services "srv/A.srv" srv/B.srv)
+        set(needed one)
+        rosidl_generate_interfaces(${PROJECT_NAME} ${services} "${unknown}"
+          DEPENDENCIES ${needed} two)
+    """)
+    assert read.files == ['srv/A.srv', 'srv/B.srv', '${unknown}']
+    assert read.dependencies == ['one', 'two']
