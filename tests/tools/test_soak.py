@@ -71,6 +71,14 @@ def test_what_is_left_is_named_and_ended(failures):
 
 
 @needs_root
+def test_where_a_cell_hangs_is_told(failures, monkeypatch):
+    monkeypatch.setattr(soak, 'SLOW_S', 0.5)
+    found = failures('idle', ('import threading\nthreading.Event().wait(2)', 'something else\n'))
+    assert list(found) == ['code cell 1', 'where cells stood after 0.5 s']
+    assert ' in wait\n' in found['where cells stood after 0.5 s']
+
+
+@needs_root
 def test_twice_compares_each_cell_again_at_once_and_after_the_last_one(failures):
     assert list(failures('twice', COUNT)) == ['code cell 1 at once again', 'code cell 1 again']
 

@@ -25,6 +25,7 @@ from tools.soak.conditions import CACHE, CONDITIONS, ROOT, Condition
 
 RUNS = CACHE / 'runs.jsonl'
 RUN_TIMEOUT_S = 1800.0
+SLOW_S = 90.0  # nbval gives a cell 100
 # What would be in the home otherwise.
 STATE = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR', 'IPYTHONDIR')
 STATE += ('ROS_LOG_DIR', 'MPLCONFIGDIR')
@@ -56,6 +57,7 @@ def run(notebooks: list[Path], condition: Condition, python: str = sys.executabl
             (folder / part).mkdir()
         variables = os.environ | {'HOME': f'{folder}/home', 'TMPDIR': f'{folder}/tmp'}
         variables |= dict.fromkeys(STATE, f'{folder}/state') | condition.variables
+        variables |= {'SOAK_SLOW_S': str(SLOW_S), 'SOAK_STACKS': f'{folder}/stacks'}
         before = files_of(folder)
         loop = [sys.executable, '-ISc', 'while True: pass']
         loops = [subprocess.Popen(loop) for _ in range(condition.busy_loops)]
@@ -86,6 +88,9 @@ def run(notebooks: list[Path], condition: Condition, python: str = sys.executabl
         if status and not any(row['failed'] for row in rows):
             printed = '\n'.join(_lines(folder / 'printed'))
             failures.append(('no cell', f'pytest ended with {status}: {printed}'))
+        stacks = '\n'.join(_lines(folder / 'stacks'))
+        if stacks and (failures or any(row['failed'] for row in rows)):
+            failures.append((f'where cells stood after {SLOW_S:g} s', stacks))
     name = notebooks[0].stem if len(notebooks) == 1 else 'all'
     rows += [{'notebook': name, 'item': item, 'failed': text} for item, text in failures]
     return [row | {'condition': condition.name, 'began': began} for row in rows]

@@ -1,9 +1,11 @@
 """What a run of a notebook leaves behind: threads, processes, shared memory.
 
-`look` looks at a kernel from inside. When all kernels have ended, this module as a program looks at
-the run: it has a /dev/shm and a table of processes of its own, so that whatever is there was left.
+`look` looks at a kernel from inside, and lets it note where a cell hangs. When all kernels have
+ended, this module as a program looks at the run: it has a /dev/shm and a table of processes of its
+own, so that whatever is there was left.
 """
 
+import faulthandler
 import os
 import re
 import threading
@@ -37,11 +39,25 @@ def look() -> None:
     now = state_of_process()
     if _before is None:
         _before = now
+        _note_where_cells_hang(float(os.environ['SOAK_SLOW_S']), os.environ['SOAK_STACKS'])
     left = now.keys() - _before.keys()
     while left and all(map(ENDS_LATER.fullmatch, left)) and time.monotonic() < deadline:
         time.sleep(0.01)
         left &= state_of_process().keys()
     assert not left, ' '.join(now[key] for key in sorted(left))
+
+
+def _note_where_cells_hang(slow_s: float, file: str) -> None:
+    """Write the stack of each thread to a file when a cell takes longer than some seconds."""
+    from IPython import get_ipython
+
+    stacks = open(file, 'a')  # noqa: SIM115, it is for the kernel's life
+    events = get_ipython().events
+    # C does it: also where the cell holds the GIL, or waits for it.
+    events.register(
+        'pre_run_cell', lambda info: faulthandler.dump_traceback_later(slow_s, file=stacks)
+    )
+    events.register('post_run_cell', lambda result: faulthandler.cancel_dump_traceback_later())
 
 
 def state_of_process() -> dict[str, str]:
