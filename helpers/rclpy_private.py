@@ -6,6 +6,7 @@ is gone, and another one that no other module touches any.
 
 from __future__ import annotations
 
+import gc
 import sys
 import threading
 import warnings
@@ -94,7 +95,15 @@ def _state(frame: FrameType) -> str:
 
 def frames(threads: list[threading.Thread]) -> list[tuple[threading.Thread, FrameType]]:
     """Return the innermost frame of each thread. A thread that has ended has none."""
-    current = sys._current_frames()
+    collects = gc.isenabled()
+    try:
+        # Before Python 3.11.9, a collection that frees a threading.local hangs in the next call:
+        # https://github.com/python/cpython/issues/106883
+        gc.disable()
+        current = sys._current_frames()
+    finally:
+        if collects:
+            gc.enable()
     return [(thread, current[thread.ident]) for thread in threads if thread.ident in current]
 
 

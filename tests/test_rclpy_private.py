@@ -2,6 +2,8 @@
 
 import ast
 import inspect
+import subprocess
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor, thread
 from importlib.metadata import version
@@ -51,6 +53,25 @@ def test_where_a_thread_waits_can_be_seen():
     assert 'work_queue.get(block=True)' in inspect.getsource(thread), (
         'An idle thread of a pool no longer waits in concurrent.futures.thread.'
     )
+
+
+COLLECTS = """
+import gc, threading
+from helpers.rclpy_private import frames
+gc.set_threshold(1)
+for _ in range(1000):
+    local = threading.local()
+    local.itself = local
+    del local
+    [(_, frame)] = frames([threading.current_thread()])
+    assert gc.isenabled()
+print(frame.f_code.co_name)
+"""
+
+
+def test_a_garbage_collection_does_not_hang_the_look_at_frames():
+    command = [sys.executable, '-c', COLLECTS]
+    assert subprocess.check_output(command, cwd=CHECKOUT, timeout=60) == b'frames\n'
 
 
 # What a module touches of a package for which rclpy_private.py is no place.
