@@ -391,6 +391,8 @@ def _made_by(node: Node) -> Iterator:
 
 def _destroy(node: Node) -> None:
     for destroy in (
+        # One that the cell spins itself holds what it found ready, as long as a variable holds it.
+        lambda: node.executor.shutdown(timeout_sec=0),
         lambda: _destroy_actions(node),
         node.destroy_node,
         lambda: Node.destroy_node(node),  # past a mistake in an own destroy_node

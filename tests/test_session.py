@@ -477,6 +477,19 @@ def test_actions_leave_nothing():
     del server  # until here it is held, as by a variable of a notebook
 
 
+def test_an_executor_that_the_cell_spins_leaves_nothing():
+    """rclpy keeps what an executor has found ready until it is spun again, or shut down."""
+    with nothing_left(), ros_session() as session:
+        node, executor = Node('node'), SingleThreadedExecutor()
+        server = ActionServer(node, Fibonacci, 'count', lambda goal_handle: Fibonacci.Result())
+        client = ActionClient(node, Fibonacci, 'count')
+        executor.add_node(node)
+        session.wait_until(client.server_is_ready, LIMIT_S)
+        goal = client.send_goal_async(Fibonacci.Goal())
+        session.wait_until(lambda: executor.spin_once(timeout_sec=0) or goal.done(), LIMIT_S)
+    del server  # until here it and the executor are held, as by variables of a notebook
+
+
 @pytest.mark.parametrize(
     'make',
     [
