@@ -57,6 +57,8 @@ def build_environment() -> dict[str, str]:
     environment |= {'LC_ALL': 'C.UTF-8', 'MAKEFLAGS': f'-j{cores} -O', 'PYTHONUTF8': '1'}
     here = Path(sys.executable).parent
     environment['PATH'] = f'{here}{os.pathsep}{os.environ.get("PATH", os.defpath)}'
+    if ' ' in sys.executable:  # colcon's setup.bash does not quote it
+        environment['COLCON_PYTHON_EXECUTABLE'] = getattr(sys, '_base_executable', sys.executable)
     if sys.prefix != sys.base_prefix:
         environment['VIRTUAL_ENV'] = sys.prefix
     if wheels:

@@ -33,6 +33,13 @@ def test_nothing_that_was_set_for_other_work_reaches_a_build(monkeypatch):
     assert seen['MAKEFLAGS'] == f'-j{len(os.sched_getaffinity(0))} -O'
 
 
+def test_colcon_finds_a_python_in_a_folder_with_a_blank(monkeypatch):
+    """Its setup.bash does not quote the folder."""
+    assert 'COLCON_PYTHON_EXECUTABLE' not in build_environment()
+    monkeypatch.setattr(sys, 'executable', '/my lessons/.venv/bin/python')
+    assert build_environment()['COLCON_PYTHON_EXECUTABLE'] == sys._base_executable
+
+
 def test_without_the_wheels_the_sourced_ros_is_the_one_to_build_with(monkeypatch):
     set_hostile(monkeypatch)
     monkeypatch.setattr(module, 'from_wheels', lambda: False)

@@ -26,13 +26,10 @@ def source(workspace: Path) -> dict[str, str]:
     setup = workspace / 'install' / 'setup.bash'
     if not setup.is_file():
         raise RuntimeError('Nothing has been built: call build() first, and read its result.')
-    environment = build_environment()
-    if ' ' in sys.executable:  # colcon's setup.bash does not quote it
-        environment['COLCON_PYTHON_EXECUTABLE'] = getattr(sys, '_base_executable', sys.executable)
     with uninterrupted():
         answer = subprocess.run(
             ['bash', '--norc', '-c', 'source "$0" > /dev/null 2>&1; env -0', str(setup)],
-            env=environment,
+            env=build_environment(),
             cwd=workspace,
             capture_output=True,
             timeout=SOURCE_TIMEOUT_S,
