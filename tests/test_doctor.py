@@ -71,7 +71,7 @@ def test_only_a_required_check_decides(tmp_path):
     assert answer.returncode == 1
     assert 'run `unset RMW_IMPLEMENTATION`, and' in row_of(answer.stdout, 'rclpy')
     assert row_of(answer.stdout, 'C++ compiler') == (
-        'C++ compiler optional none that works: for the lessons on packages run '
+        'C++ compiler optional none that works: for lessons that build packages run '
         '`sudo apt install g++`'
     )
     summary = answer.stdout[answer.stdout.index('This machine is not ready: 2 of 5') :]

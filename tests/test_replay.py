@@ -225,6 +225,8 @@ def test_a_circle_is_said(script):
     ]
     said = [move['says'] for move in one_thread['done']]
     assert said[-1] == 'Tick 0 of timer asks look and waits: its thread and its group wait with it.'
+    reentrant = script.call('play', services(1, 'Reentrant', {'call': 1, 'client': 2}))
+    assert reentrant['done'][-1]['says'].endswith(' waits: its thread waits with it.')
 
 
 def counting(*does):

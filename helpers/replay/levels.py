@@ -254,11 +254,15 @@ def _cancel(threads: int, job: str) -> Variant:
         return Fibonacci.Result()
 """
     if threads == 1:
+        too_late = (
+            'Too late: the job holds the only thread until it ends. The real rclpy then answers '
+            'that the goal has ended, and asks nobody.'
+        )
         lesson = (
-            'Too late: the job holds the only thread until it ends. No order changes that, and '
-            'it does not help that the job looks. Try two threads.'
+            f'{too_late} No order changes that, and it does not help that the job looks. '
+            'Try two threads.'
             if looks
-            else 'Too late: the job holds the only thread until it ends. Try two threads.'
+            else f'{too_late} Try two threads.'
         )
     elif looks:
         lesson = 'The second thread took the cancel while the job ran, and the job looked.'

@@ -305,10 +305,12 @@ function queueModel() {
     }
     run.waits = 'answer';
     const asked = `${who} and waits`;
-    if (now.call !== undefined) return `${asked}: its thread and its group wait with it.`;
+    const { exclusive } = groupOf(setup, run.callback);
+    if (now.call !== undefined)
+      return `${asked}: its thread ${exclusive ? 'and its group wait' : 'waits'} with it.`;
     state.runs[run.thread] = null;
     state.asleep.push(run);
-    return `${asked}: its thread is free again, its group is not.`;
+    return `${asked}: its thread is free again${exclusive ? ', its group is not' : ''}.`;
   }
 
   function end(setup, state, thread) {
