@@ -46,7 +46,7 @@ test-container: set_up ## the container and a class in it, on a Debian from debo
 	@tools/hub/set_up.sh || echo 'LEFT OUT: a class in containers.'
 	@$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 tests/container $(PYTEST_ARGS)
 
-handout: set_up ## a student's edition as one archive: SOLUTIONS=no, OFFLINE=yes (PYTHONS="3.11 3.12") add the packages
+handout: set_up ## a student's edition as one archive: SOLUTIONS=no leaves the solutions out, OFFLINE=yes (PYTHONS="3.11 3.12") adds the packages
 	@$(PYTHON) -m tools.lessons.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
 		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
 
@@ -90,8 +90,9 @@ licences: ## write licences.md from the lock files and what the packages say
 	@for group in browser site hub; do tools/set_up.sh $$group || exit; done
 	@$(PYTHON) -m tools.licences
 
-clean: ## remove the environment, JupyterLab's state, caches and what lessons built
-	rm -rf .venv .jupyter .soak scratch slides handout site .site book.pdf .hypothesis .pytest_cache .ruff_cache
+clean: ## remove the environment, JupyterLab's state, caches and what lessons built; students' files stay
+	if [ -d .jupyter ]; then find .jupyter -mindepth 1 -maxdepth 1 ! -name hub -exec rm -rf {} +; fi
+	rm -rf .venv .soak scratch slides handout site .site book.pdf .hypothesis .pytest_cache .ruff_cache
 	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
 set_up:

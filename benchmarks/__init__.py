@@ -1,1 +1,1 @@
-"""Measurements for an idle machine, run by `python -m benchmarks`."""
+"""Measurements for an idle machine, run by `make bench`."""

@@ -1,7 +1,7 @@
 """What things cost, each beside what it is compared with. For an idle machine.
 
-    python -m benchmarks                    all of them
-    python -m benchmarks latency model      some of them
+    make bench                              all of them
+    make bench ONLY="latency model"         some of them
 
 No number fails: a reader judges the ratios.
 """
