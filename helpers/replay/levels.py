@@ -294,7 +294,7 @@ LEVELS = {
     'save': Level(
         'A camera sends a picture every second. Your program needs 3.5 seconds for each, one after '
         'the other. Meanwhile two more can wait; when another comes, the oldest of them is thrown '
-        'away. You are the program: choose what it does next, and lose no picture.',
+        'away. Choose what the program does next, and lose no picture.',
         'keep',
         _save,
         {},
