@@ -47,6 +47,7 @@ TEXT = 200  # letters of a text, at most
 ITEMS = 20  # of a list or a set, at most
 UNUSABLE = 'The class hears nothing, because {} cannot be used ({}): remove it, then join again.'
 NOT_JOINED = 'You are in no class: join_class(address, code) joins one.'
+NO_LESSON = 'Nothing is told, because this notebook is no lesson: do it in the lesson itself.'
 SENT = (
     'Sent to it: your guesses and what you measured, which exercises you tried and solved, at '
     'which step you are, and a raised hand. Not sent: your code and its outputs.'
@@ -88,7 +89,7 @@ def join_class(address: str = '', code: str = '', name: str = '') -> None:
     one sentence; nothing is raised.
     """
     try:
-        text = _join(address.strip(), code, name)
+        text = _join(str(address).strip(), code, name)
     except ValueError as problem:
         text = str(problem)
     except (OSError, sqlite3.Error) as problem:
@@ -150,7 +151,7 @@ class _Outbox:
     def __init__(self) -> None:
         self._events: deque[dict] = deque()  # until they are in the file
         self._came = threading.Event()
-        self._lock = threading.Lock()
+        self._lock, self._keeping = threading.Lock(), threading.Lock()
         self._thread: threading.Thread | None = None
         self._trouble = self._said = ''
         atexit.register(self._at_exit)
@@ -194,25 +195,26 @@ class _Outbox:
                     self._keep(db)
 
     def _keep(self, db: sqlite3.Connection) -> None:
-        """Move events into the file. Two threads may move the same: an id stands there once."""
-        events = list(self._events)
-        with db:
-            for event in events:
-                if event['kind'] == 'cell':  # only the last one matters
-                    db.execute("DELETE FROM waiting WHERE kind = 'cell'")
-                row = event['id'], event['kind'], json.dumps(event)
-                db.execute('INSERT OR IGNORE INTO waiting (id, kind, event) VALUES (?, ?, ?)', row)
-            newest = '(SELECT n FROM waiting ORDER BY n DESC LIMIT ?)'
-            db.execute(f'DELETE FROM waiting WHERE n NOT IN {newest}', [WAITING])
-        for _ in events:
-            self._events.popleft()
+        """Move events into the file."""
+        with self._keeping:  # the thread, and the one that ends the kernel
+            events = list(self._events)
+            with db:
+                for event in events:
+                    if event['kind'] == 'cell':  # only the last one matters
+                        db.execute("DELETE FROM waiting WHERE kind = 'cell'")
+                    row = event['id'], event['kind'], json.dumps(event)
+                    db.execute('INSERT INTO waiting (id, kind, event) VALUES (?, ?, ?)', row)
+                newest = '(SELECT n FROM waiting ORDER BY n DESC LIMIT ?)'
+                db.execute(f'DELETE FROM waiting WHERE n NOT IN {newest}', [WAITING])
+            for _ in events:
+                self._events.popleft()
 
     def _deliver(self, db: sqlite3.Connection) -> bool:
         """Send what is in the file. Return whether something is left for later."""
         while (known := _class(db)) and (rows := _first(db)):
             try:
                 _ask(known, 'events', {'events': [json.loads(event) for _, event in rows]})
-            except ValueError as refused:  # the class does not know this seat any more
+            except ValueError as refused:  # the class knows no such seat, or no such event
                 with db:
                     db.execute('DELETE FROM waiting')
                     if not os.environ.get(HUB_VARIABLE):
@@ -247,7 +249,7 @@ def _hand(up: bool, text: str) -> None:
     with suppress(OSError, sqlite3.Error):
         known = _known()
     _tell('hand', up=up)
-    print(text if known else NOT_JOINED)
+    print((text if _lesson() else NO_LESSON) if known else NOT_JOINED)
     _outbox.say_trouble()
 
 
@@ -265,21 +267,22 @@ def _join(address: str, code: str, name: str) -> str:
     token = known.token if known and known.url == url else _hub_token()
     try:
         answer = _ask(Class(url, token), 'join', {'code': code, 'name': name})
-    except OSError as problem:
+        given, seat = answer['token'], answer['seat']
+    except (OSError, KeyError) as problem:  # what answers without a seat is no class
         raise ValueError(
             f'No class answers at {address} ({problem}). Compare the address with the wall; is '
             'this computer in the same network?'
         ) from None
     with closing(_open(path)) as db, db:
-        if answer['token'] != token:
+        if given != token:
             db.execute('DELETE FROM waiting')
         db.execute('DELETE FROM class')
         if not hub:
             until_s = time.time() + JOINED_FOR_S
-            db.execute('INSERT INTO class VALUES (?, ?, ?)', (url, answer['token'], until_s))
+            db.execute('INSERT INTO class VALUES (?, ?, ?)', (url, given, until_s))
     called = f', called {name}. {SENT}' if name else f'. {SENT} Nor your name.'
     return (
-        f'You are in the class of {address} on seat {answer["seat"]}{called} '
+        f'You are in the class of {address} on seat {seat}{called} '
         'leave_class() ends it, raise_hand() says that you are lost.'
     )
 
@@ -296,7 +299,7 @@ def _ask(known: Class, what: str, body: object) -> dict:
         with opener.open(wanted, timeout=ANSWER_LIMIT_S) as answer:
             return dict(json.load(answer))
     except error.HTTPError as refused:
-        later = refused.code == 429 and what == 'events'
+        later = what == 'events' and (refused.code == 429 or refused.code >= 500)
         with suppress(KeyError, TypeError, json.JSONDecodeError):
             reason = str(json.load(refused)['error'])
             raise (OSError if later else ValueError)(reason) from None

@@ -4,6 +4,8 @@ import contextlib
 import csv
 import json
 import socket
+import threading
+from http.server import BaseHTTPRequestHandler, HTTPServer
 
 import pytest
 from support.classes import LATER, OTHER, QUESTION, STEP, running_class, student
@@ -181,6 +183,13 @@ def test_the_next_notebook_is_in_the_class_until_the_student_leaves(opened, tmp_
     assert in_kernel(tmp_path, 'leave_class()') == classroom.NOT_JOINED
 
 
+def test_a_hand_in_a_notebook_that_is_no_lesson(opened, tmp_path):
+    in_kernel(tmp_path, join(opened))
+    copied = {'JPY_SESSION_NAME': '/home/ada/02_lose_messages-Copy1.ipynb'}
+    assert in_kernel(tmp_path, 'raise_hand()', **copied) == classroom.NO_LESSON
+    assert opened.csv()[1:] == []
+
+
 def test_the_steps_of_the_cells_that_run(opened, tmp_path):
     script = f"""
 shell.run_cell('from helpers.classroom import *', cell_id={STEP!r})
@@ -204,6 +213,48 @@ def test_a_code_that_is_wrong(opened, tmp_path):
 
 
 # --- When the class does not answer --------------------------------------------------------------
+
+
+class Broken(BaseHTTPRequestHandler):
+    """Answers a class's `join`, and everything else with what a server says that has failed."""
+
+    seat = {'token': 'secret', 'seat': 7}
+
+    def do_POST(self):
+        self.rfile.read(int(self.headers['Content-Length']))
+        joins = self.path == '/join'
+        self.send_response(200 if joins else 500)
+        self.end_headers()
+        self.wfile.write(json.dumps(self.seat if joins else {'error': 'Broken (500).'}).encode())
+
+    def log_message(self, *arguments):
+        """Print nothing."""
+
+
+@pytest.fixture
+def broken():
+    """Yield the address of a class that fails."""
+    with HTTPServer(('127.0.0.1', 0), Broken) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        yield f'127.0.0.1:{server.server_port}'
+        server.shutdown()
+        thread.join()
+
+
+def test_a_class_that_fails_is_not_left(broken, tmp_path):
+    begin = f"import time\njoin_class({broken!r}, 'a-b-c')\nguess({QUESTION!r}, 1)\ntime.sleep(1)\n"
+    said = in_kernel(tmp_path, f'{begin}raise_hand()')
+    assert 'on seat 7' in said
+    assert said.endswith('The class does not answer. What you tell is kept until it does.')
+    said = in_kernel(tmp_path, 'leave_class()')
+    assert said == 'You have left the class. It did not answer: what it was told stays there.'
+
+
+def test_what_answers_without_a_seat_is_no_class(broken, folder, capsys, monkeypatch):
+    monkeypatch.setattr(Broken, 'seat', {'ok': True})
+    classroom.join_class(broken, 'a-b-c')
+    assert capsys.readouterr().out.startswith(f'No class answers at {broken} (')
 
 
 def test_who_joins_again_keeps_the_seat_and_what_waits(tmp_path):

@@ -33,6 +33,7 @@ from support.waits import START_LIMIT_S, wait_for
 
 from helpers.classroom import HUB_VARIABLE
 from tools.addresses import in_networks
+from tools.class_server.__main__ import main
 from tools.class_server.lessons import Known
 from tools.class_server.store import BARS, EVENTS_OF_SEAT, SEATS, WORDS, Class, bars
 from tools.class_server.web import EVENTS_AT_ONCE, WRONG_A_MINUTE
@@ -444,6 +445,17 @@ def test_forgetting_leaves_nothing_in_the_file(store):
         assert b'Lovelace' not in path.read_bytes(), path
         assert b'what was said' not in path.read_bytes(), path
     assert store.take(seat, [event(number=1)]) == ''
+
+
+# --- Its command --------------------------------------------------------------------------------
+
+
+def test_a_certificate_that_is_not_there(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv('JUPYTER_CONFIG_DIR', str(tmp_path))
+    with pytest.raises(SystemExit):
+        main(['--no-browser', '--ssl-cert', str(tmp_path / 'class.cert')])
+    assert '--ssl-cert and --ssl-key must both name a file.' in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 # --- A network that is cut -----------------------------------------------------------------------

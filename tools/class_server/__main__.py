@@ -76,6 +76,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--ssl-cert', help='a certificate, as that of the hub')
     parser.add_argument('--ssl-key')
     options = parser.parse_args(arguments)
+    tls = options.ssl_cert, options.ssl_key
+    if any(tls) and not all(file and Path(file).is_file() for file in tls):
+        parser.error('--ssl-cert and --ssl-key must both name a file.')
     store = Class(folder() / FILE, known_lessons(options.root))
     try:
         asyncio.run(hold(store, options))

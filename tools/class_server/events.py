@@ -5,13 +5,16 @@ import time
 
 from jsonschema import Draft202012Validator
 
+from helpers.classroom import BATCH, ITEMS, LARGEST
+from helpers.classroom import TEXT as LONGEST
+
 LARGEST_BODY = 256 * 1024  # bytes
-NUMBER = {'type': 'number', 'minimum': -(2**53), 'maximum': 2**53}
+NUMBER = {'type': 'number', 'minimum': -LARGEST, 'maximum': LARGEST}
 # No letter may end a line, be unseen, or turn the direction of reading.
 PRINTABLE = r'^[^\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]*\Z'
-TEXT = {'type': 'string', 'maxLength': 200, 'pattern': PRINTABLE}
+TEXT = {'type': 'string', 'maxLength': LONGEST, 'pattern': PRINTABLE}
 PLAIN = {'anyOf': [{'type': 'boolean'}, NUMBER, TEXT]}
-VALUE = {'anyOf': [PLAIN, {'type': 'array', 'maxItems': 20, 'items': PLAIN}]}
+VALUE = {'anyOf': [PLAIN, {'type': 'array', 'maxItems': ITEMS, 'items': PLAIN}]}
 
 
 def _form(**fields: dict) -> Draft202012Validator:
@@ -32,7 +35,7 @@ KINDS = {
     'cell': _form(**EVENT, cell=TEXT),
     'hand': _form(**EVENT, up={'type': 'boolean'}),
 }
-EVENTS = _form(events={'type': 'array', 'maxItems': 50})
+EVENTS = _form(events={'type': 'array', 'maxItems': BATCH})
 JOIN = _form(code=TEXT, name=TEXT | {'maxLength': 40})
 
 
