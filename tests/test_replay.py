@@ -5,7 +5,6 @@ import math
 import re
 import subprocess
 import sys
-import time
 from copy import deepcopy
 from html import unescape
 from pathlib import Path
@@ -327,43 +326,6 @@ def test_of_each_step_the_numbers_are_known(script):
     assert [14, 4] in about
 
 
-@tries(150)
-@given(
-    st.one_of(
-        happenings(),
-        runs(40).map(lambda run: (predict(*run), run[2], run[3])),
-    ),
-    st.data(),
-)
-def test_a_part_is_as_in_the_whole(script, happening, data):
-    table, depth, workers = happening
-    first = data.draw(st.integers(0, len(table) - 1))
-    last = data.draw(st.integers(first, len(table) - 1))
-    group = EXCLUSIVE if workers == 1 else REENTRANT
-    run = depth, max(workers, table['thread'].nunique()), group
-    whole = script.call('states', record(replay(table, *run)))
-    shown = replay(table, *run, part=(first, last))
-    part = script.call('states', record(shown))
-    begin = next(i for i, s in enumerate(whole) if s['says'].startswith(f'Message {first} arr'))
-    for here, there in zip(part[1:], whole[begin:], strict=False):
-        assert {**here, 'lost': []} == {**there, 'lost': []}
-    # All that becomes of its messages is shown: where the whole says no more of them, it ends.
-    own = set(range(first, last + 1))
-    at_end = whole[begin + len(part) - 2 :]
-    assert not own & {seq for state in at_end[1:] for seq in state['threads']}
-    lost = {seq for seq, _ in part[-1]['lost']} & own
-    assert lost == {seq for seq, _ in whole[-1]['lost']} & own
-    assert str(shown).startswith(f'Replay: {len(own)} messages')
-
-
-def test_a_part_of_a_million_is_cut_out_first():
-    table = predict(0.001, 0.0035, 10, 1, 1_000_000)
-    start = time.process_time()
-    shown = replay(table, 10, part=(500_000, 500_099))
-    assert time.process_time() - start < 10  # all events took 80 s; idle it is 0.5 s
-    assert len(shown.runs[0].moves) < 300
-
-
 def test_where_nothing_was_heard(script):
     table = made_table([0, 1, 2, 3], {})
     shown = replay(table, depth=2)
@@ -447,7 +409,6 @@ BAD = predict(0.05, 0.2, 10, 1, 41)
         (BAD, {'depth': 0}, 'depth must be a whole number from 1 up, not 0.'),
         (BAD, {'threads': 0}, 'threads must be a whole number from 1 up, not 0.'),
         (BAD, {'group': 'x'}, "group must be 'mutually exclusive' or 'reentrant', not 'x'."),
-        (BAD, {'part': (50, 60)}, 'There is no message from 50 to 60.'),
         (BAD, {'depth': 3}, 'No queue of depth 3 with one callback at a time can have made'),
         (BAD.assign(thread=None), {}, 'It is not known which thread ran message 0.'),
         (BAD.assign(finished_s=0.0), {}, 'The callback of message 1 ended before it started.'),
@@ -460,7 +421,7 @@ BAD = predict(0.05, 0.2, 10, 1, 41)
         (
             predict(0.01, 0.005, 10, 1, 10_001),
             {},
-            '10,001 messages are too many to step through. Ask for a smaller part: part=(0, 999).',
+            '10,001 messages are too many to step through: at most 10,000.',
         ),
     ],
 )

@@ -9,18 +9,16 @@ model.js decides what may happen, view.js shows it.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
 from itertools import chain
 
-import numpy as np
 import pandas as pd
 
 from helpers.queue_model import check_count
-from helpers.replay.events import ARRIVE, END, TAKE, Event, events
+from helpers.replay.events import ARRIVE, END, TAKE, events
 from helpers.replay.model import stories
 from helpers.replay.picture import (
     LEFT,
@@ -50,7 +48,7 @@ CROSSES_IN_WORDS = (
 
 @dataclass(frozen=True)
 class Run:
-    """A run as it is replayed. `first` is how many moves come before the part that is shown.
+    """A run as it is replayed.
 
     `summary` is what is true of the run each time that it is made. A move is [microseconds, its
     kind, two numbers], as walk.js reads it.
@@ -61,16 +59,14 @@ class Run:
     lost: bool
     setup: dict
     moves: list[list[int]]
-    first: int = 0
     time_label: str = 'time since the first publish (s)'
     after_s: float = 0.0
 
     @property
     def span_s(self) -> tuple[float, float]:
         """From when to when it is shown: to a little after its last event, at least `after_s`."""
-        start = self.moves[self.first][0] / 1e6 if self.first else 0.0
         end = self.moves[-1][0] / 1e6
-        return start, end + (max(0.02 * (end - start), self.after_s) or 1.0)
+        return 0.0, end + (max(0.02 * end, self.after_s) or 1.0)
 
     @cached_property
     def messages(self) -> list[dict]:
@@ -93,7 +89,7 @@ class Run:
 
     def record(self) -> dict:
         """Return what the script needs."""
-        return {name: getattr(self, name) for name in ('name', 'setup', 'moves', 'first')}
+        return {name: getattr(self, name) for name in ('name', 'setup', 'moves')}
 
     @property
     def alternative(self) -> str:
@@ -145,18 +141,15 @@ def replay(
     depth: int,
     threads: int = 1,
     group: str = EXCLUSIVE,
-    *,
-    part: tuple[int, int] | None = None,
 ) -> Replay:
     """Return a run to step through. `table` is one of `Recording.table` or of `predict`.
 
     `depth` is that of the subscription's KEEP_LAST queue, `threads` how many the executor has, and
     `group` is 'mutually exclusive' or 'reentrant'. Where no callback ran at all, it is shown that
-    no executor took a message. `part` shows only the messages with numbers from `part[0]` to
-    `part[1]`, and those that are still there when they come.
+    no executor took a message.
 
     Raises TypeError or ValueError, with one sentence: for a table that is none, or that no such
-    queue can have made, and for more than 10,000 messages at once.
+    queue can have made, and for more than 10,000 messages.
     """
     table = check_table(table)
     check_count('depth', depth)
@@ -166,19 +159,11 @@ def replay(
     heard = table[table['started_s'].notna()]
     found = set(heard['thread'].dropna())
     names = fill_up(found, threads) if len(heard) else []
-    if part is not None:
-        table = _rows_of_part(table, depth, part)
     if len(table) > MOST_MESSAGES:
-        start = table['seq'].iloc[0] if part is None else part[0]
         raise ValueError(
-            f'{len(table):,} messages are too many to step through. Ask for a smaller part: '
-            f'part=({start}, {start + 999}).'
+            f'{len(table):,} messages are too many to step through: at most {MOST_MESSAGES:,}.'
         )
-    shown_here = table['seq'].between(*part) if part else table['seq'].notna()
     made = events(table, depth, threads if group == REENTRANT else 1)
-    first = 0
-    if part is not None:
-        made, first = _part_of(made, depth, part)
     setup = {
         'threads': names,
         'groups': [{'name': 'the group', 'exclusive': group == EXCLUSIVE}],
@@ -188,75 +173,20 @@ def replay(
         [round(1e6 * at_s), KINDS.index(do), 0, seq if do == ARRIVE else names.index(thread)]
         for at_s, do, seq, thread in made
     ]
-    lost = bool(table.loc[shown_here, 'started_s'].isna().any())
+    lost = bool(table['started_s'].isna().any())
     said = f'{len(names)} threads' if len(names) > 1 else 'one thread' if names else 'no executor'
     if len(names) > 1:
         said += f', a {group} group'
     end = 'Some were lost' if lost else 'None was lost'
     if not any(event.do == TAKE for event in made):
         end = 'None was heard'
-    summary = f'{shown_here.sum()} messages, depth {depth}, {said}. {end}.'
-    return Replay((Run('', summary, lost, setup, moves, first),))
+    summary = f'{len(table)} messages, depth {depth}, {said}. {end}.'
+    return Replay((Run('', summary, lost, setup, moves),))
 
 
 def side_by_side(runs: Mapping[str, Replay]) -> Replay:
     """Return several replays as one, stepped together in the order of time: `{'before': ...}`."""
     return Replay(tuple(replace(run, name=name) for name, one in runs.items() for run in one.runs))
-
-
-def _rows_of_part(table: pd.DataFrame, depth: int, bounds: tuple[int, int]) -> pd.DataFrame:
-    """Return the rows of a part, and those of messages that are there while it happens.
-
-    Of the earlier ones that are those which wait or run when it begins, of the later ones those
-    which are published until its last message is pushed out or its callback ends.
-    """
-    places = np.flatnonzero(table['seq'].between(*bounds))
-    if not len(places):
-        raise ValueError(f'There is no message from {bounds[0]} to {bounds[1]}.')
-    first, last = places[0], places[-1]
-    begin_s = table['published_s'][first]
-    lost = table['started_s'].isna()
-    gone = table['finished_s'] < begin_s
-    gone |= lost & (table.index + depth < first)
-    own = table.loc[first:last]
-    pushes_out = min(last + depth, len(table) - 1) if lost[own.index].any() else last
-    ends = own['finished_s'].max(), own['started_s'].max(), table['published_s'][pushes_out]
-    end_s = np.nanmax(ends)
-    here = (table.index >= first) & (table['published_s'] <= end_s)
-    table = table[~gone & (table.index < first) | here].reset_index(drop=True)
-    # Taken after that, for there is nobody who would have pushed it out: it still waits.
-    waits = (table['started_s'] > end_s) & (table.index + depth >= len(table))
-    table.loc[waits, ['started_s', 'finished_s']] = np.nan
-    return table
-
-
-def _part_of(made: list[Event], depth: int, bounds: tuple[int, int]) -> tuple[list[Event], int]:
-    """Return the events of a part, after those that lead to its start, and how many those are."""
-    least, most = bounds
-    waiting, running = deque(), {}
-    before: list[Event] = []
-    begun = arrived = False
-    found = []
-    for index, event in enumerate(made):
-        if not begun and event.do == ARRIVE and least <= event.seq <= most:
-            begun = True
-            there = {id(one) for one in chain(*running.values(), waiting)}
-            before = [one for one in made[:index] if id(one) in there]
-        if begun:
-            found.append(event)
-        if event.do == ARRIVE:
-            waiting.append(event)
-            if len(waiting) > depth:
-                waiting.popleft()
-        elif event.do == TAKE:
-            running[event.seq] = waiting.popleft(), event
-        else:
-            del running[event.seq]
-        arrived |= event.do == ARRIVE and event.seq >= most
-        there = chain((one.seq for one in waiting), running)
-        if arrived and not any(least <= seq <= most for seq in there):
-            break
-    return before + found, len(before)
 
 
 def fill_up(found: set[str], threads: int) -> list[str]:

@@ -105,7 +105,7 @@ def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) 
     }
     moves = _moves(recording, names, thread_names, cancelled_s)
     summary = f'{"One thread" if threads == 1 else f"{threads} threads"}. The cancel {taken}.'
-    return Replay((Run('', summary, False, setup, moves, 0, TIME_LABEL),))
+    return Replay((Run('', summary, False, setup, moves, TIME_LABEL),))
 
 
 def _moves(

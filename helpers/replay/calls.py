@@ -64,7 +64,7 @@ def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
         + (stuck or ['Nobody waits for ever.'])
     )
     after_s = HANGS_S if stuck else 0.0
-    return Replay((Run('', summary, False, setup, moves, 0, TIME_LABEL, after_s),))
+    return Replay((Run('', summary, False, setup, moves, TIME_LABEL, after_s),))
 
 
 def _steps(name: str, calls: pd.DataFrame, tables: dict, groups: pd.DataFrame) -> list[dict] | None:
@@ -73,6 +73,8 @@ def _steps(name: str, calls: pd.DataFrame, tables: dict, groups: pd.DataFrame) -
         return []
     index = list(groups.index).index
     own = calls[calls['caller'] == name]
+    if own['service'].isna().any():
+        raise ValueError(f'{name} asks a service that is not recorded: watch it, too.')
     seen = [
         [
             {call.style: index(call.service), 'client': index(call.client)}

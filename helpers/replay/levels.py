@@ -101,7 +101,7 @@ def _arrivals(callback: int, times_s: list[float]) -> list[dict]:
     return [{'at': at, 'callback': callback, 'seq': seq} for seq, at in enumerate(times_s)]
 
 
-# The levels. No two events of one are at the same time.
+# The levels. But for the arrivals of 'counter', no two events of one are at the same time.
 
 
 def _save() -> Variant:

@@ -5,7 +5,7 @@
 // on; `by` is who pushed it out. And `stuck`, the sentences of those that can never go on.
 function stories(record, most) {
   const { setup, moves } = record;
-  const { seek } = walk({ ...record, first: 0 });
+  const { seek } = walk(record);
   const found = new Map();
   const of = ({ callback, seq }) => found.get(`${callback} ${seq}`);
   const because = (phases, at, cause) => {

@@ -4,9 +4,9 @@ const CHECKPOINT = 64; // moves between two states that are kept, of a run with 
 const DOES = ['arrive', 'take', 'end', 'go', 'resume'];
 const model = queueModel();
 
-// A record is {setup, moves, first}: the setup of model.js; moves in short, [microseconds, which of
-// DOES, and two numbers]; and how many moves lead to the part that is shown.
-function walk({ setup, moves, first }) {
+// A record is {setup, moves}: the setup of model.js, and moves in short, [microseconds, which of
+// DOES, and two numbers].
+function walk({ setup, moves }) {
   const kept = [model.start(setup)];
   let state = model.copy(kept[0]);
   let at = 0; // moves that are done
@@ -21,10 +21,9 @@ function walk({ setup, moves, first }) {
     return { ...made, callback: one, thread: other };
   }
 
-  // Return the state after `step` moves of the part, and the sentence of the last one. The next
+  // Return the state after `to` moves, and the sentence of the last one. The next
   // call changes the state.
-  function seek(step) {
-    const to = step + first;
+  function seek(to) {
     // From one before, because the sentence belongs to the last move.
     const near = Math.min(Math.floor(Math.max(to - 1, 0) / CHECKPOINT), kept.length - 1);
     if (to < at || near * CHECKPOINT > at) {
@@ -36,7 +35,7 @@ function walk({ setup, moves, first }) {
       at += 1;
       if (at === kept.length * CHECKPOINT) kept.push(model.copy(state));
     }
-    return { state, says: step ? says : '' };
+    return { state, says: to ? says : '' };
   }
 
   // Return of each step the numbers that it is about, and which steps lose one.
@@ -50,14 +49,13 @@ function walk({ setup, moves, first }) {
         : made.do === 'take' ? now.queues[made.callback][0] : now.runs[made.thread];
       const before = now.lost.length;
       model.advance(setup, now, made);
-      if (index < first) return;
       scanned.about.push([item?.seq]);
       if (now.lost.length === before) return;
       scanned.about.at(-1).push(now.lost[before].seq);
-      scanned.losses.push(index + 1 - first);
+      scanned.losses.push(index + 1);
     });
     return scanned;
   }
 
-  return { setup, seek, scan, times: moves.slice(first).map(([us]) => us) };
+  return { setup, seek, scan, times: moves.map(([us]) => us) };
 }
