@@ -29,12 +29,16 @@ IDLE_CORES = 0.1
 
 
 class Row(NamedTuple):
-    """A cost beside what it is compared with: both are several measurements, in seconds."""
+    """A cost beside what it is compared with: several measurements each, in seconds.
+
+    With `unit` '' they are numbers without a unit.
+    """
 
     what: str
     seconds: Sequence[float]
     compared_with: str
     reference: Sequence[float]
+    unit: str = 's'
 
 
 def table(rows: Iterable[Row]) -> str:
@@ -42,19 +46,23 @@ def table(rows: Iterable[Row]) -> str:
     return pd.DataFrame(
         {
             'what': row.what,
-            'median (least to most)': _written(row.seconds),
-            'compared with': f'{row.compared_with}: {_written(row.reference)}',
+            'median (least to most)': _written(row.seconds, row.unit),
+            'compared with': f'{row.compared_with}: {_written(row.reference, row.unit)}',
             'ratio': f'{statistics.median(row.seconds) / statistics.median(row.reference):.2f}',
         }
         for row in rows
     ).to_string(index=False)
 
 
-def _written(seconds: Sequence[float]) -> str:
+def _written(seconds: Sequence[float], unit: str) -> str:
     median = statistics.median(seconds)
-    factor, unit = (1, 's') if median >= 1 else (1e3, 'ms') if median >= 1e-3 else (1e6, 'us')
+    factor = 1.0
+    if unit and median < 1:
+        factor, unit = (1e3, 'ms') if median >= 1e-3 else (1e6, 'us')
     least, middle, most = (factor * each for each in (min(seconds), median, max(seconds)))
-    return f'{middle:.3g} {unit}' + (f' ({least:.3g} to {most:.3g})' if len(seconds) > 1 else '')
+    return f'{middle:.3g} {unit}'.rstrip() + (
+        f' ({least:.3g} to {most:.3g})' if len(seconds) > 1 else ''
+    )
 
 
 def growth(what: str, costs: dict[int, Sequence[float]]) -> list[Row]:
@@ -120,7 +128,13 @@ def classroom() -> Iterable[Row]:
     ratios = [one / other for one, other in zip(inside, without, strict=True)]
     return [
         Row('a cell of lesson 02 in a class of 40', inside, 'in no class', without),
-        Row(f'the same, {len(ratios)} cells, each against itself', ratios, 'in no class', [1.0]),
+        Row(
+            f'the same, {len(ratios)} cells, each against itself',
+            ratios,
+            'in no class',
+            [1.0],
+            unit='',
+        ),
         Row('from a hand to the page', delays, 'wanted', [1.0]),
         Row("the class's server, a minute", [server_s], 'a core', [60.0]),
     ]

@@ -30,7 +30,7 @@ class CMakeLists(NamedTuple):
 def read_cmake_lists(text: str) -> CMakeLists:
     """Read the text of a CMakeLists.txt. Of its variables, only those of set() are followed.
 
-    Raises ValueError where a parenthesis is not closed, or closes nothing.
+    Raises ValueError where there are not as many closing parentheses as opening ones.
     """
     text = COMMENT.sub(lambda match: match[1] or '', text)
     unquoted = re.sub(QUOTED, '', text, flags=re.DOTALL)

@@ -1,7 +1,7 @@
 """Is this machine ready for the notebooks, and if not, what to do.
 
 `python -m helpers.doctor` prints a table of checks and exits with 1 where a required one fails.
-It runs on any Python and with any installation of ROS 2, also with none.
+It runs on Python 3.10 and newer, and with any installation of ROS 2, also with none.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def check_domain() -> Check:
 
     name = 'domain and discovery'
     try:
-        domain_id, discovery = graph_environment().values()
+        domain_id, discovery, *_ = graph_environment().values()
     except RuntimeError as error:
         return Check(name, 'no free domain id', str(error))
     return Check(name, f'domain id {domain_id}, discovery {discovery}')

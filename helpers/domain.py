@@ -62,7 +62,8 @@ def share_domain_id(domain_id: int) -> Iterator[None]:
 
 def check_domain(domain_id: int | None, discovery: str) -> None:
     """Raise ValueError where a session cannot use this domain and this range."""
-    if domain_id is not None and domain_id not in range(102):
+    whole = isinstance(domain_id, int) and not isinstance(domain_id, bool)
+    if domain_id is not None and not (whole and 0 <= domain_id <= 101):
         raise ValueError(f'domain_id must be a whole number from 0 to 101, not {domain_id!r}.')
     if discovery not in ('LOCALHOST', 'SUBNET'):
         raise ValueError(f"discovery must be 'LOCALHOST' or 'SUBNET', not {discovery!r}.")

@@ -178,6 +178,7 @@ class CallbackRecording:
         # That of a coroutine that has finished ends with the id of the thread that finished it.
         self.runs: dict[str, list[list]] = {name: [] for name in watched}
         self._watched = watched
+        self._coroutines: set[str] = set()  # the names of callbacks that can await
         self._calls: list[dict] = []
         self._answers: list[tuple[object, list]] = []  # the future, and the run of the client
         for name, thing in watched.items():
@@ -189,6 +190,8 @@ class CallbackRecording:
     def watch(self, name: str, callback: Callable) -> Callable:
         """Return the callback, which is recorded under this name from now on."""
         runs = self.runs.setdefault(name, [])
+        if inspect.iscoroutinefunction(callback):
+            self._coroutines.add(name)
 
         def start(*arguments) -> list:
             row = [time.monotonic(), float('nan'), threading.get_ident()]
@@ -196,7 +199,7 @@ class CallbackRecording:
             return row
 
         def finish(row: list) -> None:
-            if inspect.iscoroutinefunction(callback):
+            if name in self._coroutines:
                 row.append(threading.get_ident())
             row[1] = time.monotonic()
 
@@ -248,7 +251,10 @@ class CallbackRecording:
     def inside(self, inner: str, outer: str) -> int:
         """Return how many runs of `inner` started while a run of `outer` was going on."""
         return sum(
-            any(started <= run[0] < finished for started, finished, *_ in self.runs[outer])
+            any(
+                started <= run[0] and not finished <= run[0]  # NaN: it still goes on
+                for started, finished, *_ in self.runs[outer]
+            )
             for run in self.runs[inner]
         )
 
@@ -300,7 +306,7 @@ class CallbackRecording:
         for made in list(self._calls):
             answer, run = answers.get(id(made['future'])), made['caller']
             caller, seq = place.get(id(run), (None, None))
-            awaits = caller and inspect.iscoroutinefunction(self._watched[caller].callback)
+            awaits = caller in self._coroutines
             rows.append(
                 {
                     'client': made['client'],

@@ -154,8 +154,8 @@ class Session:
     def spin(self, executor: Executor) -> None:
         """Spin an executor in a background thread, until the session closes.
 
-        Raises TypeError for anything but an rclpy executor, ValueError for one that spins already,
-        and RuntimeError where the session is closed.
+        Raises TypeError for anything but an rclpy executor, ValueError for one that spins already
+        or belongs to another session, and RuntimeError where the session is not open.
         """
         if not isinstance(executor, Executor):
             raise TypeError(

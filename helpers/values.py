@@ -50,10 +50,13 @@ def check_table(table: pd.DataFrame) -> pd.DataFrame:
     Raises TypeError or ValueError, with one clear sentence, where `table` is not a recording.
     """
     check_columns(table, COLUMNS)
+    seq = column_of_numbers(table, 'seq')
+    if not (seq % 1 == 0).all():  # nor where it is NaN
+        raise ValueError('The column seq must hold whole numbers.')
     times = {name: column_of_numbers(table, name) for name in COLUMNS[1:4]}
     thread = table['thread'].astype(object)
     thread = thread.where(thread.notna(), None)
-    table = table.assign(seq=table['seq'].astype(int), thread=thread, **times)
+    table = table.assign(seq=seq.astype(int), thread=thread, **times)
     unknown = table.loc[table['published_s'].isna(), 'seq']
     if len(unknown):
         raise ValueError(f'It is not known when message {unknown.iloc[0]} was published.')

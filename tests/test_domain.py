@@ -145,6 +145,8 @@ def test_hostile_variables(monkeypatch, shared_id):
     [
         ({'domain_id': '42'}, "a whole number from 0 to 101, not '42'"),
         ({'domain_id': 102}, 'a whole number from 0 to 101, not 102'),
+        ({'domain_id': 42.0}, 'a whole number from 0 to 101, not 42.0'),
+        ({'domain_id': True}, 'a whole number from 0 to 101, not True'),
         ({'domain_id': -1}, 'a whole number from 0 to 101, not -1'),
         ({'discovery': 'subnet'}, "'LOCALHOST' or 'SUBNET', not 'subnet'"),
         ({'discovery': 'SUBNET'}, 'needs the domain id that the other machines use'),

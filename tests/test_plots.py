@@ -586,6 +586,7 @@ def test_innovation_has_its_band_and_crosses_for_what_was_kept_out():
 
 
 RUN = table_of([0.0])
+CIRCLE = pd.DataFrame({'parent': ['a', 'b'], 'child': ['b', 'a'], 'publisher': 'robot'})
 
 
 @pytest.mark.parametrize(
@@ -598,6 +599,7 @@ RUN = table_of([0.0])
         (lambda: plots.paths(DRIVE, dict.fromkeys('abcdefg', DRIVE)), '1 to 6 estimates, not 7'),
         (lambda: plots.frame_tree(FRAMES.iloc[[0, 0]]), 'make no tree'),
         (lambda: plots.frame_tree(FRAMES.iloc[1:]), 'make no tree'),
+        (lambda: plots.frame_tree(pd.concat([FRAMES, CIRCLE])), 'make no tree'),
     ],
 )
 def test_what_cannot_be_drawn_gets_one_sentence(draw, words):

@@ -255,6 +255,8 @@ GOOD = pd.DataFrame(
         (None, TypeError, 'The table must be a DataFrame, not NoneType.'),
         (GOOD.drop(columns=['seq']), ValueError, 'The table lacks the column(s) seq.'),
         (GOOD.assign(started_s='soon'), TypeError, 'The column started_s must hold numbers.'),
+        (GOOD.assign(seq=[0, np.nan]), ValueError, 'The column seq must hold whole numbers.'),
+        (GOOD.assign(seq=[0, 1.5]), ValueError, 'The column seq must hold whole numbers.'),
         (GOOD.iloc[:0], ValueError, 'The table is empty: it needs at least one row.'),
         (
             GOOD.assign(published_s=[0.0, np.nan]),
@@ -307,6 +309,9 @@ def test_a_run_is_inside_where_it_starts():
     recording.runs['outer'] += [[2, 4, 1], [6, 8, 1]]  # seconds, and the thread
     recording.runs['inner'] += [[1, 3, 2], [2, 3, 2], [3, 5, 2], [4, 5, 2], [7, 9, 2]]
     assert recording.inside('inner', 'outer') == 3
+    recording.runs['outer'].append([8.5, float('nan'), 1])  # it goes on
+    recording.runs['inner'].append([9, 10, 2])
+    assert recording.inside('inner', 'outer') == 4
 
 
 def test_run_that_goes_on():
@@ -329,3 +334,12 @@ def test_watched_function():
     assert recording.tables()['double'].empty
     assert [double(2), double(3)] == [4, 6]
     assert recording.finished('double') == 2
+
+
+def test_a_watched_function_that_asks():
+    with ros_session():
+        asker = Asker()
+        recording = CallbackRecording(client=asker.client)
+        recording.watch('job', lambda: asker.client.call_async(asker.ask()))()
+    [call] = recording.calls().to_dict('records')
+    assert (call['caller'], call['run'], call['style']) == ('job', 0, 'send')

@@ -600,6 +600,13 @@ def test_names_of_workspaces(name):
         Workspace(name)
 
 
+def test_an_overlay_replaces_no_folder_of_its_underlay(other):
+    other.write('src/package/package.xml', 'text')
+    with pytest.raises(ValueError, match=r"^'src' is a folder of the underlay: choose another"):
+        Workspace('src', underlay=other)
+    assert other.file('src/package/package.xml').read_text() == 'text'
+
+
 @pytest.mark.parametrize('path', ['/etc/passwd', 'src/../../up', ''])
 def test_a_file_stays_in_its_workspace(other, path):
     with pytest.raises(ValueError, match='Give a path inside the workspace'):

@@ -61,7 +61,8 @@ def simulate(
     `ay`, the IMU's other acceleration (m/s^2), which a turned IMU needs; there is no gravity in
     them. The truth has `t` and the columns of STATE, with the centripetal acceleration as `ay`.
 
-    Raises ValueError for variances that cannot be used, and for more outliers than fixes.
+    Raises ValueError or TypeError for variances that cannot be used, and ValueError for more
+    outliers than fixes.
     """
     variances = settings.variances('variances', variances, VARIANCES)
     t = np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ

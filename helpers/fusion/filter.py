@@ -154,7 +154,7 @@ class ExtendedKalmanFilter:
         return self._update(part, values, covariance, gate)
 
     def predict(self, t: float) -> None:
-        """Move the estimate on to the time `t` (seconds). An earlier time changes nothing."""
+        """Move the estimate on to `t` (s), after a message. An earlier time changes nothing."""
         if t > self.t:
             self.state, jacobian = motion(self.state, t - self.t)
             self.covariance = jacobian.dot(self.covariance).dot(jacobian.T)

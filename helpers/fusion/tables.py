@@ -162,6 +162,7 @@ def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -
 
 def _messages(sensors: Iterable[str], config) -> list[tuple[str, dict[str, str]]]:
     """Return the messages of the sensors, without the parts that are not to be used."""
+    sensors = sensors if isinstance(sensors, str) else tuple(sensors)
     settings.some_of('sensors', sensors, SENSORS)
     config = settings.chosen('config', config, SENSORS)
     for sensor, names in config.items():

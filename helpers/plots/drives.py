@@ -31,6 +31,7 @@ from helpers.plots.style import (
 )
 
 TRUTH = '#c3c9ce'
+NO_TREE = 'These transforms make no tree: it has one root, and each frame one parent.'
 
 
 def path(
@@ -225,9 +226,7 @@ def _tree_layout(transforms: pd.DataFrame) -> tuple[dict[str, int], dict[str, fl
     """Return each frame's depth and its row: the leaves have rows 0, 1, 2, ..."""
     roots = [name for name in transforms.parent.unique() if name not in {*transforms.child}]
     if len(roots) != 1 or transforms.child.duplicated().any():
-        raise ValueError(
-            'These transforms make no tree: it has one root, and each frame one parent.'
-        )
+        raise ValueError(NO_TREE)
     children = transforms.groupby('parent', sort=False)['child'].agg(list).to_dict()
     depths: dict[str, int] = {}
     rows: dict[str, float] = {}
@@ -245,4 +244,6 @@ def _tree_layout(transforms: pd.DataFrame) -> tuple[dict[str, int], dict[str, fl
             leaves += 1
 
     place(roots[0], 0)
+    if len(depths) != len(transforms) + 1:  # a circle beside the tree
+        raise ValueError(NO_TREE)
     return depths, rows

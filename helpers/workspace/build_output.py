@@ -219,7 +219,8 @@ def lines_that_matter(text: str) -> list[str]:
 
     Kept are: CMake's errors with the line of your CMakeLists.txt; of a Python traceback the last
     frame and the exception; the compiler's and linker's errors; what setup.py says at its end.
-    Not kept is what only reports that something before it has failed.
+    Not kept is what only reports that something before it has failed. Where none of these is found,
+    the last eight lines are kept.
     """
     lines = text.splitlines()
     kept: list[str] = []

@@ -52,7 +52,7 @@ def use(install: Path, sourced: dict[str, str]) -> None:
         if package not in _loaded:
             _load(files)
             _loaded[package] = hashes
-    # rcl looks for the type support's libraries in this variable at run time.
+    # The ament index is in the first one; processes that a cell starts need both.
     for name in ('AMENT_PREFIX_PATH', 'LD_LIBRARY_PATH'):
         if name in sourced:
             os.environ[name] = sourced[name]

@@ -14,7 +14,7 @@ from pathlib import Path
 def fix_wheels(prefix: str | Path = sys.prefix) -> None:
     """Make the CMake files of the ROS 2 wheels fit this machine.
 
-    The wheels were built in a container, and 20 of their CMake files name its folders, such as
+    The wheels were built in a container, and 21 of their CMake files name its folders, such as
     /opt/python/cp311-cp311/include/python3.11. CMake stops at a folder that does not exist. Here
     these are replaced by the folders of this Python and this NumPy. Fast DDS also asks for the
     development files of two libraries which it brings along: nobody else needs them. A second call

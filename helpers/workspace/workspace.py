@@ -38,7 +38,8 @@ class Workspace:
     a folder of the underlay, is built in a terminal that has sourced the underlay, and is closed
     with it. `%%write` goes on to write into the underlay.
 
-    Raises ValueError for a name that is not letters, digits, `_` and `-`.
+    Raises ValueError for a name that is not letters, digits, `_` and `-`, or that of a folder of
+    the underlay.
     """
 
     def __init__(self, name: str, underlay: Workspace | None = None) -> None:
@@ -47,6 +48,8 @@ class Workspace:
             raise ValueError(
                 f'Name a workspace with letters, digits, _ and -, such as lesson_08, not {name!r}.'
             )
+        if underlay and name in ('src', 'build', 'install', 'log'):
+            raise ValueError(f'{name!r} is a folder of the underlay: choose another name.')
         if underlay is None:
             if _open_workspace is not None:
                 _open_workspace.close()
