@@ -32,12 +32,14 @@ from nbval.plugin import IPyNbCell, IPyNbFile
 LOOK = '__import__("tools.soak.leftovers", fromlist=["look"]).look()'
 SHORTEST_S, LONGEST_S = 0.001, 10.0
 ANSWER_TIMEOUT_S = 60.0  # of a kernel that is alive, on a busy machine
+REPLY_S = 0.2  # after its 'idle', a kernel's reply to the same message is there
 # From the second try on, the check of an exercise also prints hints. A fresh run has none.
 HINTS = re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE)
 KERNEL_LOST = (Empty, RuntimeError, ValueError)  # no answer, a dead kernel, a broken message
 # In IPython's traceback: the top level of a module, or the cell's own import where Python has left
 # out all frames below it.
 IN_IMPORT = re.compile(r'^File (<frozen importlib|.+\.py:\d+$)|^-+> \d+ (import|from) ', re.M)
+IMPORTS = re.compile(r'^(import|from) ', re.M)
 # Python's helper of a pool of processes: its child that was not yet noted is a zombie.
 IN_TRACKER = re.compile(r'resource_tracker\.py:\d+, in ResourceTracker\.(ensure_running|_launch)')
 COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
@@ -147,7 +149,9 @@ class Interrupted(IPyNbCell):
             self.raise_cell_error(f'Run for {after_s:.3f} s. The kernel is lost: {why}')
         traceback = COLOURS.sub('', '\n'.join(error.get('traceback', [])))
         self.user_properties.append(('traceback', traceback))  # for who asks why a later cell fails
-        if IN_IMPORT.search(traceback):
+        sent = any(name == 'interrupted_after_s' for name, _ in self.user_properties)
+        unsaid = sent and not traceback and IMPORTS.search(self.cell.source)
+        if unsaid or IN_IMPORT.search(traceback):
             # Python cannot repeat a half-done import of NumPy: the reader restarts the kernel.
             self.user_properties.append(('in_import', True))
             fresh_kernel(self, self.cell_num)
@@ -167,8 +171,11 @@ class Interrupted(IPyNbCell):
         except Empty:
             self.user_properties.append(('interrupted_after_s', after_s))
             kernel.interrupt()
-            # Not the reply: when the signal meets ipykernel beside the cell, it sends none.
-            return listen(kernel, message, 'idle', ANSWER_TIMEOUT_S)
+            # When the signal meets ipykernel beside the cell, it sends no reply, or a broken one.
+            error = listen(kernel, message, 'idle', ANSWER_TIMEOUT_S)
+            with suppress(Empty):
+                kernel.get_message('shell', timeout=REPLY_S)
+            return error
 
 
 class Killed(IPyNbCell):
