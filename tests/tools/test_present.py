@@ -67,6 +67,14 @@ def test_a_copy_in_which_nothing_happened_follows_its_lesson(root):
     assert code(other).source == 'newer()'
 
 
+def test_a_record_that_was_broken_off_keeps_what_was_typed(root):
+    copy = made(root, '02')
+    change(copy, 'typed()')
+    (root / 'presentation' / present.MADE).write_text('')
+    assert code(made(root, '02')).source == 'typed()'
+    assert code(made(root, '02', '--new')).source == 'run()'
+
+
 @pytest.mark.parametrize('number', ['', '03', '01 03'])
 def test_a_wrong_number_is_told_in_one_sentence(root, capsys, number):
     assert present.main([number, '--root', str(root)]) == 1

@@ -41,6 +41,13 @@ def stream(text):
     return new_output('stream', name='stdout', text=text)
 
 
+def test_what_is_saved_while_a_lesson_runs_stays(tmp_path, capsys):
+    path = saved(tmp_path, "from pathlib import Path\nPath('00_try_it.ipynb').write_text('{}')")
+    assert run.main(['00'], tmp_path) == 1
+    assert 'was changed while it ran: save it, then run it again.' in capsys.readouterr().err
+    assert path.read_text() == '{}'
+
+
 def test_what_is_cleaned():
     view = new_output('display_data', data={WIDGET: {'model_id': '1'}, 'text/plain': 'Slider()'})
     dirty = new_notebook(

@@ -148,6 +148,57 @@ def test_a_file_that_both_have_changed_is_set_aside(tmp_path, mine, capsys):
     assert read(mine / 'notebooks') == sources(notebook(NEWER).cells)
 
 
+def test_what_an_earlier_update_has_set_aside_stays(tmp_path, mine):
+    for mine_again, newer in (('first', 'newer'), ('second', 'newest')):
+        (mine / 'helper.py').write_text(mine_again)
+        fill(tmp_path / 'newer', '02', NEWER, newer)
+        assert update.main([str(tmp_path / 'newer'), '--to', str(mine)]) == 0
+    aside = sorted(path.read_text() for path in mine.glob('helper.py*.yours'))
+    assert aside == ['first', 'second']
+
+
+@pytest.mark.parametrize(
+    'text',
+    [
+        'null',
+        '[]',
+        '{}',
+        '{"nbformat": 4, "nbformat_minor": 2, "metadata": {}, "cells": [{"cell_type": "raw",'
+        ' "metadata": {}, "source": "x"}]}',
+    ],
+)
+def test_a_notebook_of_another_tool_does_not_end_the_update(tmp_path, mine, text):
+    (mine / 'notebooks' / LESSON).write_text(text)
+    fill(tmp_path / 'newer', '02', NEWER, 'newer')
+    assert update.main([str(tmp_path / 'newer'), '--to', str(mine)]) == 0
+    assert (mine / 'notebooks' / f'{LESSON}.yours').read_text() == text
+    assert read(mine / 'notebooks') == sources(notebook(NEWER).cells)
+
+
+def test_checkpoints_are_of_who_made_them(tmp_path, mine):
+    fill(tmp_path / 'newer', '02', NEWER, 'newer')
+    for folder, cells in ((mine, WRITTEN), (tmp_path / 'newer', NEWER)):
+        write(folder / 'notebooks/.ipynb_checkpoints', LESSON, cells)
+    assert update.main([str(tmp_path / 'newer'), '--to', str(mine)]) == 0
+    assert read(mine / 'notebooks/.ipynb_checkpoints') == sources(notebook(WRITTEN).cells)
+
+
+def test_an_update_that_was_interrupted_is_gone_on_with(tmp_path, mine):
+    fill(tmp_path / 'newer', '02', NEWER, 'newer')
+    (mine / update.BASE).rename(mine / f'{update.BASE}.old')
+    assert update.main([str(tmp_path / 'newer'), '--to', str(mine)]) == 0
+    assert read(mine / 'notebooks') == BOTH
+    assert len(list(mine.iterdir())) == 4
+
+
+def test_packages_of_an_older_edition_go(tmp_path, mine):
+    (mine / 'wheels').mkdir()
+    fill(tmp_path / 'newer', '02', NEWER, 'newer')
+    (tmp_path / 'newer/requirements.lock').write_text('newer')
+    assert update.main([str(archive_of(tmp_path / 'newer')), '--to', str(mine)]) == 0
+    assert not (mine / 'wheels').exists()
+
+
 def test_a_clone_follows_its_origin(tmp_path, capsys):
     origin, clone = tmp_path / 'origin', tmp_path / 'clone'
     fill(origin, '02', OLD, 'old')

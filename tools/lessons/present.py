@@ -53,6 +53,13 @@ def _hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def _write(path: Path, text: str) -> None:
+    """Write a file at once, or not at all."""
+    new = path.with_name(f'{path.name}.new')
+    new.write_text(text, encoding='utf-8')
+    new.replace(path)
+
+
 def present(numbers: str, root: Path, *, new: bool = False, outputs: bool = False) -> list[Path]:
     """Make or keep the copies below `root`; return those of the lessons with these numbers.
 
@@ -65,7 +72,10 @@ def present(numbers: str, root: Path, *, new: bool = False, outputs: bool = Fals
     folder = root / FOLDER
     folder.mkdir(exist_ok=True)
     record = folder / MADE
-    made = json.loads(record.read_text()) if record.is_file() else {}
+    try:
+        made = json.loads(record.read_text())
+    except (OSError, ValueError):  # none yet, or it was broken off: what is there is kept
+        made = {}
     for path in lesson.paths(root / 'notebooks'):
         copy = folder / path.name
         touched = copy.is_file() and _hash(copy.read_text(encoding='utf-8')) != made.get(path.name)
@@ -76,9 +86,9 @@ def present(numbers: str, root: Path, *, new: bool = False, outputs: bool = Fals
         if copy.is_file() and path not in wanted and made.get(origin) == wanted_from:
             continue
         text = _copy_of(source, outputs)
-        copy.write_text(text, encoding='utf-8')
+        _write(copy, text)
         made[path.name], made[origin] = _hash(text), wanted_from
-    record.write_text(json.dumps(made, indent=1))
+        _write(record, json.dumps(made, indent=1))
     return [folder / path.name for path in wanted]
 
 

@@ -128,6 +128,8 @@ def update(path: Path) -> bool:
     """
     before = path.read_text(encoding='utf-8')
     notebook = execute(nbformat.reads(before, as_version=4), path.parent)
+    if path.read_text(encoding='utf-8') != before:
+        raise ValueError(f'{path.name} was changed while it ran: save it, then run it again.')
     for name, picture in pictures(notebook).items():
         (path.parent / name).parent.mkdir(exist_ok=True)
         (path.parent / name).write_bytes(picture)

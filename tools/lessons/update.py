@@ -15,6 +15,7 @@ one side of a conflict only (`git merge -Xours`), and needs git.
 """
 
 import argparse
+import os
 import re
 import shutil
 import subprocess
@@ -30,6 +31,7 @@ from nbformat.v4 import new_markdown_cell, new_notebook
 ROOT = Path(__file__).resolve().parents[2]
 BASE = '.handed_out'  # beside the lessons: what was handed out
 APART = (BASE, '.git', 'wheels')
+LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # wherever they are
 YOURS = '*Your version of the cell above, from before the update:*'
 
 
@@ -82,8 +84,8 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
         if now not in (None, was, data):
             try:
                 data = _merged(old, own, newer / file)
-            except ValueError:
-                aside = own.rename(own.with_name(f'{own.name}.yours'))
+            except (ValueError, LookupError, TypeError, AttributeError, nbformat.ValidationError):
+                aside = own.rename(_free(own))
                 said.append(f'Both have changed {file}: yours is now {aside.name}.')
         _write(target, data, (newer / file).stat().st_mode)
         if own not in (target, None):
@@ -96,8 +98,12 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
 
 def files_of(folder: Path) -> list[Path]:
     """Return the paths of the files of a course, relative to its folder."""
-    files = (path.relative_to(folder) for path in folder.rglob('*') if path.is_file())
-    return sorted(path for path in files if path.parts[0] not in APART)
+    files = (
+        path.relative_to(folder)
+        for path in folder.rglob('*')
+        if path.is_file() and os.access(path, os.R_OK)  # a teacher's own file is no lesson
+    )
+    return sorted(p for p in files if p.parts[0] not in APART and not LEFT_OUT & {*p.parts})
 
 
 def _found(path: Path) -> Path:
@@ -105,6 +111,15 @@ def _found(path: Path) -> Path:
     if path.is_file() or not re.match(r'\d\d_.*\.ipynb', path.name):
         return path
     return next(iter(sorted(path.parent.glob(f'[0-9][0-9]{path.name[2:]}'))), path)
+
+
+def _free(path: Path) -> Path:
+    """Return the name for a file that is set aside. What an earlier update has set aside stays."""
+    aside, number = path.with_name(f'{path.name}.yours'), 1
+    while aside.exists():
+        number += 1
+        aside = path.with_name(f'{path.name}.{number}.yours')
+    return aside
 
 
 def _bytes(path: Path) -> bytes | None:
@@ -131,12 +146,21 @@ def _write(path: Path, data: bytes, mode: int) -> None:
 
 def update_from_folder(newer: Path, mine: Path) -> list[str]:
     """Merge a folder into `mine`, and keep it there as what was handed out last."""
+    old = mine / f'{BASE}.old'
+    if old.exists() and not (mine / BASE).exists():  # the last update was interrupted
+        old.rename(mine / BASE)
     said = merge_folders(mine / BASE, mine, newer)
     fresh = mine / f'{BASE}.new'
     shutil.rmtree(fresh, ignore_errors=True)
-    shutil.copytree(newer, fresh, ignore=lambda _, names: set(names) & {*APART, '__pycache__'})
-    shutil.rmtree(mine / BASE, ignore_errors=True)
+    fresh.mkdir(parents=True)
+    for file in files_of(newer):
+        (fresh / file).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(newer / file, fresh / file)
+    shutil.rmtree(old, ignore_errors=True)
+    if (mine / BASE).exists():
+        (mine / BASE).rename(old)
     fresh.rename(mine / BASE)
+    shutil.rmtree(old, ignore_errors=True)
     return said
 
 
@@ -149,10 +173,13 @@ def update_from_archive(archive: Path, mine: Path) -> list[str]:
         newer = next((path.parent for path in Path(folder).glob(f'*/{BASE}')), None)
         if newer is None:
             raise ValueError(f'{archive} is no archive of `make handout`.')
+        lock = _bytes(mine / 'requirements.lock')
         said = update_from_folder(newer, mine)
         if (newer / 'wheels').is_dir():
             shutil.rmtree(mine / 'wheels', ignore_errors=True)
             (newer / 'wheels').rename(mine / 'wheels')
+        elif _bytes(mine / 'requirements.lock') != lock:
+            shutil.rmtree(mine / 'wheels', ignore_errors=True)  # they are those of the old lock
     return said
 
 
