@@ -36,7 +36,7 @@ from tools.addresses import in_networks
 from tools.class_server.__main__ import main
 from tools.class_server.lessons import Known
 from tools.class_server.store import BARS, EVENTS_OF_SEAT, SEATS, WORDS, Class, bars
-from tools.class_server.web import EVENTS_AT_ONCE, WRONG_A_MINUTE
+from tools.class_server.web import EVENTS_AT_ONCE, WRONG_A_MINUTE, Room
 from tools.lessons.lesson import lessons
 from tools.lessons.present import DECK
 
@@ -421,6 +421,30 @@ def test_a_port_that_is_taken(tmp_path):
     assert done.returncode == 1
     said = f'Port {port} cannot be used (Address already in use). Is another class open? '
     assert done.stderr == f'{said}Name another one: make class PORT={port + 1}\n'
+
+
+def test_a_second_class_here_does_not_begin(tmp_path):
+    with running_class(tmp_path) as first:
+        second = subprocess.run(
+            [sys.executable, '-m', 'tools.class_server', '--root', tmp_path, '--no-browser'],
+            env=os.environ | {'JUPYTER_CONFIG_DIR': str(tmp_path / 'jupyter')},
+            capture_output=True,
+            text=True,
+        )
+        assert (second.returncode, second.stdout) == (1, '')
+        assert second.stderr == 'A class is open here already: Ctrl+C in its terminal ends it.\n'
+        assert first.tell(first.join(), event()) == ''
+
+
+def test_a_class_that_goes_on_with_changed_lessons(store):
+    seat = store.join('ada', '')
+    cell = event('cell', cell=STEP)
+    assert store.take(seat, [event(number=1, value=3), cell]) == ''
+    store.close()
+    again = Class(store.file, REAL[:1])
+    assert again.went_on
+    assert Room(again).view()['seats'] == 1
+    again.close()
 
 
 def test_who_can_reach_it(opened, tmp_path):

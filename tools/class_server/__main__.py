@@ -5,9 +5,12 @@ python -m tools.class_server --lan --port 8765
 
 import argparse
 import asyncio
+import fcntl
+import os
 import signal
 import socket
 import sys
+import threading
 import webbrowser
 from contextlib import suppress
 from pathlib import Path
@@ -57,7 +60,8 @@ async def hold(store: Class, options: argparse.Namespace) -> None:
     print('Ctrl+C ends the class and deletes what it was told. Save the CSV before.', flush=True)
     page_file().write_text(page)
     if options.browser:
-        webbrowser.open(page)
+        # One that lives in the terminal ends when it is closed.
+        threading.Thread(target=webbrowser.open, args=[page], daemon=True).start()
     try:
         await over.wait()
     finally:
@@ -79,6 +83,13 @@ def main(arguments: list[str] | None = None) -> int:
     tls = options.ssl_cert, options.ssl_key
     if any(tls) and not all(file and Path(file).is_file() for file in tls):
         parser.error('--ssl-cert and --ssl-key must both name a file.')
+    folder().mkdir(mode=0o700, parents=True, exist_ok=True)
+    try:
+        # Until this process ends: another class, at its end, would delete what this one was told.
+        fcntl.flock(os.open(folder(), os.O_RDONLY), fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        print('A class is open here already: Ctrl+C in its terminal ends it.', file=sys.stderr)
+        return 1
     store = Class(folder() / FILE, known_lessons(options.root))
     try:
         asyncio.run(hold(store, options))

@@ -58,7 +58,8 @@ class Class:
         for row in self._db.execute(
             'SELECT seat, lesson, kind, what, value FROM events ORDER BY n'
         ):
-            self._note(*row)
+            if self._is_known(*row[1:3], row[4]):
+                self._note(*row)
 
     # Seats
 
@@ -129,6 +130,11 @@ class Class:
         if event.get('cell', None) not in (None, *known.step_of):
             return 'The lesson has no such cell.'
         return ''
+
+    def _is_known(self, lesson: str, kind: str, value: str) -> bool:
+        """Return whether the lessons, which may have changed since, have what an event names."""
+        known = self.lessons.get(lesson)
+        return known is not None and (kind != 'cell' or json.loads(value) in known.step_of)
 
     def _note(self, seat: int, lesson: str, kind: str, what: str, value: str) -> None:
         """Remember what counts: of each seat the last event of a kind. What is solved stays so."""
