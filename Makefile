@@ -93,7 +93,8 @@ licences: ## write licences.md from the lock files and what the packages say
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built; students' files stay
 	if [ -d .jupyter ]; then find .jupyter -mindepth 1 -maxdepth 1 ! -name hub -exec rm -rf {} +; fi
 	rm -rf .venv .soak scratch slides handout site .site book.pdf .hypothesis .pytest_cache .ruff_cache
-	find . -name .git -prune -o \( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
+	find . \( -name .git -o -path ./my_lessons -o -path ./presentation -o -path ./.jupyter/hub \) -prune -o \
+		\( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
 set_up:
 	@mkdir -p .jupyter && tools/set_up.sh

@@ -19,7 +19,11 @@ fail() {
     exit 1
 }
 
-exec 9< tools/set_up.sh
+case $venv in *[[:space:]*?[]*) fail "No blank and none of * ? [ may be in the name of the folder: $venv" ;; esac
+
+# On NFS only a file that is open for writing can be locked. Not this script: no second one could
+# start meanwhile.
+if [ -w pyproject.toml ]; then exec 9<> pyproject.toml; else exec 9< pyproject.toml; fi
 ! command -v flock > /dev/null || flock 9 # two calls at once: the second waits
 
 locks=requirements.lock groups=

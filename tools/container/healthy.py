@@ -5,4 +5,6 @@ import urllib.request
 
 port = os.environ.get('JUPYTER_PORT', '8888')
 prefix = os.environ.get('JUPYTERHUB_SERVICE_PREFIX', '/')
-urllib.request.urlopen(f'http://127.0.0.1:{port}{prefix}api', timeout=4).close()
+# Not by a proxy of the machine, which is passed on to the container.
+direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+direct.open(f'http://127.0.0.1:{port}{prefix}api', timeout=4).close()

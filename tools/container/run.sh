@@ -29,7 +29,7 @@ $container version > /dev/null 2>&1 ||
 trouble() { # FILE with what the command said
     if grep -qi 'no space left on device' "$1"; then
         say='The disk is full: the image needs 5 GB while it is made. Remove old ones with `podman image prune` or `docker image prune`, then try again.'
-    elif grep -qiE 'address already in use|port is already allocated|ports are not available' "$1"; then
+    elif [ -n "${port-}" ] && grep -qiE 'address already in use|port is already allocated|ports are not available' "$1"; then
         say="The port $port is already in use: choose another one, for example \`make lab-container PORT=8890\`."
     else
         return 0
@@ -68,7 +68,7 @@ run_lab() {
     set --
     if [ "$user" = 0 ]; then
         user=${SUDO_UID:-1000} group=${SUDO_GID:-1000}
-        chown "$user:$group" "$lessons"
+        [ ! -O "$lessons" ] || chown "$user:$group" "$lessons"
     else
         case $($container --version) in *podman*) set -- --userns=keep-id ;; esac
     fi
