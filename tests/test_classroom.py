@@ -243,8 +243,16 @@ def broken():
 
 
 def test_a_class_that_fails_is_not_left(broken, tmp_path):
-    begin = f"import time\njoin_class({broken!r}, 'a-b-c')\nguess({QUESTION!r}, 1)\ntime.sleep(1)\n"
-    said = in_kernel(tmp_path, f'{begin}raise_hand()')
+    script = f"""
+import contextlib, io
+from support.waits import wait_for
+join_class({broken!r}, 'a-b-c')
+said = io.StringIO()
+with contextlib.redirect_stdout(said):
+    wait_for(lambda: guess({QUESTION!r}, 1) and said.getvalue())
+print(said.getvalue())
+"""
+    said = in_kernel(tmp_path, script)
     assert 'on seat 7' in said
     assert said.endswith('The class does not answer. What you tell is kept until it does.')
     said = in_kernel(tmp_path, 'leave_class()')

@@ -1,9 +1,14 @@
-"""Clean a notebook, so that a diff shows only what changed. Every cell gets its slide type."""
+"""Clean a notebook, so that a diff shows only what changed, and write it at once.
+
+Every cell gets its slide type.
+"""
 
 import hashlib
 import re
+import shutil
 from collections.abc import Iterator
 from copy import deepcopy
+from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
@@ -75,3 +80,15 @@ def _clean_outputs(cell: NotebookNode) -> list[NotebookNode]:
 def text_of(notebook: NotebookNode) -> str:
     """Return the text of a notebook's file, as Jupyter writes it."""
     return nbformat.writes(notebook) + '\n'
+
+
+def write(path: Path, after: str, before: str = '') -> bool:
+    """Write a file, at once or not at all; return True where that changed it."""
+    if after == before:
+        return False
+    unfinished = path.with_suffix('.tmp')
+    unfinished.write_text(after, encoding='utf-8')
+    if path.exists():
+        shutil.copymode(path, unfinished)
+    unfinished.replace(path)
+    return True

@@ -15,8 +15,8 @@ import sys
 from pathlib import Path
 
 from tools.lessons import tables
+from tools.lessons.clean import write
 from tools.lessons.lesson import GLOSSARY, ROOT, START
-from tools.lessons.run import write
 
 TEMPLATE = Path(__file__).resolve().parent / 'template.ipynb'
 TEMPLATE_STEM = '90_write_a_lesson'

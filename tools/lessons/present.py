@@ -19,7 +19,7 @@ import nbformat
 from jupyter_core.paths import jupyter_config_dir
 
 from tools.lessons import lesson
-from tools.lessons.clean import text_of
+from tools.lessons.clean import text_of, write
 from tools.lessons.slides import folded
 
 FOLDER = 'presentation'
@@ -53,13 +53,6 @@ def _hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def _write(path: Path, text: str) -> None:
-    """Write a file at once, or not at all."""
-    new = path.with_name(f'{path.name}.new')
-    new.write_text(text, encoding='utf-8')
-    new.replace(path)
-
-
 def present(numbers: str, root: Path, *, new: bool = False, outputs: bool = False) -> list[Path]:
     """Make or keep the copies below `root`; return those of the lessons with these numbers.
 
@@ -86,9 +79,9 @@ def present(numbers: str, root: Path, *, new: bool = False, outputs: bool = Fals
         if copy.is_file() and path not in wanted and made.get(origin) == wanted_from:
             continue
         text = _copy_of(source, outputs)
-        _write(copy, text)
+        write(copy, text)
         made[path.name], made[origin] = _hash(text), wanted_from
-        _write(record, json.dumps(made, indent=1))
+        write(record, json.dumps(made, indent=1))
     return [folder / path.name for path in wanted]
 
 

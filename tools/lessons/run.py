@@ -14,7 +14,6 @@ Notebook 00, which shows the table of exercises, is run as well where that has c
 
 import logging
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -32,7 +31,7 @@ from nbformat import NotebookNode
 
 from helpers.progress import FILE_VARIABLE
 from tools.lessons import tables
-from tools.lessons.clean import clean, text_of
+from tools.lessons.clean import clean, text_of, write
 from tools.lessons.lesson import ROOT, START, chosen
 from tools.lessons.slides import png_of
 
@@ -124,7 +123,8 @@ def pictures(notebook: NotebookNode) -> dict[str, bytes]:
 def update(path: Path) -> bool:
     """Execute and clean a notebook's file in place; return True where that changed the file.
 
-    Raises RuntimeError as `execute` does; the file is then as it was before.
+    Raises RuntimeError as `execute` does, and the file is as it was before; ValueError where it was
+    saved meanwhile, and the file is as it was saved.
     """
     before = path.read_text(encoding='utf-8')
     notebook = execute(nbformat.reads(before, as_version=4), path.parent)
@@ -134,18 +134,6 @@ def update(path: Path) -> bool:
         (path.parent / name).parent.mkdir(exist_ok=True)
         (path.parent / name).write_bytes(picture)
     return write(path, text_of(notebook), before)
-
-
-def write(path: Path, after: str, before: str = '') -> bool:
-    """Write a file, at once or not at all; return True where that changed it."""
-    if after == before:
-        return False
-    unfinished = path.with_suffix('.tmp')
-    unfinished.write_text(after, encoding='utf-8')
-    if path.exists():
-        shutil.copymode(path, unfinished)
-    unfinished.replace(path)
-    return True
 
 
 def main(arguments: list[str], root: Path = ROOT) -> int:

@@ -84,7 +84,7 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
         if now not in (None, was, data):
             try:
                 data = _merged(old, own, newer / file)
-            except (ValueError, LookupError, TypeError, AttributeError, nbformat.ValidationError):
+            except ValueError:
                 aside = own.rename(_free(own))
                 said.append(f'Both have changed {file}: yours is now {aside.name}.')
         _write(target, data, (newer / file).stat().st_mode)
@@ -127,12 +127,15 @@ def _bytes(path: Path) -> bytes | None:
 
 
 def _merged(base: Path, mine: Path, newer: Path) -> bytes:
-    """Return the text of a merged notebook. Raises ValueError for what is none."""
+    """Return the text of a merged notebook. Raises ValueError for what is none, or has no ids."""
     if newer.suffix != '.ipynb':
         raise ValueError
-    old = nbformat.read(base, as_version=4) if base.is_file() else new_notebook()
-    notebooks = (nbformat.read(path, as_version=4) for path in (mine, newer))
-    return (nbformat.writes(merge(old, *notebooks)) + '\n').encode()
+    try:
+        old = nbformat.read(base, as_version=4) if base.is_file() else new_notebook()
+        notebooks = (nbformat.read(path, as_version=4) for path in (mine, newer))
+        return (nbformat.writes(merge(old, *notebooks)) + '\n').encode()
+    except (LookupError, TypeError, AttributeError, nbformat.ValidationError) as problem:
+        raise ValueError from problem
 
 
 def _write(path: Path, data: bytes, mode: int) -> None:

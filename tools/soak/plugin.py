@@ -149,7 +149,7 @@ class Interrupted(IPyNbCell):
             self.raise_cell_error(f'Run for {after_s:.3f} s. The kernel is lost: {why}')
         traceback = COLOURS.sub('', '\n'.join(error.get('traceback', [])))
         self.user_properties.append(('traceback', traceback))  # for who asks why a later cell fails
-        sent = any(name == 'interrupted_after_s' for name, _ in self.user_properties)
+        sent = 'interrupted_after_s' in dict(self.user_properties)
         unsaid = sent and not traceback and IMPORTS.search(self.cell.source)
         if unsaid or IN_IMPORT.search(traceback):
             # Python cannot repeat a half-done import of NumPy: the reader restarts the kernel.
