@@ -31,6 +31,7 @@ def test_nothing_that_was_set_for_other_work_reaches_a_build(monkeypatch):
     assert seen['PATH'].startswith(f'{os.path.dirname(sys.executable)}:')
     assert seen['VIRTUAL_ENV'] == sys.prefix
     assert seen['MAKEFLAGS'] == f'-j{len(os.sched_getaffinity(0))} -O'
+    assert seen['LDFLAGS'] == '-Wl,--as-needed'
 
 
 def test_colcon_finds_a_python_in_a_folder_with_a_blank(monkeypatch):
