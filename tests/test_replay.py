@@ -378,6 +378,7 @@ def test_two_runs_side_by_side():
     pictures = [ElementTree.fromstring(svg(both, index)) for index in (0, 1)]
     assert len({(one.get('width'), one.get('height')) for one in pictures}) == 1
     assert [record(both, index)['name'] for index in (0, 1)] == ['A', 'D']
+    assert re.findall('<figcaption>(.*?)</figcaption>', html(both)) == ['A', 'D']
 
 
 def test_what_nbval_compares_does_not_move():

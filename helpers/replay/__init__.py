@@ -91,12 +91,13 @@ class Run:
         """Return what the script needs."""
         return {name: getattr(self, name) for name in ('name', 'setup', 'moves')}
 
-    @property
-    def alternative(self) -> str:
-        """The picture in words."""
+    def figure(self, svg: str) -> str:
+        """Return its picture with words for it, below the name of one of several runs."""
+        caption = f'<figcaption>{escape(self.name)}</figcaption>' if self.name else ''
         name = f'{self.name}: ' if self.name else ''
         words = ROWS_IN_WORDS + (CROSSES_IN_WORDS if self.lost else '')
-        return f'{name}{self.summary} {words}'
+        alternative = escape(f'{name}{self.summary} {words}')
+        return f'<figure>{caption}<img alt="{alternative}" src="{address(svg)}"></figure>'
 
 
 @dataclass(frozen=True)
@@ -119,8 +120,7 @@ class Replay:
         span_s = min(starts), max(ends)  # pictures beside each other share their time
         pictures = [run.picture(span_s, width, left) for run in self.runs]
         figures = ''.join(
-            f'<figure><img alt="{escape(run.alternative)}" src="{address(svg)}"></figure>'
-            for run, (svg, _) in zip(self.runs, pictures, strict=True)
+            run.figure(svg) for run, (svg, _) in zip(self.runs, pictures, strict=True)
         )
         record = {
             'span': span_s,

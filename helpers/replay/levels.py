@@ -307,9 +307,9 @@ LEVELS = {
         {'depth': (1, 2, 4)},
     ),
     'starve': Level(
-        'You are the executor, with one thread. The IMU sends a message every second, and its '
-        'callback needs 0.4 s. The camera sends one every 3 s, and needs 2.5 s. Lose as few as you '
-        'can.',
+        'You are the executor, with one thread. The IMU, a sensor of motion, sends a message '
+        'every second, and its callback needs 0.4 s. The camera sends one every 3 s, and needs '
+        '2.5 s. Lose as few as you can.',
         'keep',
         _starve,
         {},

@@ -32,8 +32,8 @@ WAITS = {
 }
 RUNS = {
     '': (HEARD, '', 'callback runs'),
-    'answer': (PALE, '', 'callback waits for an answer'),
-    'lock': (PALE, '2 1', 'callback waits for a lock'),
+    'answer': (HEARD, '2 2', 'callback waits for an answer'),
+    'lock': (HEARD, '1 3', 'callback waits for a lock'),
 }
 
 
