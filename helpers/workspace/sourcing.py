@@ -46,8 +46,8 @@ def use(install: Path, sourced: dict[str, str]) -> None:
         hashes = {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
         if _loaded.get(package, hashes) != hashes:
             raise RuntimeError(
-                f'{package} has changed, and this kernel has loaded the old one: restart the '
-                'kernel, then run the notebook from its top.'
+                f'This kernel has loaded an older {package}: restart it, then run the notebook '
+                'from its top.'
             )
         if package not in _loaded:
             _load(files)
