@@ -63,8 +63,8 @@ def build_environment() -> dict[str, str]:
         environment['VIRTUAL_ENV'] = sys.prefix
     if wheels:
         environment['AMENT_PREFIX_PATH'] = sys.prefix
-        # The Python libraries of the message packages lack Python's functions, and no program uses
-        # them. The compilers of Debian and Ubuntu leave out what is not used, others do not.
+        # A program that links messages does not use their Python libraries, which lack Python's
+        # functions. The compilers of Debian and Ubuntu leave out what is not used, others do not.
         environment['LDFLAGS'] = '-Wl,--as-needed'
         libraries = environment.get('LD_LIBRARY_PATH', '').split(os.pathsep)
         environment['LD_LIBRARY_PATH'] = os.pathsep.join(

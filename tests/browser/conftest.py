@@ -14,6 +14,8 @@ from lab_page import LIMIT_S, LabPage
 from lab_server import Server, server
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
 
+from tools.lessons.present import DECK
+
 ARTEFACTS = Path(
     os.environ.get('BROWSER_ARTEFACTS') or Path(tempfile.gettempdir(), 'ros2_notebooks_browser')
 )
@@ -105,9 +107,11 @@ def lab(lab_page, student_server, request) -> Iterator[LabPage]:
 
 @pytest.fixture
 def deck(lab_page, instructor_server, request) -> Iterator[LabPage]:
-    """Yield an instructor's page. What is changed in the copies does not reach the next test."""
+    """Yield an instructor's page. No change of a copy and no place reaches the next test."""
     folder = instructor_server.folder / 'presentation'
     copies = {path: path.read_bytes() for path in folder.glob('*.ipynb')}
+    kept = instructor_server.folder / 'JUPYTER_CONFIG_DIR' / 'lab' / 'workspaces' / DECK
+    kept.unlink(missing_ok=True)
     with lab_page(instructor_server, request.node.name) as opened:
         yield opened
     for path, before in copies.items():
