@@ -22,7 +22,7 @@ from helpers.values import check_table, shown
 
 # A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
 # long as callbacks and timers of the same run were late.
-REST = 0.4
+ALLOWED_REST = 0.4
 
 
 def predict(
@@ -232,7 +232,7 @@ def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -
     waited = np.column_stack([total - (pushed_out - arrived), total]).ravel()
     starts, ends = _pauses(heard, threads, until=published[-1])
     rested = np.interp(ends, edges, waited) - np.interp(starts, edges, waited)
-    allowed = REST * callbacks.median() + np.ptp(callbacks) + np.ptp(periods)
+    allowed = ALLOWED_REST * callbacks.median() + np.ptp(callbacks) + np.ptp(periods)
     return [
         f'Message {table["seq"].iloc[lost[np.searchsorted(pushed_out, starts[i], "right")]]} was '
         f'pushed out although a worker was free for {ends[i] - starts[i]:.3g} s.'

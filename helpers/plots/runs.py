@@ -44,7 +44,7 @@ from helpers.plots.style import (
 )
 from helpers.values import check_table, natural
 
-MOST_SEQ_LABELS, MOST_GAP_LABELS = 25, 15
+MAX_SEQ_LABELS, MAX_GAP_LABELS = 25, 15
 TIME_LABEL = 'time since the first publish (s)'
 
 # The descriptions in words: nbval compares them, so no number that moves may be in them.
@@ -132,7 +132,7 @@ def _label_gaps(ax: Axes, table: pd.DataFrame) -> None:
     """Write the sequence number at each heard message, and at each gap how many were lost."""
     heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
     texts = []
-    if len(heard) <= MOST_SEQ_LABELS:
+    if len(heard) <= MAX_SEQ_LABELS:
         # Below and to the right of a heard message nothing else can be: no message with a
         # smaller number comes later, unless several threads overlap.
         look = {'xytext': (3, -4), 'ha': 'left', 'va': 'top', 'color': 'black'}
@@ -140,7 +140,7 @@ def _label_gaps(ax: Axes, table: pd.DataFrame) -> None:
             texts.append(_label(ax, str(message.seq), message.started_s, message.seq, look))
     # Consecutive rows share a gap: within one, row number minus rank among the lost is constant.
     gaps = [gap for _, gap in lost.groupby(lost.index - np.arange(len(lost)))]
-    if len(gaps) <= MOST_GAP_LABELS:
+    if len(gaps) <= MAX_GAP_LABELS:
         look = {'xytext': (-4, 1), 'ha': 'right', 'va': 'bottom', 'color': LOST_TEXT}
         for gap in gaps:
             x, y = gap.published_s.mean(), gap.seq.mean()

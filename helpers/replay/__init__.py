@@ -23,7 +23,7 @@ from helpers.replay.model import stories
 from helpers.replay.picture import (
     LEFT,
     LETTER,
-    MOST_ROWS,
+    MAX_ROWS,
     NARROW,
     WIDTH,
     address,
@@ -36,7 +36,7 @@ SCRIPT = 'model.js', 'walk.js', 'element.js', 'view.js'
 SCRIPT_OF_CALLS = 'circle.js', *SCRIPT
 KINDS = ARRIVE, TAKE, END, 'go', 'resume'  # as walk.js numbers them
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
-MOST_MESSAGES = 10_000
+MAX_MESSAGES = 10_000
 ROWS_IN_WORDS = (
     'One row for each message: a line while it waits, with a colour for the reason, and a bar '
     'while its callback runs.'
@@ -71,7 +71,7 @@ class Run:
     @cached_property
     def messages(self) -> list[dict]:
         """What became of the first messages, as stories.js tells it."""
-        return stories(self.record(), MOST_ROWS)['messages']
+        return stories(self.record(), MAX_ROWS)['messages']
 
     @property
     def names(self) -> list[str]:
@@ -159,9 +159,9 @@ def replay(
     heard = table[table['started_s'].notna()]
     found = set(heard['thread'].dropna())
     names = fill_up(found, threads) if len(heard) else []
-    if len(table) > MOST_MESSAGES:
+    if len(table) > MAX_MESSAGES:
         raise ValueError(
-            f'{len(table):,} messages are too many to step through: at most {MOST_MESSAGES:,}.'
+            f'{len(table):,} messages are too many to step through: at most {MAX_MESSAGES:,}.'
         )
     made = events(table, depth, threads if group == REENTRANT else 1)
     setup = {

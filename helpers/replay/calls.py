@@ -9,7 +9,7 @@ from helpers.recording import CallbackRecording
 from helpers.replay import KINDS, Replay, Run, fill_up
 from helpers.replay.events import ARRIVE, END, TAKE
 from helpers.replay.model import stories
-from helpers.replay.picture import MOST_ROWS
+from helpers.replay.picture import MAX_ROWS
 
 DEPTH = 10  # of services and clients, by default; a tick that is seen is taken
 WORDS = {'Timer': 'tick', 'Service': 'request', 'Client': 'answer'}
@@ -58,7 +58,7 @@ def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
         ],
     }
     moves = _moves(tables, calls, names, thread_names)
-    stuck = stories({'setup': setup, 'moves': moves}, MOST_ROWS)['stuck']
+    stuck = stories({'setup': setup, 'moves': moves}, MAX_ROWS)['stuck']
     summary = ' '.join(
         ['One thread.' if threads == 1 else f'{threads} threads.']
         + (stuck or ['Nobody waits for ever.'])

@@ -19,7 +19,7 @@ WIDTH, NARROW = 760, 440  # pixels; the narrow ones stand side by side
 LEFT, RIGHT, TOP, BOTTOM = 46, 14, 14, 40
 LINE, MARK = 16, 28  # of the legend: a line's height, and how far its words are from its mark
 LETTER = 6.6  # about as wide as one of a name
-MOST_ROWS = 120
+MAX_ROWS = 120
 SAFE = "!$'()*+,-./:;=?@_~ "  # may stand in the address of an image, in double quotes
 # Why a message waits, and a callback, as model.js calls it: colour, dashes, and the legend's words.
 WAITS = {

@@ -153,22 +153,22 @@ def _cmake_error(block: list[str]) -> list[str]:
     body = textwrap.dedent('\n'.join(block[1:stack])).strip('\n')
     # CMake breaks lines where the name of a folder happens to end: join, and break again. What was
     # indented, such as the frames of a traceback, it left as it was.
-    told: list[str] = []
+    said: list[str] = []
     for paragraph in re.split(r'\n\s*\n', body):
         if paragraph.startswith(' '):
-            told += paragraph.splitlines()
+            said += paragraph.splitlines()
         elif text := ' '.join(paragraph.split()):
-            told.append(text)
+            said.append(text)
     # It ran a program, which failed: what the program said is what matters.
-    program = [i for i, x in enumerate(told) if re.search(r'returned error code \d+', x)]
+    program = [i for i, x in enumerate(said) if re.search(r'returned error code \d+', x)]
     if program:
-        told = told[program[0] + 1 :]
-        tracebacks = [i for i, x in enumerate(told) if x.startswith('Traceback (')]
+        said = said[program[0] + 1 :]
+        tracebacks = [i for i, x in enumerate(said) if x.startswith('Traceback (')]
         if tracebacks:
-            told = _traceback(told[tracebacks[-1] :])
-        if not told:
+            said = _traceback(said[tracebacks[-1] :])
+        if not said:
             return []
-    short = [part for x in told for part in ([x] if x.startswith(' ') else wrap(x))]
+    short = [part for x in said for part in ([x] if x.startswith(' ') else wrap(x))]
     mine = [x.strip() for x in block[stack + 1 :] if x.strip().startswith('CMakeLists.txt')]
     return [block[0], *(f'  {x}' for x in short), *(f'  called from {x}' for x in mine[-1:])]
 
