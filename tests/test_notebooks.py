@@ -12,11 +12,13 @@ TEXTS = tables.texts_of()
 
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
 def test_lesson(lesson):
-    assert rules.problems(lesson) == []
+    problems = rules.problems(lesson)
+    assert not problems, '\n'.join(problems)
 
 
 def test_lessons_together():
-    assert rules.problems_of_all(LESSONS) == []
+    problems = rules.problems_of_all(LESSONS)
+    assert not problems, '\n'.join(problems)
 
 
 @pytest.fixture(scope='module')

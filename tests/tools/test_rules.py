@@ -18,6 +18,7 @@ URDU = (
     'قطار میں پیغام ہے <bdi dir="ltr">C++</bdi>۔\n</details>'
 )
 VIETNAMESE = '<details lang="vi">\n<summary>Tiếng Việt</summary>\nMột nút (node) ở đây.\n</details>'
+LEAVE_OUT = 'When time runs out, leave out:'
 ALT = 'alt="One dot for each of five messages."'
 
 
@@ -96,6 +97,11 @@ CHANGED = [
     ('says_where_it_belongs', 'For the instructor: 2 minutes', 'For the instructor: ask'),
     ('says_where_it_belongs', 'Part: nodes', 'Part: node'),
     ('says_where_it_belongs', 'Part: nodes', 'Timetables: half a day (step 9)\\nPart: nodes'),
+    ('steps_have_minutes', 'For the instructor: 2 minutes', 'For the instructor: ask'),
+    ('leaves_out_what_is_there', 'Part: nodes', f'Part: nodes\\n{LEAVE_OUT} step 9'),
+    ('leaves_out_what_is_there', 'Part: nodes', f'Part: nodes\\n{LEAVE_OUT} steps 1 and 9'),
+    ('leaves_out_what_is_there', 'Part: nodes', f'Part: nodes\\n{LEAVE_OUT} exercise 2'),
+    ('needs_what_came_before', '**You need**', '**You need** lesson 01 and 90,'),
     ('has_what_a_lesson_has', '"predict"', '"deck-break"'),
     ('has_what_a_lesson_has', '### Exercise 1', '### Practice 1'),
     ('has_what_a_lesson_has', '## In practice', '### Question 4\\n\\n## In practice'),
@@ -158,6 +164,7 @@ ADDED = [
     ('names_stay', code('%time 1\nfor my_guess in [0]:\n    run()')),
     ('exercises_are_checked', code('run()', 'check')),
     ('tagged', note('Ask first.')),
+    ('tagged', new_raw_cell('For the instructor: ask')),
     ('tagged', new_markdown_cell('For the instructor: ask', metadata=note('').metadata)),
     ('fits_a_slide', code('\n'.join(['run()'] * (rules.MAX_CODE_LINES + 1)))),
     ('fits_a_slide', code('%%write a\n' + 'run()\n' * rules.MAX_CODE_LINES)),

@@ -9,13 +9,14 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output, new_raw_cell
 from nbval.plugin import get_sanitize_patterns
 
 from tools.lessons import rules, run
 from tools.lessons.clean import WIDGET, clean, text_of
 
 SANITIZE = Path(__file__).parents[1] / 'nbval_sanitize.cfg'
+TIMED_OUT = '1 failed: TimeoutError: In vain. Nobody.'
 RANDOM_LOG = """\
 import random
 for number in random.sample(range(1000), k=random.randint(5, 15)):
@@ -85,6 +86,7 @@ def test_what_is_cleaned():
     ('sources', 'limit', 'why'),
     [
         (['print("new")', '1 / 0', '2'], 100, '2 failed: ZeroDivisionError: division by zero'),
+        (['raise TimeoutError("In vain.\\nNobody.\\nNever.")'], 100, TIMED_OUT),
         (['import os', 'os._exit(1)'], 100, '2 failed: the kernel ended'),
         (['import time\ntime.sleep(30)'], 1, '1 failed: it took longer than 1 s'),
     ],
@@ -114,6 +116,19 @@ def test_an_unknown_lesson_is_reported(tmp_path, capsys):
     saved(tmp_path, '1')
     assert run.main(['07'], tmp_path) == 1
     assert capsys.readouterr().err.endswith("There is no single lesson '07'. Give one of 00.\n")
+
+
+def test_a_timetable_that_is_not_there_is_reported(tmp_path, capsys):
+    path = saved(tmp_path, '1')
+    notebook = nbformat.read(path, as_version=4)
+    notebook.cells.append(new_raw_cell('For the instructor: a note\n\nTimetables: half day'))
+    path.write_text(text_of(notebook), encoding='utf-8')
+    block = '<!-- made by `make notebooks`: timetable of half a day -->\n\n<!-- end -->\n'
+    (tmp_path / 'teaching.md').write_text(block)
+    assert run.main([], tmp_path) == 1
+    said = "00_try_it.ipynb: there is no timetable 'half day'. Give some of half a day.\n"
+    assert capsys.readouterr().err == said
+    assert (tmp_path / 'teaching.md').read_text() == block
 
 
 def test_a_file_that_is_no_notebook_is_reported(tmp_path, capsys):

@@ -79,7 +79,8 @@ def plan(name: str, after: str, remove: bool, root: Path) -> tuple[dict[str, str
     else:
         if not re.fullmatch(r'[a-z]+(_[a-z0-9]+)+', name):
             raise ValueError(
-                f'Name the lesson in small letters, a verb and what it is about: {EXAMPLE}'
+                'Name the lesson in small letters, a verb and what it is about, with _ between '
+                f'the words: {EXAMPLE}'
             )
         if found:
             raise ValueError(f'There is {found}.ipynb already: choose another name.')

@@ -20,7 +20,7 @@ from tools.lessons.slides import PICTURE, SKIPPED, SLIDE, height
 
 MAX_CODE_LINES = 24  # what a slide has room for
 MAX_WORDS = 180
-LEAST_WORDS = 6  # of an alternative text
+MIN_WORDS = 6  # of an alternative text
 QUESTIONS = 3  # in each lesson's quiz
 EXERCISE = ('exercise', 'check', 'solution')
 TAGS = {'predict', 'nbval-ignore-output', 'deck-break', *EXERCISE, *SKIPPED}
@@ -84,6 +84,20 @@ def sections(lesson: Lesson) -> dict[str, list[str]]:
 def label(line: str) -> str:
     """Return which of LABELS a line of prose opens with, or an empty string."""
     return next((name for name in LABELS if re.match(rf'\*\*{name}\b', line)), '')
+
+
+def labelled(lesson: Lesson, wanted: str) -> list[str]:
+    """Return the lines of the opening that stand under one of LABELS."""
+    found, name = [], ''
+    for line in sections(lesson)['']:
+        name = label(line) or name
+        found += [line] if name == wanted else []
+    return found
+
+
+def section_names(lesson: Lesson) -> list[str]:
+    """Return what is before the dot in each second-level heading: `1`, `2`, `Exercises`, ..."""
+    return [text.partition('.')[0] for _, level, text in headings(lesson) if level == 2]
 
 
 def bold_bullets(lines: list[str]) -> list[str]:
@@ -174,9 +188,9 @@ def pictures_described(lesson: Lesson) -> Iterator[str]:
     known: set[str] = set()
     for index, cell in enumerate(lesson.notebook.cells, 1):
         for alt in alternative_texts(cell):
-            if len(alt.split()) < LEAST_WORDS:
+            if len(alt.split()) < MIN_WORDS:
                 yield (
-                    f'Cell {index} has a picture without an alternative text of {LEAST_WORDS} '
+                    f'Cell {index} has a picture without an alternative text of {MIN_WORDS} '
                     f'words or more: {alt!r}. helpers.alt_text gives one to a figure.'
                 )
             elif alt in known:
@@ -211,10 +225,12 @@ def tagged(lesson: Lesson) -> Iterator[str]:
         folded = tags(cell) & {'solution', 'notes'}
         if ('jupyter' in cell.metadata) != bool(folded):
             yield f'Cell {index}: hide the source of a solution or a note, and of nothing else.'
-        if 'notes' in tags(cell) and not (
-            cell.cell_type == 'raw' and cell.source.startswith(f'{NOTE}: ')
-        ):
-            yield f'Cell {index} is a note: make it a raw cell that begins with `{NOTE}: `.'
+        raw, noted = cell.cell_type == 'raw', 'notes' in tags(cell)
+        if (raw or noted) and not (raw and noted and cell.source.startswith(f'{NOTE}: ')):
+            yield (
+                f'Cell {index} is a note: make it a raw cell with the tag notes that begins with '
+                f'`{NOTE}: `.'
+            )
         if 'solution' in tags(cell) and not re.match(r'# Solution of exercise \d', cell.source):
             yield f'Cell {index} is a solution: begin it with `# Solution of exercise N`.'
 
@@ -296,12 +312,37 @@ def says_where_it_belongs(lesson: Lesson) -> Iterator[str]:
         yield str(error)
 
 
+def steps_have_minutes(lesson: Lesson) -> Iterator[str]:
+    """A note says how long a step takes, or several: `8 minutes, for steps 1 and 2`."""
+    noted = set(lesson.minutes_by_step)
+    text = '\n'.join(cell.source for cell in lesson.notebook.cells if 'notes' in tags(cell))
+    for first, last in re.findall(r'minutes, for steps (\d+) (?:and|to) (\d+)', text):
+        noted |= {str(step) for step in range(int(first), int(last) + 1)}
+    for name in section_names(lesson):
+        if name not in {*noted, *LAST_SECTIONS}:
+            yield f'No note below "## {name}" says how many minutes it takes.'
+
+
+def leaves_out_what_is_there(lesson: Lesson) -> Iterator[str]:
+    there = {f'Step {name}' for name in section_names(lesson)}
+    there |= {name.partition(':')[0] for name in exercises(lesson)}
+    named = re.findall(r'(step|exercise)s? (\d+)(?: (?:and|to) (\d+))?', lesson.leave_out)
+    for kind, *numbers in named:
+        for number in filter(None, numbers):
+            if f'{kind.capitalize()} {number}' not in there:
+                yield f'The first note leaves out {kind} {number}, which is not there.'
+
+
+def needs_what_came_before(lesson: Lesson) -> Iterator[str]:
+    needed = ' '.join(labelled(lesson, 'You need'))
+    for number in re.findall(r'(?:[Ll]essons?|,| and| to) (\d\d)\b', needed):
+        if number >= lesson.number:
+            yield f'"You need" names lesson {number}, which does not come before this one.'
+
+
 def recap_answers_opening(lesson: Lesson) -> Iterator[str]:
-    parts, opening, name = sections(lesson), [], ''
-    for line in parts['']:
-        name = label(line) or name
-        opening += [line] if name == 'You will learn' else []
-    promised, answered = bold_bullets(opening), bold_bullets(parts.get('Recap', []))
+    promised = bold_bullets(labelled(lesson, 'You will learn'))
+    answered = bold_bullets(sections(lesson).get('Recap', []))
     if not promised or not all(promised + answered):
         yield 'Each bullet of "You will learn" and of the recap must start with bold words.'
     if promised != answered:
@@ -310,7 +351,7 @@ def recap_answers_opening(lesson: Lesson) -> Iterator[str]:
 
 def practice_is_backed(lesson: Lesson) -> Iterator[str]:
     """A bullet of "In practice" names the step that shows it, or has a link to what says so."""
-    known = {text.partition('.')[0] for _, level, text in headings(lesson) if level == 2}
+    known = set(section_names(lesson))
     text = '\n'.join(sections(lesson).get('In practice', []))
     for bullet in re.findall(r'^[-*] .*(?:\n +\S.*)*', text, re.MULTILINE):
         shown = known & set(re.findall(r'\b[Ss]teps? (\d+)', bullet))
@@ -498,6 +539,9 @@ EVERY: list[Rule] = [
 LESSON: list[Rule] = [
     steps,
     says_where_it_belongs,
+    steps_have_minutes,
+    leaves_out_what_is_there,
+    needs_what_came_before,
     recap_answers_opening,
     has_what_a_lesson_has,
     practice_is_backed,

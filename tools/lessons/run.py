@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
 
@@ -67,22 +68,7 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
         nonlocal said
         said = os.fstat(written.fileno()).st_size
 
-    log = logging.getLogger('nbclient')
-    log.setLevel(logging.CRITICAL)  # a failure is told once, by the RuntimeError
-    client = NotebookClient(
-        notebook,
-        km=AsyncKernelManager(kernel_spec_manager=_ThisInterpreter()),
-        resources={'metadata': {'path': str(folder)}},
-        timeout=CELL_TIMEOUT_S,
-        force_raise_errors=True,
-        skip_cells_with_tag='',
-        record_timing=False,
-        on_cell_execute=count,
-        on_cell_executed=note,
-        log=log,
-    )
-    # nbval knows no widgets: what is printed into an Output widget is output of the cell.
-    client.widget_registry = {}
+    client = _client(notebook, folder, on_cell_execute=count, on_cell_executed=note)
     environment = os.environ | {
         # Under nbval ipykernel sees this variable, and leaves output written at C level alone.
         'PYTEST_CURRENT_TEST': 'tools/lessons/run.py',
@@ -97,7 +83,9 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
             lines = os.pread(written.fileno(), said, 0).decode(errors='replace').splitlines(True)
             from_c = ''.join(line for line in lines if not line.startswith('[IPKernelApp]'))
     except CellExecutionError as error:
-        what = f'{error.ename}: {error.evalue}'.splitlines()[0]
+        lines = f'{error.ename}: {error.evalue}'.splitlines()
+        # The second line of a time-out says what was waited for.
+        what = ' '.join(lines[: 2 if error.ename == 'TimeoutError' else 1])
     except CellTimeoutError:
         what = f'it took longer than {CELL_TIMEOUT_S} s'
     except (DeadKernelError, AssertionError):  # after Ctrl+C nbclient fails its own assertion
@@ -107,6 +95,25 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
             raise RuntimeError(f'JupyterLab would show on red what C wrote: {from_c[:200]!r}')
         return clean(notebook)
     raise RuntimeError(f'code cell {running} failed: {what}')
+
+
+def _client(notebook: NotebookNode, folder: Path, **hooks: Callable) -> NotebookClient:
+    log = logging.getLogger('nbclient')
+    log.setLevel(logging.CRITICAL)  # a failure is told once, by the RuntimeError
+    client = NotebookClient(
+        notebook,
+        km=AsyncKernelManager(kernel_spec_manager=_ThisInterpreter()),
+        resources={'metadata': {'path': str(folder)}},
+        timeout=CELL_TIMEOUT_S,
+        force_raise_errors=True,
+        skip_cells_with_tag='',
+        record_timing=False,
+        log=log,
+        **hooks,
+    )
+    # nbval knows no widgets: what is printed into an Output widget is output of the cell.
+    client.widget_registry = {}
+    return client
 
 
 def pictures(notebook: NotebookNode) -> dict[str, bytes]:

@@ -88,7 +88,7 @@ def heading(cell: NotebookNode, form: str) -> bool:
 
 def height(cell: NotebookNode) -> float:
     """Return about how high a cell is with its outputs, in hundredths of the slide's height."""
-    if tags(cell) & SKIPPED:
+    if tags(cell) & SKIPPED or cell.cell_type == 'raw':
         return 0.0
     if cell.cell_type == 'markdown':
         source = UNFOLDED.sub(r'\1', cell.source)  # a reader unfolds one part at a time

@@ -47,6 +47,7 @@ def made(texts: Texts) -> Texts:
     Raises ValueError with one sentence where a notebook does not say what a table needs.
     """
     lessons = lessons_of(texts)
+    _check_timetables(lessons, texts)
     should = {name: _with_tables(texts[name], lessons) for name in DOCUMENTS if name in texts}
     for lesson, following in zip(lessons, [*lessons[1:], None], strict=True):
         for cell in lesson.notebook.cells:
@@ -56,6 +57,17 @@ def made(texts: Texts) -> Texts:
             _link(lesson, following if following and following.number != GLOSSARY else None)
         should[f'notebooks/{lesson.file}'] = text_of(clean(lesson.notebook))
     return {path: text for path, text in should.items() if text != texts[path]}
+
+
+def _check_timetables(lessons: list[Lesson], texts: Texts) -> None:
+    documents = '\n'.join(texts.get(name, '') for name in DOCUMENTS)
+    known = re.findall(r'`make notebooks`: timetable of (.+?) -->', documents)
+    for lesson in lessons if known else []:
+        if unknown := [name for name in lesson.timetables if name not in known]:
+            raise ValueError(
+                f'{lesson.file}: there is no timetable {unknown[0]!r}. '
+                f'Give some of {", ".join(known)}.'
+            )
 
 
 def needs_run(lessons: list[Lesson]) -> bool:
