@@ -314,12 +314,12 @@ def says_where_it_belongs(lesson: Lesson) -> Iterator[str]:
 
 def steps_have_minutes(lesson: Lesson) -> Iterator[str]:
     """A note says how long a step takes, or several: `8 minutes, for steps 1 and 2`."""
-    noted = set(lesson.minutes_by_step)
+    noted = {*lesson.minutes_by_step, *LAST_SECTIONS}
     text = '\n'.join(cell.source for cell in lesson.notebook.cells if 'notes' in tags(cell))
     for first, last in re.findall(r'minutes, for steps (\d+) (?:and|to) (\d+)', text):
         noted |= {str(step) for step in range(int(first), int(last) + 1)}
     for name in section_names(lesson):
-        if name not in {*noted, *LAST_SECTIONS}:
+        if name not in noted:
             yield f'No note below "## {name}" says how many minutes it takes.'
 
 
