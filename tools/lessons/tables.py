@@ -61,7 +61,8 @@ def made(texts: Texts) -> Texts:
 
 def _check_timetables(lessons: list[Lesson], texts: Texts) -> None:
     documents = '\n'.join(texts.get(name, '') for name in DOCUMENTS)
-    known = re.findall(r'`make notebooks`: timetable of (.+?) -->', documents)
+    blocks = [what.partition(' of ') for _, what, _ in BLOCK.findall(documents)]
+    known = [name for kind, _, name in blocks if kind == 'timetable']
     for lesson in lessons if known else []:
         if unknown := [name for name in lesson.timetables if name not in known]:
             raise ValueError(
