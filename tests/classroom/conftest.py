@@ -1,0 +1,3 @@
+"""The servers and the browser of these tests."""
+
+from support.browser import *  # noqa: F403

@@ -1,0 +1,83 @@
+"""What container/run.sh says if it cannot go on, with commands that stand for podman."""
+
+import os
+import shutil
+import subprocess
+
+import pytest
+from support.processes import put
+
+from tools.lessons.lesson import ROOT
+
+USED = ('cat', 'chown', 'cksum', 'cut', 'dirname', 'find', 'grep', 'id', 'mkdir', 'mktemp', 'rm',
+        'sh', 'sort', 'tee', 'tr', 'uname')  # fmt: skip
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Run the script where no other commands are. `podman` is what a stand-in does, in sh."""
+    path = tmp_path / 'path'
+    path.mkdir()
+    for command in USED:
+        (path / command).symlink_to(shutil.which(command))
+
+    def run(what, podman=None, **variables):
+        if podman is not None:
+            put(path, 'podman', f'case $1 in version | --version) ;; {podman} esac')
+        environment = {'PATH': str(path), 'LESSONS': str(tmp_path / 'lessons')} | variables
+        return subprocess.run(
+            [ROOT / 'tools/classroom/container/run.sh', what],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+
+    return run
+
+
+@pytest.mark.parametrize('what', ['image', 'lab'])
+def test_no_command(run, what):
+    done = run(what)
+    assert done.returncode == 1
+    assert done.stderr.startswith('There is neither podman nor docker: install one')
+    done = run(what, CONTAINER='nerdctl --namespace x')
+    assert done.stderr.startswith('There is no command nerdctl')
+
+
+@pytest.mark.parametrize(
+    ('answer', 'problem'),
+    [
+        ('exit 125', 'There is no image yet'),
+        ('echo 123-456', 'The image is not of these lessons'),
+    ],
+)
+def test_no_image_of_these_lessons(run, answer, problem):
+    done = run('lab', f'image) {answer} ;;')
+    said = f'{problem}: run `make image`, then try again.\n'
+    assert (done.returncode, done.stderr) == (1, said)
+
+
+def label(run):
+    """Return what the script writes onto an image that it builds."""
+    done = run('image', 'build) echo "$*" ;;')
+    assert done.returncode == 0, done.stderr
+    return done.stdout.partition('--label lessons=')[2].split()[0]
+
+
+def test_a_port_in_use(run):
+    own, words = label(run), 'Bind for 127.0.0.1:8931 failed: port is already allocated'
+    done = run('lab', f'image) echo {own} ;; run) echo "{words}" >&2; exit 126 ;;', PORT='8931')
+    assert done.returncode == 126
+    assert done.stderr.startswith('The port 8931 is already in use: choose another one')
+
+
+def test_the_lessons_and_port_of_a_run(run, tmp_path):
+    own = label(run)
+    done = run('lab', f'image) echo {own} ;; run) echo "$*" ;;', PORT='8931')
+    assert done.returncode == 0, done.stderr
+    said = done.stdout
+    assert '--publish 127.0.0.1:8931:8931' in said
+    assert f'--volume {tmp_path / "lessons"}:/home/student' in said
+    assert '--user 0:' not in said
+    assert os.path.isdir(tmp_path / 'lessons')

@@ -1,0 +1,1 @@
+"""Everything for a class: README.md says what each part is for."""

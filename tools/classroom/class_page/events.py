@@ -1,0 +1,83 @@
+"""What a student's computer may send. Everything else is refused with one sentence."""
+
+import json
+import time
+
+from jsonschema import Draft202012Validator
+
+from helpers.classroom import BATCH, ITEMS, LARGEST
+from helpers.classroom import TEXT as LONGEST
+
+LARGEST_BODY = 256 * 1024  # bytes
+NUMBER = {'type': 'number', 'minimum': -LARGEST, 'maximum': LARGEST}
+# No letter may end a line, be unseen, or turn the direction of reading.
+PRINTABLE = r'^[^\x00-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ud800-\udfff]*\Z'
+TEXT = {'type': 'string', 'maxLength': LONGEST, 'pattern': PRINTABLE}
+PLAIN = {'anyOf': [{'type': 'boolean'}, NUMBER, TEXT]}
+VALUE = {'anyOf': [PLAIN, {'type': 'array', 'maxItems': ITEMS, 'items': PLAIN}]}
+
+
+def _form(**fields: dict) -> Draft202012Validator:
+    """Return the form of an object that has these fields and no others."""
+    form = {'type': 'object', 'properties': fields, 'required': [*fields]}
+    return Draft202012Validator(form | {'additionalProperties': False})
+
+
+EVENT = {
+    'id': {'type': 'string', 'pattern': r'^[0-9a-f]{16}\Z'},
+    'kind': TEXT,
+    'lesson': TEXT,
+}
+KINDS = {
+    'guess': _form(**EVENT, question=TEXT, value=VALUE),
+    'outcome': _form(**EVENT, question=TEXT, value=VALUE),
+    'task': _form(**EVENT, task={'type': 'integer'}, solved={'type': 'boolean'}),
+    'cell': _form(**EVENT, cell=TEXT),
+    'hand': _form(**EVENT, up={'type': 'boolean'}),
+}
+EVENTS = _form(events={'type': 'array', 'maxItems': BATCH})
+JOIN = _form(code=TEXT, name=TEXT | {'maxLength': 40})
+
+
+def parse(body: bytes, form: Draft202012Validator) -> dict:
+    """Return what a message holds. Raises ValueError with one sentence for any other form."""
+    try:
+        found = json.loads(body, parse_constant=_refuse)
+        json.dumps(found, ensure_ascii=False).encode()
+    except (ValueError, RecursionError):  # among them what is no UTF-8
+        raise ValueError('This is no message to a class: it is not JSON.') from None
+    if not form.is_valid(found):
+        raise ValueError('This is no message to a class: it has another form.')
+    return found
+
+
+def _refuse(constant: str) -> None:
+    raise ValueError(constant)  # NaN and Infinity are no JSON
+
+
+def is_event(event: object) -> bool:
+    """Return whether an event has the form of its kind."""
+    kind = event.get('kind') if isinstance(event, dict) else None
+    return isinstance(kind, str) and kind in KINDS and KINDS[kind].is_valid(event)
+
+
+class Limit:
+    """Allows `rate` things a second for long, and `burst` at once."""
+
+    def __init__(self, rate: float, burst: int) -> None:
+        self.rate, self.burst = rate, burst
+        self._left, self._at = float(burst), time.monotonic()
+
+    def left(self) -> float:
+        """Return how many things are allowed now."""
+        now = time.monotonic()
+        self._left = min(self.burst, self._left + (now - self._at) * self.rate)
+        self._at = now
+        return self._left
+
+    def take(self, count: int = 1) -> bool:
+        """Return whether `count` things are allowed now, and count them if they are."""
+        if self.left() < count:
+            return False
+        self._left -= count
+        return True

@@ -1,0 +1,113 @@
+"""The notes window, which follows the deck: a part of the server of `make present`.
+
+presenter.js keeps in a workspace of JupyterLab where the deck is. The rest is in the notebook.
+"""
+
+import html
+import time
+from functools import lru_cache
+from pathlib import Path
+
+import nbformat
+from jupyter_server.base.handlers import JupyterHandler
+from jupyter_server.serverapp import ServerApp
+from jupyter_server.utils import url_path_join
+from nbconvert.filters import markdown2html
+from tornado import web
+
+from tools.classroom.class_page import page_file
+from tools.classroom.notes import of_step
+from tools.classroom.present import FOLDER, deck
+
+HERE = Path(__file__).resolve().parent
+FILES = {  # by the name in the address
+    '': ('window.html', 'text/html'),
+    'window.css': ('window.css', 'text/css'),
+    'window.js': ('window.js', 'text/javascript'),
+}
+
+
+def state(root: Path, deck: dict) -> dict:
+    """Return what the window shows: of the notebook `deck['current']`, and of its cell.
+
+    `root` is the folder with the copies, `deck` what presenter.js keeps. Without a deck the answer
+    is empty.
+    """
+    file = root / FOLDER / Path(deck.get('current', '')).name
+    if not file.is_file():
+        return {}
+    try:
+        cells = _cells(file, file.stat().st_mtime_ns)
+    except (OSError, ValueError):  # JupyterLab is writing it
+        return {}
+    at = min(deck['places'].get(deck['current'], 0), len(cells) - 1)
+    types = [cell.metadata.get('slideshow', {}).get('slide_type') for cell in cells]
+    starts = [i for i, kind in enumerate(types) if kind in ('slide', 'subslide')]
+    starts += [len(cells)] * 2  # the end of the last slide, and of the one after it, which is empty
+    slide = sum(start <= at for start in starts)
+    on_slide = range(at + 1, starts[slide])
+    on_slide = [cells[i] for i in on_slide if types[i] == 'fragment']
+    following = [cells[i] for i in range(*starts[slide : slide + 2]) if types[i] != 'skip']
+    began = deck['began'].get(deck['current'])
+    return of_step(cells, at) | {
+        'slide': slide,
+        'slides': len(starts) - 2,
+        'next': 'On this slide' if on_slide else 'Next slide',
+        'cells': ''.join(map(_html, on_slide or following)),
+        'gone': int(time.time() - began) // 60 if began else 0,
+    }
+
+
+@lru_cache(maxsize=2)
+def _cells(file: Path, _changed: int) -> list[nbformat.NotebookNode]:
+    """Return the cells of a notebook. It is read again where the time of its change is another."""
+    return nbformat.read(file, as_version=4).cells
+
+
+def _html(cell: nbformat.NotebookNode) -> str:
+    if cell.cell_type == 'markdown':
+        return markdown2html(cell.source)
+    return f'<pre>{html.escape(cell.source)}</pre>'
+
+
+class Window(JupyterHandler):
+    """Answer the instructor, whom JupyterLab knows: the page, its files, the state as JSON."""
+
+    def initialize(self, root: Path) -> None:
+        """Take over the folder with the copies."""
+        self.root = root
+
+    @web.authenticated
+    def get(self, name: str) -> None:
+        """Answer a request for /notes/NAME."""
+        self.set_header('Cache-Control', 'no-store')
+        if name == 'state':
+            self.finish(state(self.root, deck()))
+        elif name in FILES:
+            file, kind = FILES[name]
+            self.set_header('Content-Type', f'{kind}; charset=UTF-8')
+            self.finish((HERE / file).read_bytes())
+        else:
+            raise web.HTTPError(404)
+
+
+class PageOfClass(JupyterHandler):
+    """Give the slides the address of the class page; nothing if no class is open."""
+
+    @web.authenticated
+    def get(self) -> None:
+        """Answer with the address."""
+        self.set_header('Content-Type', 'text/plain')
+        self.finish(page_file().read_text() if page_file().is_file() else '')
+
+
+def _load_jupyter_server_extension(server: ServerApp) -> None:
+    """Add the window to the server of `make present`."""
+    base, root = server.web_app.settings['base_url'], Path(server.root_dir)
+    server.web_app.add_handlers(
+        '.*',
+        [
+            (url_path_join(base, 'notes/(.*)'), Window, {'root': root}),
+            (url_path_join(base, 'class'), PageOfClass),
+        ],
+    )
