@@ -1,12 +1,11 @@
 #!/bin/sh
 # Write requirements.lock: every dependency of pyproject.toml, pinned, with the hashes of its files.
 # And requirements-GROUP.lock for each of its groups: what that needs besides.
-# usage: tools/lock.sh UV [--upgrade]
+# usage: tools/lock.sh [--upgrade]
 # Without --upgrade a version that still fits stays as it is.
 set -eu
 cd "$(dirname "$0")/.."
-uv=$1
-shift
+. tools/uv.sh
 
 new=.requirements.lock.new
 trap 'rm -f "$new" "$new.checked"' EXIT
@@ -18,10 +17,10 @@ resolve() { # LOCK, and what uv resolves; uv keeps the versions that it finds in
     # empy has no wheel: tools/set_up.sh builds its one module.
     "$uv" pip compile --universal --python-version 3.11 \
         --only-binary :all: --no-binary empy --generate-hashes --no-annotate --no-header \
-        --no-emit-index-url --no-emit-find-links --quiet --output-file "$new" "$@" > /dev/null
+        --no-emit-index-url --no-emit-find-links --output-file "$new" "$@" > /dev/null
 }
 
-resolve requirements.lock pyproject.toml --all-extras "$@"
+resolve requirements.lock pyproject.toml --extra ros "$@"
 
 # The lock fits several Pythons, but a package may lack the wheel of one. tools/set_up.sh reads the
 # result in the second line, and need not ask the package index.
@@ -35,10 +34,7 @@ for python in 3.14 3.13 3.12 3.11; do
     fi
     rm -f "$new.checked"
 done
-if [ -z "$pythons" ]; then
-    echo 'No Python has a wheel of every package: requirements.lock stays as it was.' >&2
-    exit 1
-fi
+[ -n "$pythons" ] || fail 'No Python has a wheel of every package: requirements.lock stays as it was.'
 {
     echo '# Made by `make lock` from pyproject.toml. Do not edit.'
     echo "# Every wheel exists for Python$pythons"
@@ -47,7 +43,7 @@ fi
 echo "requirements.lock: $(grep -c '^[a-z].*==' requirements.lock) pins, Python$pythons"
 
 constraints='--constraint requirements.lock'
-for group in browser site hub; do
+for group in uv test browser site hub licences; do
     resolve "requirements-$group.lock" --group "$group" $constraints "$@"
     {
         echo "# Made by \`make lock\` from the group \`$group\` of pyproject.toml. Do not edit."
