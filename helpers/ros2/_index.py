@@ -1,0 +1,70 @@
+"""The ament index: which packages are installed where, and which interfaces they have.
+
+The prefixes of AMENT_PREFIX_PATH come first, in their order, then this environment, which the
+wheels do not name there.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from helpers.ros2._errors import CommandError
+
+INDEX = 'share/ament_index/resource_index'
+KINDS = 'msg', 'srv', 'action'
+
+
+def prefixes() -> list[Path]:
+    """Return where packages are installed. The first one that has a package wins."""
+    named = [Path(p) for p in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if p]
+    return [p for p in dict.fromkeys([*named, Path(sys.prefix)]) if (p / INDEX).is_dir()]
+
+
+def packages(resource: str = 'packages') -> dict[str, Path]:
+    """Return the packages that have a resource in the index, each with its prefix."""
+    found: dict[str, Path] = {}
+    for prefix in prefixes():
+        for file in sorted((prefix / INDEX / resource).glob('[!.]*')):
+            found.setdefault(file.name, prefix)
+    return found
+
+
+def prefix_of(package: str, missing: str = "Package '{}' not found") -> Path:
+    """Return the prefix of a package. Raises CommandError if there is none."""
+    try:
+        return packages()[package]
+    except KeyError:
+        raise CommandError(missing.format(package)) from None
+
+
+def executables(package: str) -> list[Path]:
+    """Return the executables of a package. Raises CommandError if there is no such package."""
+    found = []
+    for folder, folders, files in os.walk(prefix_of(package) / 'lib' / package):
+        folders[:] = sorted(name for name in folders if not name.startswith('.'))
+        found += [Path(folder, name) for name in sorted(files)]
+    return [file for file in found if os.access(file, os.X_OK)]
+
+
+def complete_packages(**kwargs: Any) -> list[str]:
+    """Return the names of all packages, for Tab."""
+    return sorted(packages())
+
+
+def interfaces(package: str | None = None) -> list[str]:
+    """Return the names of all interfaces, or of those of a package, sorted by package and kind."""
+    names = set()
+    for owner, prefix in packages('rosidl_interfaces').items():
+        if package not in (None, owner):
+            continue
+        file = prefix / INDEX / 'rosidl_interfaces' / owner
+        for line in file.read_text(encoding='utf-8').splitlines():
+            stem, _, suffix = line.rpartition('.')
+            kind = stem.partition('/')[0]
+            # A name with an underscore is a part of a service or an action.
+            if kind in KINDS and suffix in ('idl', kind) and '_' not in stem:
+                names.add(f'{owner}/{stem}')
+    return sorted(names)

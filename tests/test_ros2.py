@@ -1,0 +1,419 @@
+"""The ros2 command: what the real one prints, and what it does where the real one leaves off."""
+
+import contextlib
+import importlib
+import json
+import os
+import random
+import re
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from domain_coordinator import domain_id
+from support.waits import LIMIT_S, START_LIMIT_S
+
+from helpers.ros2 import _index, _sessions
+from helpers.ros2._values import _slots, filled, read_yaml, to_yaml
+from helpers.ros2.main import main
+
+DATA = Path(__file__).parent / 'ros2'
+OUTPUTS = {one['command']: one for one in json.loads((DATA / 'outputs.json').read_text())}
+RACES = re.compile(r'(?m)^(waiting for service|Waiting for at least).*\n')  # in some runs only
+MOVING = re.compile(r'(?<=GID: ).*|(?<=ID: )[0-9a-f]{32}|(?<=_ros2cli_)\w+')
+TOOLS = re.compile('launch|osrf|ros2|rosidl_runtime_py')  # packages of the real command
+
+
+@contextlib.contextmanager
+def process(*command, **variables):
+    """Run a process beside the block, and end it as Ctrl+C does."""
+    started = subprocess.Popen(
+        command,
+        env={**os.environ, 'PYTHONUNBUFFERED': '1', **variables},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        yield started
+    finally:
+        started.send_signal(signal.SIGINT)
+        try:
+            started.communicate(timeout=LIMIT_S)
+        except (subprocess.TimeoutExpired, ValueError):
+            started.kill()
+
+
+def ros2(*words, **variables):
+    return process(str(Path(sys.executable).with_name('ros2')), *words, **variables)
+
+
+def python(script, *arguments, **variables):
+    return process(sys.executable, '-c', script, *arguments, **variables)
+
+
+@pytest.fixture(scope='module')
+def domain():
+    """Reserve a domain for the commands of this file."""
+    with domain_id() as free, pytest.MonkeyPatch.context() as patch:
+        patch.setenv('ROS_DOMAIN_ID', str(free))
+        patch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        patch.setenv('COLUMNS', '100')
+        yield free
+
+
+@pytest.fixture(scope='module')
+def graph(domain):
+    """Run the nodes at which the real command was pointed."""
+    with process(sys.executable, str(DATA / 'nodes.py')) as nodes:
+        assert nodes.stdout.readline() == 'ready\n'
+        yield nodes
+
+
+@pytest.fixture
+def own_domain(monkeypatch):
+    """Reserve a domain for one test, in which nobody else is."""
+    with domain_id() as free:
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(free))
+        yield free
+
+
+@pytest.fixture
+def run(domain, capfd):
+    """Return a function that runs a command here, and returns its status and what it prints."""
+
+    def run(command):
+        status = main(shlex.split(command))
+        return status, *capfd.readouterr()
+
+    return run
+
+
+def masked(text):
+    text = MOVING.sub('*', RACES.sub('', text))
+    return text.replace(sys.prefix, 'ENVIRONMENT')
+
+
+def test_prints_what_the_real_command_prints(graph, run):
+    differ = {}
+    for command, real in OUTPUTS.items():
+        expected = real['exit'], real['stdout'], real['stderr']
+        said = run(command.removeprefix('ros2 '))
+        if command == 'ros2 pkg list':  # the packages of two environments
+            packages = [name for name in real['stdout'].split() if not TOOLS.match(name)]
+            said, expected = set(packages) - set(said[1].split()), set()
+        elif command == 'ros2 interface package std_srvs':  # in an order that is never the same
+            said, expected = [(s, sorted(o.split()), e) for s, o, e in (said, expected)]
+        else:
+            said, expected = [(s, masked(o), masked(e)) for s, o, e in (said, expected)]
+        if said != expected:
+            differ[command] = said, expected
+    assert differ == {}
+    assert len(OUTPUTS) == 71
+
+
+# --- Values
+
+
+def instances():
+    """Yield a message of each part of each interface of the wheels."""
+    parts = {'msg': [''], 'srv': ['Request', 'Response'], 'action': ['Goal', 'Result', 'Feedback']}
+    for name in _index.interfaces():
+        package, kind, last = name.split('/')
+        found = getattr(importlib.import_module(f'{package}.{kind}'), last)
+        for part in parts[kind]:
+            yield (getattr(found, part) if part else found)()
+
+
+def drawn(slot, draw):
+    """Return a value for a slot of a message."""
+    name = type(slot).__name__
+    if 'Sequence' in name or name == 'Array':
+        most = min(slot.maximum_size, 3) if name == 'BoundedSequence' else 3
+        size = slot.size if name == 'Array' else draw.randint(0, most)
+        return [drawn(slot.value_type, draw) for _ in range(size)]
+    if hasattr(slot, 'namespaced_name'):
+        *modules, last = slot.namespaced_name()
+        return drawn_message(getattr(importlib.import_module('.'.join(modules)), last)(), draw)
+    if 'String' in name:
+        most = min(getattr(slot, 'maximum_size', 8), 8)
+        return ''.join(draw.choices('aé1: \n\t#-\'"{}[]~\\\x85\u2028😀🤖', k=draw.randint(0, most)))
+    if slot.typename == 'boolean':
+        return draw.random() < 0.5
+    if slot.typename == 'octet':
+        return bytes([draw.randrange(256)])
+    if slot.typename in ('float', 'double'):
+        return draw.choice([0.0, 0.1, -1e30, 1e-7, float('inf'), draw.uniform(-9, 9)])
+    bits = int(re.sub(r'\D', '', slot.typename) or 8)
+    return draw.choice([0, 1, 2 ** (bits - slot.typename.startswith('int')) - 1])
+
+
+def drawn_message(message, draw):
+    for name, slot in _slots(message):
+        setattr(message, name, drawn(slot, draw))
+    return message
+
+
+@pytest.mark.parametrize('flow_style', [False, True])
+def test_yaml_of_every_interface_becomes_the_message(flow_style):
+    draw, number = random.Random(2026), 0
+    for message in instances():
+        for _ in range(3):
+            expected = drawn_message(type(message)(), draw)
+            text = to_yaml(expected, flow_style)
+            assert filled(type(message)(), text, '{}')[0] == expected, text
+            number += 1
+    assert number > 600
+
+
+# --- What may happen
+
+
+PUBLISHERS = """
+import sys, rclpy
+from rclpy.node import Node
+from std_msgs.msg import Int32, String
+rclpy.init()
+nodes = [Node(f'node_{i}') for i in range(int(sys.argv[1]))]
+nodes[-1].create_publisher(Int32 if len(nodes) > 1 else String, '/both', 1)
+print('ready', flush=True)
+sys.stdin.read()
+"""
+
+
+def test_finds_200_nodes_at_once(own_domain, run):
+    with python(PUBLISHERS, '199') as many, python(PUBLISHERS, '1') as one:
+        assert many.stdout.readline() == one.stdout.readline() == 'ready\n'
+        assert run('node list -c') == (0, '200\n', '')
+        assert run('topic list -t')[1].count('/both [std_msgs/msg/Int32, std_msgs/msg/String]') == 1
+        status, out, err = run('topic echo /both')
+        assert (status, out) == (1, '')
+        assert err == (
+            "Cannot echo topic '/both', as it contains more than one type: "
+            '[std_msgs/msg/Int32, std_msgs/msg/String]\n'
+        )
+
+
+def test_sees_nodes_of_many_processes_right_after_their_start(own_domain, run):
+    with contextlib.ExitStack() as stack:
+        started = [stack.enter_context(python(PUBLISHERS, '1')) for _ in range(4)]
+        for one in started:
+            assert one.stdout.readline() == 'ready\n'
+        for _ in range(5):
+            assert run('node list -c')[1] == '4\n'
+
+
+def test_echo_goes_on_when_a_publisher_ends(domain):
+    script = """
+import time, rclpy
+from std_msgs.msg import String
+rclpy.init()
+publisher = rclpy.create_node('short').create_publisher(String, '/short', 1)
+while not publisher.get_subscription_count():
+    time.sleep(0.01)
+publisher.publish(String(data='said'))
+publisher.wait_for_all_acked()
+"""
+    with ros2(
+        'topic', 'echo', '/short', 'std_msgs/msg/String', '--qos-reliability', 'reliable'
+    ) as echo:
+        for _ in range(2):
+            with python(script) as short:
+                assert short.wait(START_LIMIT_S) == 0, short.stderr.read()
+            assert [echo.stdout.readline() for _ in range(2)] == ['data: said\n', '---\n']
+        assert echo.poll() is None
+
+
+@pytest.mark.parametrize(
+    ('words', 'first'),
+    [
+        (['topic', 'echo', '/imu/data', '--field', 'header.frame_id'], '\n'),
+        (['topic', 'hz', '/nothing'], 'WARNING: topic [/nothing] does not appear'),
+        (['topic', 'pub', '/out', 'std_msgs/msg/Empty'], 'publisher: beginning loop'),
+        (['service', 'call', '/nothing', 'std_srvs/srv/Empty'], 'waiting for service'),
+    ],
+)
+def test_ctrl_c_ends_a_command_without_a_word(graph, words, first):
+    with ros2(*words) as command:
+        assert command.stdout.readline().startswith(first)
+        command.send_signal(signal.SIGINT)
+        _, err = command.communicate(timeout=LIMIT_S)
+        assert (command.returncode, err) == (int(signal.SIGINT), '')
+
+
+def test_a_closed_pipe_is_no_error(graph):
+    with ros2('topic', 'echo', '/imu/data') as command:
+        command.stdout.readline()
+        command.stdout.close()
+        assert command.wait(LIMIT_S) == 128 + signal.SIGPIPE
+        assert command.stderr.read() == ''
+
+
+@pytest.mark.parametrize(
+    ('command', 'status', 'sentence'),
+    [
+        ('tpic', 2, "ros2: error: there is no 'tpic', only action, "),
+        ('topic lst', 2, "ros2 topic: error: there is no 'lst', only bw, delay, "),
+        ('topic hz', 2, 'ros2 topic hz: error: the following arguments are required: topic_name'),
+        ('topic echo /chatter no_msgs/msg/No', 1, 'The passed message type is invalid'),
+        ('topic echo /battery --field nope --once', 1, "Invalid field 'nope': 'BatteryState' ob"),
+        ('topic echo /a//b', 1, 'Invalid topic name: '),
+        ('topic pub /x std_msgs/msg/String "{data: [}"', 1, 'The passed value is not YAML: '),
+        ('topic pub /x std_msgs/msg/String text', 1, 'The passed value needs to be a dictionary'),
+        ('topic pub /x std_msgs/msg/Int8 "{data: x}"', 1, 'Failed to populate field: inv'),
+        ('service call /motors std_srvs/srv/No', 1, 'The passed service type is invalid'),
+        ('service call /motors std_srvs/srv/SetBool "{on: 1}"', 1, 'Failed to populate field: '),
+        ('action send_goal /count test_msgs/action/No', 1, 'The passed action type is invalid'),
+        ('param load /robot nowhere.yaml', 1, 'Cannot load nowhere.yaml: '),
+        ('lifecycle get /robot', 1, 'Node not found'),
+        ('pkg executables nothing', 1, "Package 'nothing' not found"),
+    ],
+)
+def test_mistakes_get_one_sentence_and_a_status(graph, run, command, status, sentence):
+    said = run(command)
+    assert (said[0], said[1]) == (status, '')
+    assert said[2].startswith(sentence)
+    assert said[2].count('\n') == 1
+
+
+def test_lifecycle_walks_through_the_states(own_domain, run):
+    script = """
+import rclpy
+from rclpy.lifecycle import LifecycleNode
+rclpy.init()
+node = LifecycleNode('camera')
+print('ready', flush=True)
+rclpy.spin(node)
+"""
+    with python(script) as camera:
+        assert camera.stdout.readline() == 'ready\n'
+        assert run('lifecycle nodes')[1] == '/camera\n'
+        assert run('lifecycle get')[1] == '/camera: unconfigured [1]\n'
+        assert run('lifecycle list /camera')[1].startswith('- configure [1]\n\tStart: unconfig')
+        assert run('lifecycle set /camera configure') == (0, 'Transitioning successful\n', '')
+        assert run('lifecycle get camera')[1] == 'inactive [2]\n'
+        assert run('lifecycle set camera fly')[2].startswith('Unknown transition requested, ava')
+
+
+def test_parameters_go_to_a_file_and_back(graph, run, tmp_path):
+    run('param set /robot gains "[3.0, 4.0]"')
+    saved = tmp_path / 'robot.yaml'
+    saved.write_text(run('param dump /robot')[1].replace('    wheels: 2\n', ''))
+    run('param set /robot gains "[5.0]"')
+    assert 'Set parameter gains successful\n' in run(f'param load /robot {saved}')[1]
+    assert run('param get /robot gains')[1] == 'Double values are: [3.0, 4.0]\n'
+    assert read_yaml(saved.read_text())['/robot']['ros__parameters']['gains'] == [3.0, 4.0]
+
+
+# --- Where it is
+
+
+IN_SESSION = """
+import subprocess, sys
+from pathlib import Path
+from helpers.ros2 import _sessions
+_sessions.FOLDER = Path(sys.argv[1])
+from helpers.session import ros_session
+from rclpy.node import Node
+with ros_session() as session:
+    node = Node(sys.argv[2])
+    print('open', flush=True)
+    sys.stdin.read(1)
+"""
+TERMINAL = """
+import sys
+from pathlib import Path
+from helpers.ros2 import _sessions
+_sessions.FOLDER = Path(sys.argv[1])
+from helpers.ros2.main import main
+sys.exit(main(['node', 'list']))
+"""
+
+
+def test_terminal_finds_the_only_open_session(monkeypatch, tmp_path):
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+
+    def terminal():
+        with python(TERMINAL, str(tmp_path)) as command:
+            return *command.communicate(timeout=START_LIMIT_S), command.returncode
+
+    with contextlib.ExitStack() as stack:
+        for name in ('one', 'two'):
+            session = python(IN_SESSION, str(tmp_path), name, JPY_SESSION_NAME=f'{name}.ipynb')
+            last = stack.enter_context(session)
+            assert last.stdout.readline() == 'open\n'
+            if name == 'one':
+                assert terminal() == ('/one\n', '', 0)
+        out, err, status = terminal()
+        assert (out, status) == ('', 1)
+        assert re.fullmatch(
+            r'2 notebooks .* one.ipynb \(\d+\), two.ipynb \(\d+\)\. Choose .*\n', err
+        )
+        last.kill()  # its record stays, and does not count
+        last.wait()
+        assert terminal() == ('/one\n', '', 0)
+
+
+def test_a_cell_meets_its_own_kernel(monkeypatch, tmp_path):
+    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
+    script = IN_SESSION.replace(
+        'sys.stdin.read(1)', "subprocess.run([sys.prefix + '/bin/ros2', 'node', 'list'])"
+    )
+    other = python(IN_SESSION, str(_sessions.FOLDER), 'other')
+    with other as session, python(script, str(_sessions.FOLDER), 'mine') as cell:
+        assert session.stdout.readline() == 'open\n'
+        assert cell.communicate(timeout=START_LIMIT_S)[0] == 'open\n/mine\n'
+
+
+def test_leaves_to_a_sourced_ros(tmp_path):
+    real = tmp_path / 'ros2'
+    real.write_text('#!/bin/sh\necho the real one: "$@"\n')
+    real.chmod(0o755)
+    path = f'{Path(sys.executable).parent}:{tmp_path}:{os.environ["PATH"]}'
+    with ros2('topic', 'list', PATH=path, ROS_DISTRO='jazzy') as command:
+        assert command.communicate(timeout=START_LIMIT_S)[0] == 'the real one: topic list\n'
+    with ros2('--version', PATH=path) as command:
+        assert 'follows ros2cli 0.32.2' in command.communicate(timeout=START_LIMIT_S)[0]
+
+
+def test_created_packages_can_be_built_and_run(run, monkeypatch, tmp_path):
+    (tmp_path / 'src').mkdir()
+    monkeypatch.chdir(tmp_path / 'src')
+    about = '--maintainer-name you --maintainer-email you@example.com --license Apache-2.0'
+    command = (
+        f'pkg create --build-type ament_python {about} --dependencies rclpy --node-name talker py'
+    )
+    status, out, err = run(command)
+    assert (status, err) == (0, '')
+    assert "dependencies: ['rclpy']\nnode_name: talker\ncreating folder ./py\n" in out
+    assert run(command)[0] == 1  # it is there already
+    monkeypatch.chdir(tmp_path)
+    subprocess.run(
+        [Path(sys.executable).with_name('colcon'), 'build'], check=True, capture_output=True
+    )
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path / 'install' / 'py'))
+    assert run('pkg executables py')[1] == 'py talker\n'
+    monkeypatch.setenv(
+        'PYTHONPATH', str(next(tmp_path.glob('install/py/lib/python*/site-packages')))
+    )
+    assert run('run py talker') == (0, 'Hi from py.\n', '')
+
+
+def test_tab_completes_names(graph, tmp_path):
+    def completed(line):
+        file = tmp_path / 'completions'
+        script = (
+            'import os, sys; os.dup2(os.open(sys.argv[1], os.O_RDWR | os.O_CREAT), 8);'
+            'from helpers.ros2.main import main; main()'
+        )
+        variables = {'COMP_LINE': line, 'COMP_POINT': str(len(line)), '_ARGCOMPLETE': '1'}
+        with python(script, str(file), **variables) as command:
+            command.wait(START_LIMIT_S)
+        return file.read_text().split('\v')
+
+    assert completed('ros2 top') == ['topic ']
+    assert completed('ros2 topic echo /cha') == ['/chatter ']
