@@ -1,0 +1,120 @@
+// The drive of a robot: one more run under the slider of view.js, with a floor instead of lists.
+
+// Return what walk.js returns of a run: times, seek, scan. And `told`, which steps say something.
+function drive(record) {
+  const { unit, step, commands, events } = record;
+  const numbers = (text, Kind) => new Kind(Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer);
+  const poses = numbers(record.poses, Int16Array); // five numbers each: x, y, yaw, v, w
+  const scans = numbers(record.scans, Uint8Array);
+  const beams = scans.length / record.scanned.length;
+  const turn = w => (w ? ` and ${(w / 1000).toFixed(2)} rad/s` : '');
+  const speed = ([, v, w]) => `${(v / 1000).toFixed(2)} m/s${turn(w)}`;
+  const told = one => (one[1] || one[2] ? `The robot is told to drive ${speed(one)}.` : 'The robot is told to stop.');
+  const because = ([, , , seq, age]) => (seq < 0
+    ? '' : ` The callback of message ${seq} says so, which is ${(age / 1000).toFixed(2)} s old.`);
+  const isNew = (one, i) => !i || one[1] !== commands[i - 1][1] || one[2] !== commands[i - 1][2];
+  const steps = [
+    ...Array.from({ length: poses.length / 5 }, (_, i) => [1000 * i * step, '']),
+    ...commands.map((one, i) => [one[0], isNew(one, i) ? told(one) + because(one) : '']),
+    ...events,
+  ].sort(([one], [other]) => one - other);
+  let text = '';
+  const says = steps.map(([, said]) => (text = said || text));
+
+  // Between two poses it is on a straight line.
+  function pose(ms) {
+    const last = poses.length / 5 - 1;
+    const exact = Math.min(Math.max(ms / (1000 * step), 0), last);
+    const i = Math.min(Math.floor(exact), Math.max(last - 1, 0));
+    const part = last ? exact - i : 0;
+    const value = k => poses[5 * i + k] + part * ((poses[5 * (i + 1) + k] ?? 0) - poses[5 * i + k]);
+    const from = poses[5 * i + 2] / 1e4;
+    const turn = Math.atan2(...['sin', 'cos'].map(f => Math[f]((poses[5 * i + 7] ?? 0) / 1e4 - from)));
+    return { x: value(0) * unit, y: value(1) * unit, yaw: from + part * turn, v: value(3) / 1000, w: value(4) / 1000 };
+  }
+
+  const latest = (rows, ms) => rows.findLast(([at]) => at <= ms);
+
+  // The path around what the laser saw, from where it was.
+  function fan(scan) {
+    if (!scan) return '';
+    const { x, y, yaw } = pose(scan[0]);
+    const i = record.scanned.indexOf(scan);
+    const hits = Array.from({ length: beams }, (_, k) => {
+      const angle = yaw + record.view * (k / (beams - 1) - 0.5);
+      const range = scans[i * beams + k] * record.range;
+      return `${(x + range * Math.cos(angle)).toFixed(2)} ${(y + range * Math.sin(angle)).toFixed(2)}`;
+    });
+    return `M${x} ${y}L${hits.join('L')}z`;
+  }
+
+  // All that is seen at a time.
+  function look(ms) {
+    const command = latest(commands, ms);
+    const taken = command && command[3] >= 0 ? record.scanned.findLast(([, seq]) => seq <= command[3]) : undefined;
+    const now = latest(record.scanned, ms);
+    const till = Math.min(Math.floor(ms / (1000 * step)), poses.length / 5 - 1);
+    return {
+      ...pose(ms), command, till, fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]),
+      told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}, ${(command[4] / 1000).toFixed(2)} s old`) : 'nothing yet',
+    };
+  }
+
+  return {
+    times: steps.map(([ms]) => 1000 * ms),
+    told: steps.map(([, said]) => said !== ''),
+    points: Array.from({ length: poses.length / 5 }, (_, i) => `${(poses[5 * i] * unit).toFixed(2)} ${(poses[5 * i + 1] * unit).toFixed(2)}`),
+    says: to => says[to - 1] ?? '',
+    scan: () => ({ about: steps.map(() => []), losses: [] }),
+    look,
+  };
+}
+
+const FRAME = 40; // ms
+
+// Return what goes on by a frame while it plays, `rate` times as fast as it was.
+function inTime(steps, position, rate, go) {
+  let us = steps[position - 1]?.us ?? 0;
+  let to = position;
+  return () => {
+    us += 1000 * FRAME * rate;
+    while (steps[to]?.us <= us) to += 1;
+    go(to, us);
+  };
+}
+
+function floor(run, record, picture) {
+  const svg = new DOMParser().parseFromString(
+    decodeURIComponent(picture.src.slice(picture.src.indexOf(',') + 1)), 'image/svg+xml').documentElement;
+  const find = name => svg.querySelector(`.${name}`);
+  find('paper').remove();
+  svg.setAttribute('color', 'currentColor');
+  svg.setAttribute('role', 'img');
+  svg.setAttribute('aria-label', picture.alt);
+  find('all').setAttribute('stroke-opacity', '.3');
+  const marks = ['seconds', 'bumps'].map(name => [find(name), find(name).getAttribute('d').split(/(?=M)/)]);
+  const [time, robot, told] = Array.from({ length: 3 }, () => element('span', { class: 'replay-time' }));
+  const row = (name, content) => element('div', { class: 'replay-row' }, element('b', {}, name), element('div', {}, content));
+
+  function draw(position, us) {
+    const ms = us / 1000;
+    const seen = run.look(ms);
+    const { x, y, yaw, v, w } = seen;
+    find('robot').setAttribute('transform', `translate(${x.toFixed(3)} ${y.toFixed(3)})`);
+    find('robot').firstChild.setAttribute('transform', `rotate(${(yaw * 180 / Math.PI).toFixed(1)})`);
+    find('driven').setAttribute('d', `M${run.points.slice(0, seen.till + 1).join('L')}L${x.toFixed(3)} ${y.toFixed(3)}`);
+    find('fan').setAttribute('d', seen.fan);
+    const { r } = seen.old ? { r: find('robot').querySelector('circle').getAttribute('r') } : {};
+    find('old').setAttribute('d', seen.old && `${seen.old}M${seen.was.x - r} ${seen.was.y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`);
+    const counts = [Math.floor(ms / 1000), record.bumps.filter(at => at <= ms).length];
+    marks.forEach(([path, parts], i) => path.setAttribute('d', parts.slice(0, counts[i]).join('')));
+    time.textContent = `${(ms / 1000).toFixed(2)} s`;
+    robot.textContent = `${v.toFixed(2)} m/s, ${w.toFixed(2)} rad/s`;
+    told.textContent = seen.told;
+    return run.says(position);
+  }
+
+  const node = element('div', { class: 'replay-floor' }, svg,
+    row('time', time), row('robot', robot), row('told', told));
+  return { node, draw };
+}

@@ -1,0 +1,75 @@
+"""What a robot did: where it was, what it was told, what it saw, and what happened."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from helpers.robot.floor import Floor
+
+
+class Step(NamedTuple):
+    """The robot after a step of its physics: pose on the floor, speed (m/s), turning (rad/s)."""
+
+    t_s: float
+    x: float
+    y: float
+    yaw: float
+    v: float
+    w: float
+
+
+class Command(NamedTuple):
+    """A command, and when it arrived: speed (m/s) and turning rate (rad/s), as they were sent."""
+
+    t_s: float
+    v: float
+    w: float
+
+
+class Scan(NamedTuple):
+    """A scan: its number, the stamp of its message, and its ranges (181,), float32, in m."""
+
+    seq: int
+    t_s: float
+    stamp_ns: int
+    ranges: np.ndarray
+
+
+class Event(NamedTuple):
+    """Something that happened. Kinds: 'bump', 'watchdog', 'camera', 'ignored'."""
+
+    t_s: float
+    kind: str
+    text: str
+
+
+ROWS = {'poses': Step, 'commands': Command, 'scans': Scan, 'events': Event}
+
+
+@dataclass
+class DriveRecord:
+    """The drive of a robot so far. The lists grow while it drives, and can be read meanwhile.
+
+    All `t_s` are seconds since the robot's start, which was at `started_s` of `time.monotonic()`,
+    the clock of recordings. In sim time `started_s` is None, and second 0 has the stamp 1 s.
+    """
+
+    floor: Floor
+    started_s: float | None = None
+    poses: list[Step] = field(default_factory=list)
+    commands: list[Command] = field(default_factory=list)
+    scans: list[Scan] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+
+    def table(self, name: str) -> pd.DataFrame:
+        """Return one of the lists as a table, a row for each entry.
+
+        Raises ValueError for another name.
+        """
+        if name not in ROWS:
+            raise ValueError(f'A drive has the tables {", ".join(ROWS)}, not {name!r}.')
+        return pd.DataFrame(list(getattr(self, name)), columns=list(ROWS[name].__annotations__))

@@ -1,0 +1,140 @@
+"""A robot while it drives: a picture in the cell's output, drawn again twelve times a second."""
+
+from __future__ import annotations
+
+import threading
+from html import escape
+
+from rclpy.subscription import Subscription
+
+from helpers._plumbing.progress_bar import somebody_watches
+from helpers.replay import Replay
+from helpers.replay.script import source
+from helpers.robot.floor import Pose
+from helpers.robot.robot import Robot
+from helpers.robot.view.picture import Track, described, picture
+from helpers.robot.view.replay import bumps, place, replay_drive
+from helpers.robot.view.scans import ScanRecording
+from helpers.session import current_session
+
+PERIOD_S = 1 / 12
+EVERY = 5  # steps of the robot: a point of its path
+NEWS_S = 3.0  # so long an event is shown
+
+
+def watch(
+    robot: Robot,
+    subscription: Subscription | None = None,
+    threads: int = 1,
+    name: str = '',
+) -> ScanRecording | None:
+    """Show a robot while this cell runs, and its replay when the session closes.
+
+    The replay is also there after an Interrupt, and alone where nobody watches, as under nbval.
+
+    With a subscription to the robot's scans one sees, too, which scan its callback works on, how
+    old it is, and which ones wait. `threads` is how many its executor has. `name` is what the
+    replay calls the drive. Returns its recording.
+
+    Raises TypeError for anything but a robot and a subscription, ValueError for one that does not
+    hear the scans, RuntimeError where no session is open.
+    """
+    if not isinstance(robot, Robot):
+        raise TypeError(f'Only a robot can be watched, not {robot!r}.')
+    session = current_session()
+    recording = ScanRecording(robot, subscription) if subscription is not None else None
+    view = LiveView(robot, recording)
+
+    def end() -> None:
+        try:
+            shown = replay_drive(robot.record, recording, threads, name)
+        except ValueError:  # interrupted where the recording does not add up
+            shown = replay_drive(robot.record, name=name)
+        view.stop(shown)
+
+    view.start()
+    session.at_close(end)
+    return recording
+
+
+class LiveView:
+    """The picture of a drive, from `start` to `stop`, sent by a thread of its own.
+
+    To update a display, unlike to make one, needs no cell: it moves, whatever the cell waits for.
+    """
+
+    def __init__(self, robot: Robot, recording: ScanRecording | None) -> None:
+        self._record, self._recording = robot.record, recording
+        self._track, self._passed = Track(), 0
+        self._display = None
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, name='robot view', daemon=True)
+
+    def start(self) -> None:
+        """Show the first picture, in the output of the cell that runs, where somebody watches."""
+        if somebody_watches():
+            from IPython.display import display
+
+            data = {'text/html': self.html()}
+            self._display = display(data, raw=True, display_id=True)
+            self._thread.start()
+
+    def _run(self) -> None:
+        while not self._over.wait(PERIOD_S):
+            self._display.update({'text/html': self.html()}, raw=True)
+
+    def stop(self, shown: Replay) -> None:
+        """End the pictures, and show this in their place."""
+        from IPython.display import display
+
+        if self._display is None:
+            display(shown)
+            return
+        self._over.set()
+        self._thread.join()
+        self._display.update(shown)
+
+    def html(self) -> str:
+        """Return the picture of now, and what the robot and its callback do."""
+        record = self._record
+        poses, scans, commands = record.poses, record.scans, record.commands
+        now = poses[-1]
+        for row in poses[self._passed : len(poses) : EVERY]:
+            self._track.add(row.x, row.y)
+            self._passed += EVERY
+        svg = picture(
+            record.floor,
+            self._track,
+            Pose(now.x, now.y, now.yaw),
+            scans[-1].ranges if scans else None,
+            [place(record, bump.t_s) for bump in bumps(record)],
+        )
+        told = [f'{commands[-1].v:.2f} m/s, {commands[-1].w:.2f} rad/s'] if commands else []
+        rows = [
+            ('time', [f'{now.t_s:.1f} s']),
+            ('robot', [f'{now.v:.2f} m/s, {now.w:.2f} rad/s']),
+            ('told', told or ['nothing yet']),
+        ]
+        news = record.events[-1:]
+        said = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
+        body = ''.join(_row(name, *map(escape, words)) for name, words in rows)
+        return (
+            f'<div class="replay robot-live"><style>{source("style.css")}{source("drive.css")}'
+            f'</style><div role="img" aria-label="{described(record.floor)}">{svg}</div>{body}'
+            f'{self._queue()}<p class="replay-says">{escape(said)}</p></div>'
+        )
+
+    def _queue(self) -> str:
+        """Return which message has a callback, and which wait."""
+        if self._recording is None:
+            return ''
+        runs, waits = self._recording.now(self._recording.depth)
+        busy = [
+            f'<li class="replay-busy">message {seq}, {s:.2f} s old</li>' for seq, s in runs.items()
+        ]
+        waiting = ''.join(f'<li>{seq}</li>' for seq in waits)
+        return _row('callback', *busy or ['<li>free</li>']) + _row('queue', waiting)
+
+
+def _row(name: str, *content: str) -> str:
+    return f'<div class="replay-row"><b>{name}</b><div><ul>{"".join(content)}</ul></div></div>'

@@ -1,0 +1,208 @@
+"""A drive to step through, as the runs of `helpers.replay` are, and beside it the queue."""
+
+from __future__ import annotations
+
+import base64
+import math
+from bisect import bisect_right
+from collections import deque
+from dataclasses import dataclass, replace
+from html import escape
+
+import numpy as np
+
+from helpers.replay import Replay, replay
+from helpers.replay.picture import address
+from helpers.robot.floor import Pose
+from helpers.robot.record import DriveRecord, Event
+from helpers.robot.sensors import ANGLES
+from helpers.robot.view.picture import Track, described, picture
+from helpers.robot.view.scans import ScanRecording
+
+# What a notebook keeps of a drive, at most: so it stays below 60 kB.
+POSES, SCANS, COMMANDS, EVENTS = 400, 60, 150, 50
+EVERY_S = 0.1  # a pose
+BEAMS = 46  # of a scan
+FURTHEST = 255  # of a range: it saw nothing
+TIMES = ['published_s', 'started_s', 'finished_s']
+TIME_LABEL = "time since the robot's start (s)"
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A drive as it is replayed: of a `Replay` one of the `runs`, with a floor for its picture."""
+
+    record_: DriveRecord
+    summary: str
+    recording: ScanRecording | None = None
+    name: str = ''
+    lost: bool = False
+    setup: None = None
+    names: tuple[str] = ('',)  # in front of rows, of which it has none
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """From when to when it was recorded."""
+        return 0.0, self.record_.poses[-1].t_s if self.record_.poses else 0.0
+
+    def sampled(self) -> tuple[float, np.ndarray]:
+        """Return the time between two poses, and the poses (n, 5): x, y, yaw, v, w."""
+        rows = np.array(self.record_.poses or [(0.0, *self.record_.floor.start, 0.0, 0.0)], float)
+        end = rows[-1, 0]
+        count = min(math.ceil(end / EVERY_S), POSES) + 1
+        columns = (*rows.T[1:3], np.unwrap(rows[:, 3]), *rows.T[4:6])
+        times = np.linspace(0, end, count)
+        return end / max(count - 1, 1), np.stack(
+            [np.interp(times, rows[:, 0], column) for column in columns], axis=1
+        )
+
+    def picture(self, span_s, width: int, left: int) -> tuple[str, list[float]]:
+        """Return the floor as an SVG at the end of the drive. It has no axis of time."""
+        _, end = self.span_s
+        scans = self.record_.scans
+        track = Track()
+        for x, y, *_ in self.sampled()[1].tolist():
+            track.add(x, y)
+        svg = picture(
+            self.record_.floor,
+            track,
+            place(self.record_, end),
+            scans[-1].ranges if scans else None,
+            [place(self.record_, bump.t_s) for bump in bumps(self.record_)],
+            seconds=[place(self.record_, second) for second in range(min(int(end), POSES) + 1)],
+            paper=True,
+        )
+        return svg, [0, 0, 0, 0]
+
+    def figure(self, svg: str) -> str:
+        """Return its picture, with words for it, below the name of one of several runs."""
+        caption = f'<figcaption>{escape(self.name)}</figcaption>' if self.name else ''
+        words = f'{self.summary} {described(self.record_.floor)}'
+        return f'<figure>{caption}<img alt="{escape(words)}" src="{address(svg)}"></figure>'
+
+    def record(self) -> dict:
+        """Return what drive.js needs: whole milliseconds, mm/s and mrad/s."""
+        floor, step = self.record_.floor, self.sampled()
+        unit = max(1.0, *floor.size_m) / 20_000  # metres; a robot may leave an open floor
+        scale = np.array([1 / unit, 1 / unit, 1e4, 1e3, 1e3])
+        poses = step[1].copy()
+        poses[:, 2] = np.arctan2(np.sin(poses[:, 2]), np.cos(poses[:, 2]))
+        poses = np.clip((poses * scale).round(), -32_000, 32_000)
+        scans = thinned(self.record_.scans, SCANS)
+        few = np.linspace(0, len(ANGLES) - 1, BEAMS).round().astype(int)
+        ranges = np.array([scan.ranges[few] for scan in scans], float).reshape(-1, BEAMS)
+        furthest = np.max(ranges, initial=1.0, where=np.isfinite(ranges))
+        quantum = furthest / (FURTHEST - 1)
+        ranges = np.nan_to_num(ranges / quantum, nan=0, posinf=FURTHEST).round().clip(0, FURTHEST)
+        return {
+            'name': self.name,
+            'unit': unit,
+            'step': round(step[0], 4),
+            'poses': packed(poses, '<i2'),
+            'view': round(float(ANGLES[-1] - ANGLES[0]), 4),
+            'range': round(quantum, 4),
+            'scanned': [[round(1000 * scan.t_s), scan.seq] for scan in scans],
+            'scans': packed(ranges, 'u1'),
+            'commands': self.commands(),
+            'events': [
+                [round(1000 * event.t_s), event.text] for event in self.record_.events[:EVENTS]
+            ],
+            'bumps': [round(1000 * bump.t_s) for bump in bumps(self.record_)],
+        }
+
+    def commands(self) -> list[list[int]]:
+        """Return of each command [when, speed, turning, message, its age]; -1 is no message.
+
+        The message is that whose callback sent it. Commands arrive in the order in which they are
+        sent, also if several are late.
+        """
+        found, before = [], None
+        sent = deque([] if self.recording is None else self.recording.sent)
+        for command in self.record_.commands:
+            message = -1, 0
+            own = [k for k, one in enumerate(sent) if one[1:3] == command[1:3]]
+            if own and sent[own[0]][0] <= self.record_.started_s + command.t_s:
+                for _ in range(own[0]):  # they never arrived
+                    sent.popleft()
+                *_, seq = sent.popleft()
+                if seq >= 0:
+                    message = seq, round(1000 * (command.t_s - self.record_.scans[seq].t_s))
+            told = round(1000 * command.v), round(1000 * command.w)
+            found.append(((told != before), [round(1000 * command.t_s), *told, *message]))
+            before = told
+        if len(found) > COMMANDS:
+            found = [one for one in found if one[0]]
+        return [row for _, row in thinned(found, COMMANDS)]
+
+
+def replay_drive(
+    record: DriveRecord,
+    recording: ScanRecording | None = None,
+    threads: int = 1,
+    name: str = '',
+) -> Replay:
+    """Return a drive to step through: the floor, and when `recording` is given, its queue beside.
+
+    `record` is `robot.record`, `recording` what `watch` returned for the subscription that commands
+    the robot, `threads` how many its executor has. With the mouse, keys or Play one sees
+    what the robot saw, what it was told, and which scan it acted on. `name` is what this drive is
+    called in words, so that one tells it from others of the page.
+
+    Raises TypeError for anything else, ValueError for a recording beside a drive in sim time, and
+    what `helpers.replay.replay` raises.
+    """
+    if not isinstance(record, DriveRecord):
+        raise TypeError(f'A drive is replayed from robot.record, not from {record!r}.')
+    hit = bumps(record)
+    moved = any(row.v or row.w for row in record.poses)
+    end = 'hit something' if hit else 'hit nothing' if moved else 'did not move'
+    called = f'{name}: ' if name else ''
+    summary = f'{called}A drive on the floor {record.floor.name}. The robot {end}.'
+    if recording is None:
+        return DriveReplay((Drive(record, summary),))
+    if record.started_s is None:
+        raise ValueError(
+            'In sim time a drive and a recording share no clock: replay the drive alone.'
+        )
+    table = recording.table()
+    table[TIMES] += recording.started_s - record.started_s
+    (run,) = replay(table, recording.depth, threads, recording.group).runs
+    # How many messages there were differs from run to run.
+    said = run.summary.partition(', ')[2]
+    drive = Drive(record, summary, recording)
+    after_s = drive.span_s[1] - run.moves[-1][0] / 1e6
+    said = called + said[0].upper() + said[1:]
+    run = replace(run, summary=said, time_label=TIME_LABEL, after_s=after_s)
+    return DriveReplay((drive, run))
+
+
+@dataclass(frozen=True)
+class DriveReplay(Replay):
+    """A drive, and the queue of its messages."""
+
+    def __str__(self) -> str:
+        """Return what is true each time: nbval compares it."""
+        return f'Replay: {" ".join(run.summary for run in self.runs)}'
+
+
+def place(record: DriveRecord, t_s: float) -> Pose:
+    """Return where the robot was at a time, after its last step."""
+    after = bisect_right(record.poses, t_s + 1e-9, key=lambda row: row.t_s) - 1
+    return Pose(*record.poses[after][1:4]) if after >= 0 else record.floor.start
+
+
+def bumps(record: DriveRecord) -> list[Event]:
+    """Return the bumps that are shown."""
+    return [event for event in record.events if event.kind == 'bump'][:EVENTS]
+
+
+def thinned(rows: list, most: int) -> list:
+    """Return at most so many of the rows, evenly, with the first and the last."""
+    if len(rows) <= most:
+        return list(rows)
+    return [rows[index] for index in np.linspace(0, len(rows) - 1, most).round().astype(int)]
+
+
+def packed(numbers: np.ndarray, kind: str) -> str:
+    """Return numbers as base64, two bytes or one each."""
+    return base64.b64encode(numbers.astype(kind).tobytes()).decode()

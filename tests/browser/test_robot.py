@@ -1,0 +1,112 @@
+"""The robot, watched and driven in JupyterLab: live pictures, keys, Interrupt, and its replay."""
+
+import nbformat
+from nbformat.v4 import new_code_cell, new_notebook
+from support.lab_page import complaints
+
+from tools.lessons.clean import NOTEBOOK_METADATA
+
+IMPORTS = """from helpers.robot import ROOMS, Robot
+from helpers.robot.view import drive_by_hand, watch
+from helpers.session import ros_session"""
+BY_HAND = """with ros_session():
+    robot = Robot(ROOMS)
+    watch(robot)
+    drive_by_hand(robot, 600)
+print(robot.record.commands[-1].v)"""
+ENDLESS = """with ros_session():
+    robot = Robot(ROOMS)
+    watch(robot)
+    while True:
+        robot.drive(0.0, 1.0, 1.0)"""
+# How the robot is drawn: each picture has a place and a heading.
+ROBOT = '.robot-live .robot'
+PICTURES = """count => new Promise(resolve => {
+    const area = document.querySelector('.robot-live').closest('.jp-OutputArea');
+    let seen = 0;
+    const observer = new MutationObserver(() => {
+        if (!area.querySelector('.robot-live svg')?.getBoundingClientRect().height) resolve(-1);
+        seen += 1;
+        if (seen < count) return;
+        observer.disconnect();
+        resolve((seen * 1000) / (performance.now() - start));
+    });
+    const start = performance.now();
+    observer.observe(area, { childList: true, subtree: true });
+})"""
+
+
+def place(page):
+    return page.locator(ROBOT).get_attribute('transform')
+
+
+def wait_for_another(page, what, before):
+    page.wait_for_function(
+        """([what, before]) => {
+            const found = document.querySelector(what)?.getAttribute('transform');
+            return found && found !== before;
+        }""",
+        arg=[what, before],
+    )
+
+
+def test_watched_driven_and_replayed(lab):
+    cells = [new_code_cell(source) for source in (IMPORTS, BY_HAND, ENDLESS)]
+    path = lab.server.folder / 'notebooks' / '97_robot.ipynb'
+    nbformat.write(new_notebook(cells=cells, metadata=NOTEBOOK_METADATA), path)
+    lab.open(path.name)
+    lab.run(0)
+    page = lab.page
+
+    # By hand, while the cell runs: keys, then the mouse. The robot stops when they are let go.
+    lab.start(1)
+    page.wait_for_selector('.by-hand-keys:focus')
+    for press, release in (
+        (lambda: page.keyboard.down('ArrowUp'), lambda: page.keyboard.up('ArrowUp')),
+        (page.mouse.down, page.mouse.up),
+    ):
+        page.locator('.hand-back').scroll_into_view_if_needed()
+        page.locator('.hand-back').hover()
+        before = place(page)
+        press()
+        wait_for_another(page, ROBOT, before)
+        release()
+        page.wait_for_function(
+            """() => /robot0.00 m.s, 0.00 rad.s/.test(
+                document.querySelector('.robot-live').textContent)"""
+        )
+    lab.screenshot('robot_by_hand')
+    page.locator('.by-hand-keys').focus()
+    page.keyboard.press('End')
+    lab.wait_until_ran(1)
+    assert complaints(lab.cells()[1]) == []
+    assert page.locator('.robot-live, .by-hand').count() == 0
+
+    # Stepped through with keys.
+    shown = page.locator('.replay-on')
+    shown.focus()
+    says = shown.locator('[aria-live=polite]')
+    page.keyboard.press('ArrowRight')
+    assert says.inner_text() == 'The robot is told to drive 0.50 m/s.'
+    page.keyboard.press('ArrowRight')
+    assert says.inner_text() == 'The robot is told to stop.'
+    start = shown.locator('.robot').get_attribute('transform')
+    page.keyboard.press('Home')
+    assert shown.locator('.robot').get_attribute('transform') != start
+    shown.get_by_role('button', name='Play').click()
+    wait_for_another(page, '.replay-on .robot', shown.locator('.robot').get_attribute('transform'))
+    lab.screenshot('robot_replay')
+
+    # Pictures come, none is empty, and Interrupt ends the run and leaves its replay.
+    lab.start(2)
+    page.wait_for_selector('.robot-live')
+    rate = page.evaluate(PICTURES, 30)
+    print(f'{rate:.1f} pictures a second')
+    assert rate > 0
+    page.keyboard.press('Escape')
+    lab.command('notebook:interrupt-kernel')
+    lab.wait_until_ran(2)
+    outputs = lab.cells()[2]['outputs']
+    assert [one.get('ename') for one in outputs] == [None, 'KeyboardInterrupt']
+    assert 'A drive on the floor rooms.' in outputs[0]['data']['text/plain']
+    assert page.locator('.robot-live').count() == 0

@@ -1,0 +1,251 @@
+"""The robot, seen: its pictures in Python, its replay in a JavaScript engine, both in a kernel."""
+
+import base64
+import json
+import math
+import re
+from html import unescape
+from urllib.parse import unquote
+from xml.etree import ElementTree
+
+import pytest
+import quickjs
+from geometry_msgs.msg import Twist
+from hypothesis import given
+from hypothesis import strategies as st
+from jupyter_client.manager import run_kernel
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import Imu, LaserScan
+from support.javascript import FOLDER
+
+from helpers.robot import CORRIDOR, EMPTY, ROOMS, DriveRecord, Pose, Robot
+from helpers.robot.body import Body
+from helpers.robot.record import Command, Event, Scan, Step
+from helpers.robot.sensors import Sensors
+from helpers.robot.view import drive_by_hand, replay_drive, watch
+from helpers.robot.view.picture import Track
+from helpers.session import ros_session
+
+MOST_BYTES = 60_000
+
+
+def html(shown):
+    return shown._repr_mimebundle_()['text/html']
+
+
+def record_of(shown, index=0):
+    """What the page gets of a run."""
+    data = re.search("data-record='([^']*)'", html(shown))[1]
+    return json.loads(unescape(data))['runs'][index]
+
+
+@pytest.fixture
+def script():
+    """Return a function that looks at a drive as the page does, at these milliseconds."""
+    context = quickjs.Context()
+    context.add_callable('atob', lambda text: base64.b64decode(text).decode('latin-1'))
+    context.eval((FOLDER / 'drive.js').read_text())
+    context.eval("""function looked(record, times) {
+        const run = drive(record);
+        return { seen: times.map(run.look), told: run.told, times: run.times,
+            says: run.told.flatMap((told, i) => (told ? [run.says(i + 1)] : [])) };
+    }""")
+
+    def looked(record, times):
+        return json.loads(
+            context.eval(f'JSON.stringify(looked({json.dumps(record)}, {json.dumps(times)}))')
+        )
+
+    return looked
+
+
+@pytest.fixture(scope='module')
+def long_drive():
+    """Return the record of three minutes, from wall to wall."""
+    body, record = Body(ROOMS), DriveRecord(ROOMS)
+    sensors = Sensors(0, True, None)
+    for step in range(9000):
+        before = body.bumps
+        command = Command(
+            body.t_s, -0.3 if step % 150 < 50 else 1.0, 1.3 if step % 150 < 50 else 0.1
+        )
+        body.step([command])
+        record.poses.append(Step(body.t_s, *body.pose, body.v, body.w))
+        if step % 5 == 0:
+            record.commands.append(command)
+            record.scans.append(Scan(len(record.scans), body.t_s, 0, sensors.scan(body)))
+        if body.bumps > before:
+            record.events.append(Event(body.t_s, 'bump', f'It hit something in step {step}.'))
+    return record
+
+
+def test_a_long_drive_is_small_and_keeps_its_bumps(long_drive):
+    shown = replay_drive(long_drive)
+    bumps = [event for event in long_drive.events if event.kind == 'bump']
+    assert len(bumps) > 20
+    assert str(shown) == 'Replay: A drive on the floor rooms. The robot hit something.'
+    assert len(html(shown).encode()) < MOST_BYTES
+    kept = record_of(shown)['events']
+    assert [[round(1000 * bump.t_s), bump.text] for bump in bumps][: len(kept)] == kept
+    assert len(record_of(shown)['bumps']) == min(len(bumps), 50)
+
+
+def test_the_page_shows_where_the_robot_was(script, long_drive):
+    rows = [row for row in long_drive.poses if row.t_s < 38]
+    early = DriveRecord(ROOMS, poses=rows)
+    record = record_of(replay_drive(early))
+    seen = script(record, [1000 * row.t_s for row in rows])['seen']
+    for row, at in zip(rows, seen, strict=True):
+        # Ten poses a second are kept: at 1 m/s a wall is noticed 5 cm too early or too late.
+        assert math.dist((row.x, row.y), (at['x'], at['y'])) < 0.06
+        assert abs(math.remainder(row.yaw - at['yaw'], math.tau)) < 0.05
+
+
+def test_its_picture_has_words_and_is_an_svg(long_drive):
+    text = html(replay_drive(long_drive))
+    alternative, address = re.search(
+        '<img alt="([^"]*)" src="data:image/svg.xml,([^"]*)"', text
+    ).groups()
+    assert 'The robot hit something. The floor rooms, 10 m by 7 m, from above' in alternative
+    svg = ElementTree.fromstring(unquote(address))
+    parts = {part.get('class'): part.get('d') for part in svg.iter() if part.get('class')}
+    assert parts['bumps'].count('M') == len(record_of(replay_drive(long_drive))['bumps'])
+    assert parts['fan']
+
+
+@given(st.lists(st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)), min_size=1, max_size=60))
+def test_a_track_passes_all_its_points(steps):
+    track, points, x, y = Track(), [], 0.0, 0.0
+    for dx, dy in steps:
+        x, y = x + dx, y + dy
+        points.append((x, y))
+        track.add(x, y)
+    drawn = [tuple(map(float, point.split())) for point in track.line()[1:].split('L')]
+    assert math.dist(drawn[-1], points[-1]) < 0.01
+    for point in points:
+        assert (
+            min(_distance(point, *pair) for pair in zip([drawn[0], *drawn], drawn, strict=False))
+            < 0.02
+        )
+
+
+def _distance(point, a, b):
+    """Return how far a point is from the line between two others."""
+    (px, py), (ax, ay), (bx, by) = point, a, b
+    length = (bx - ax) ** 2 + (by - ay) ** 2
+    part = ((px - ax) * (bx - ax) + (py - ay) * (by - ay)) / length if length else 0.0
+    part = min(max(part, 0.0), 1.0)
+    return math.dist(point, (ax + part * (bx - ax), ay + part * (by - ay)))
+
+
+# Beside the queue
+
+
+class Brake(Node):
+    """Drives until it sees a wall."""
+
+    def __init__(self):
+        super().__init__('brake')
+        self.recording, self.worked_on = None, []  # what the live picture shows
+        self.commands = self.create_publisher(Twist, 'cmd_vel', 10)
+        self.scans = self.create_subscription(LaserScan, 'scan', self.look, 50)
+
+    def look(self, scan):
+        if self.recording is not None:
+            self.worked_on.append(list(self.recording.now(50)[0]))
+        command = Twist()
+        command.linear.x = 0.5 if scan.ranges[90] > 0.6 else 0.0
+        self.commands.publish(command)
+
+
+def test_one_sees_which_scan_it_acted_on(script, capsys):
+    with ros_session() as session:
+        robot = Robot(CORRIDOR, start=Pose(3.3, 1.25, 0.0))
+        brake = Brake()
+        recording = brake.recording = watch(robot, brake.scans)
+        executor = SingleThreadedExecutor()
+        executor.add_node(brake)
+        session.spin(executor)
+        robot.run(20, until=lambda: robot.stopped)
+    heard = recording.table()['seq'].tolist()
+    assert [seq for seqs in brake.worked_on for seq in seqs] == heard
+    shown = replay_drive(robot.record, recording)
+    said = 'The robot hit nothing. Depth 50, one thread. None was lost.'
+    assert str(shown) == f'Replay: A drive on the floor corridor. {said}'
+    assert str(shown) in capsys.readouterr().out  # nobody watches: at the end, and nothing else
+    assert len(html(shown).encode()) < MOST_BYTES
+    record = record_of(shown)
+    # Each callback sends one command, so they come in the order of the scans that were heard.
+    assert [one[3] for one in record['commands']] == [
+        scan for scan, _ in zip(recording.table()['seq'], record['commands'], strict=False)
+    ]
+    for at_ms, _, _, seq, age_ms in record['commands']:
+        assert at_ms - age_ms == pytest.approx(1000 * robot.record.scans[seq].t_s, abs=1)
+    says = script(record, [])['says']
+    assert re.fullmatch(
+        r'The robot is told to stop\. The callback of message \d+ says so, which is [\d.]+ s old\.',
+        says[-1],
+    )
+    # One slider for both: the page gets the queue as the second run.
+    assert record_of(shown, 1)['setup']['callbacks'][0]['depth'] == 50
+
+
+# In a kernel
+
+CELL = """
+from helpers.robot import EMPTY, Robot
+from helpers.robot.view import drive_by_hand, watch
+from helpers.session import ros_session
+import threading
+with ros_session():
+    robot = Robot(EMPTY)
+    watch(robot)
+    robot.drive(0.5, 0.0, 0.5)
+    {then}
+print([thread.name for thread in threading.enumerate() if thread.name == 'robot view'])
+"""
+SAID = 'Replay: A drive on the floor empty. The robot hit nothing.'
+
+
+@pytest.mark.parametrize('watched', [True, False])
+def test_the_replay_takes_the_place_of_the_pictures(watched):
+    found = []
+
+    def show(message):
+        kind, content = message['msg_type'], message['content']
+        if kind.endswith('display_data'):
+            found.append((kind, content['data']))
+        elif kind in ('stream', 'error'):
+            found.append((kind, content.get('text', content.get('evalue'))))
+
+    cell = CELL.format(then='' if watched else 'drive_by_hand(robot)')
+    with run_kernel(kernel_name='python3') as kernel:
+        kernel.execute_interactive(cell, allow_stdin=watched, output_hook=show, timeout=60)
+    assert found.pop() == ('stream', '[]\n')
+    pictures, (kind, data) = found[:-1], found[-1]
+    assert data['text/plain'] == SAID
+    assert kind == ('update_display_data' if watched else 'display_data')
+    assert bool(pictures) == watched
+    assert all('robot-live' in data['text/html'] for _, data in pictures)
+
+
+def test_bad_input_is_one_sentence():
+    with pytest.raises(RuntimeError, match='No session is open'), ros_session():
+        robot = Robot(EMPTY, sim_time=True)
+        node = Node('node')
+        wrong = node.create_subscription(Imu, 'imu/data', print, 10)
+        with pytest.raises(TypeError, match='Only a robot can be watched'):
+            watch(node)
+        with pytest.raises(TypeError, match='Only a robot can be driven'):
+            drive_by_hand(node)
+        with pytest.raises(ValueError, match='hears /imu/data: give one that hears /scan'):
+            watch(robot, wrong)
+        with pytest.raises(TypeError, match='give its subscription'):
+            watch(robot, node)
+        with pytest.raises(TypeError, match='replayed from robot.record'):
+            replay_drive(robot)
+        session_is_over = robot
+        raise RuntimeError('No session is open')
+    with pytest.raises(RuntimeError, match='No session is open'):
+        watch(session_is_over)
