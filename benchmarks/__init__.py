@@ -1,1 +1,1 @@
-"""Measurements for an idle machine, run by `make bench`."""
+"""What the session and the recorder cost, measured by `make bench`."""

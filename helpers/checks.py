@@ -1,23 +1,42 @@
-"""Predictions and exercises: what is right, what the reader's code did, and a hint.
+"""Guesses and tasks: what is right, what the student's code did, and a hint.
 
-Both functions print and return None, so that a cell shows their text and nothing else. The text is
-the same in every fresh run from top to bottom. Where an exercise is still wrong in a second run of
-the same kernel, its hints appear.
+    my_guess = guess('How many?', ...)                          the student writes a guess
+    compare_prediction('How many?', my_guess, 20)               later: was it right?
+
+    check(2, ('none is lost', lambda: ..., 'Count the threads.'))      below the cell of task 2
+    %%solution 2                                                the first line of the next cell
+
+The functions print and return None, so that a cell shows their text and nothing else. The text is
+the same in every fresh run from top to bottom. If a task is still wrong in a second run of the
+same kernel, its hints appear.
 """
 
 from __future__ import annotations
 
 import re
+import signal
+import threading
 import traceback
-from collections.abc import Callable, Set
+from collections.abc import Callable, Iterator, Sequence, Set
+from contextlib import contextmanager
 from numbers import Integral, Real
 
+from IPython import get_ipython
+from IPython.core.error import UsageError
+
 from helpers import classroom, progress
-from helpers.text import wrap
+from helpers._plumbing.rclpy_private import can_ask
+from helpers._plumbing.text import wrap
 
-NO_GUESS = 'No guess yet. Write one in the predict cell, run that cell, then run this one again.'
+NO_GUESS = 'No guess yet. Write one in place of the three dots, run that cell, then this one again.'
+CPU_LIMIT_S = 5.0  # of one test of a check: an endless loop uses it up
+LIMIT_S = 90.0  # a build on a busy machine takes its time
 
-_failed_tries: dict[str, int] = {}  # by title: failed tries since the last try that passed
+# By the numbers of the tasks of this notebook:
+_requirements: dict[int, Sequence[tuple]] = {}
+_solved: dict[int, bool] = {}
+_failed_tries: dict[int, int] = {}  # since the last try that passed
+_given: dict[int, dict[str, object]] = {}  # names and values that `%%solution` has given
 
 
 def compare_prediction(
@@ -36,13 +55,13 @@ def compare_prediction(
       'not that one'.
     - list or tuple: every item, in order. set: every item, in any order. 'right' or 'not those'.
 
-    Where a measured number moves from run to run, whatever lies within `tolerance` of it is right,
-    in its own unit. Choose it wide enough for the slowest machine: then the verdict stays the same.
+    If a measured number moves from run to run, whatever lies within `tolerance` of it is right, in
+    its own unit. Choose it wide enough for the slowest machine: then the verdict stays the same.
     The right answer is then not printed.
 
-    `because` is a sentence that explains the outcome. It is printed after any guess, but not
-    before there is one. A guess of None, or of the wrong kind, gets a sentence that says what to
-    do: it raises nothing, since a reader wrote it.
+    `because` is a sentence that explains the outcome. It is printed after any guess. If there is no
+    guess yet, a student is asked for one; a run without a student, as in CI, prints the answer. A
+    guess of the wrong kind gets a sentence that says what to do: it raises nothing.
 
     Raises TypeError for an outcome of another kind.
     """
@@ -52,7 +71,14 @@ def compare_prediction(
         raise TypeError(f'The outcome of a prediction cannot be of type {type(outcome).__name__}.')
     print(question)
     if guess is None or guess is ...:
-        print(f'  {NO_GUESS}')
+        shell = get_ipython()
+        if shell is None or not hasattr(shell, 'kernel') or can_ask(shell.kernel):
+            print(f'  {NO_GUESS}')
+            return
+        if not tolerance:
+            print(f'  The answer is {_written(outcome)}.')
+        if because:
+            print(f'  {because}')
         return
     if _kind(guess) != wanted:
         print(f'  Your guess: {guess!r}. Please change it: the answer must be {wanted}.')
@@ -65,36 +91,92 @@ def compare_prediction(
         print(f'  {because}')
 
 
-def check(title: str, *requirements: tuple[str, object | Callable[[], object], str]) -> None:
-    """Print for each requirement whether it is met, and if not, what the reader's code did.
+def check(task: int, *requirements: tuple[str, object | Callable[[], object], str]) -> None:
+    """Print for each requirement of a task whether it is met, and if not, what the code did.
 
-    A requirement is `(what_is_right, test, hint)`. `test`, or what it returns where it is a
-    function without arguments, says whether the requirement is met: a str says that it is not, and
-    what was found instead; everything else is a truth value. If the function raises, its error is
-    what was found. So a test is often one line:
+    A requirement is `(what_is_right, test, hint)`. `test`, or what it returns if it is a function
+    without arguments, says whether the requirement is met: a str says that it is not, and what was
+    found instead; everything else is a truth value. If the function raises, its error is what was
+    found. So a test is often one line:
 
         lambda: heard == [2, 4, 42] or f'your node published {heard}'
 
-    What was found must not move from run to run. Hints are shown when the exercise is still wrong
-    at the second try. A try that passes starts the counting again. A title such as 'Exercise 1 of
-    lesson 02' is kept in the reader's progress when all is right.
+    A test looks the student's names up when it runs, in the notebook, so that `%%solution` can run
+    it again. What was found must not move from run to run. Hints are shown when the task is still
+    wrong at the second try. A task that passes is kept in the student's progress.
+
+    A test may use CPU_LIMIT_S seconds of CPU and LIMIT_S seconds of the clock.
     """
+    if isinstance(task, str):  # a lesson that is not rewritten yet
+        _print_results(task, requirements)
+        return
+    _requirements[task] = requirements
+    with _without_solution(task):
+        solved = _print_results(f'Task {task}', requirements, task)
+    _solved[task] = solved
+    if solved:
+        progress.record(task)
+    classroom.tell_task(task, solved)
+
+
+def _print_results(title: str, requirements: Sequence[tuple], task: int | None = None) -> bool:
+    """Print the results; with a `task`, count the tries at it. Return whether all is right."""
     results = [(what, *_run(test), hint) for what, test, hint in requirements]
     met_ones = sum(met for _, met, _, _ in results)
     done = met_ones == len(results)
-    tries = _failed_tries[title] = 0 if done else _failed_tries.get(title, 0) + 1
+    if task is not None:
+        _failed_tries[task] = 0 if done else _failed_tries.get(task, 0) + 1
     for what, met, found, hint in results:
         _print(f'[{"ok" if met else "not yet"}] {what}')
         if found:
             _print(f'    Found: {found}')
-        if not met and tries > 1:
+        if not met and _failed_tries.get(task, 0) > 1:
             _print(f'    Hint: {hint}')
-    # Of a solution that passes, nobody should read that the exercise above it is done.
-    cheer = ' All done.' if done and not title.startswith('Solution') else ''
-    _print(f'{title}: {met_ones} of {len(results)}.{cheer}')
-    if done:
-        progress.record(title)
-    classroom.tell_exercise(title, done)
+    end = '' if task is None else ' All done.' if done else ' Try again, or go on: see below.'
+    _print(f'{title}: {met_ones} of {len(results)}.{end}')
+    return done
+
+
+def solution(line: str, cell: str) -> None:
+    """Run a cell `%%solution 2` if the student has not solved task 2, and check it as well.
+
+    So the lesson goes on with the student's code if its check has passed, and with the solution if
+    it has not. The cell may begin with another magic, such as `%%write`.
+    """
+    if not line.strip().isdecimal():
+        raise UsageError('Write the number of the task: %%solution 2')
+    task = int(line)
+    if _solved.get(task):
+        _print(f'Task {task} is solved: the lesson goes on with your code.')
+        return
+    shell = get_ipython()
+    names = shell.user_ns
+    before = dict(names)
+    code = shell.transform_cell(cell)
+    exec(compile(code, shell.compile.cache(code), 'exec'), names)
+    _given[task] = {
+        name: value
+        for name, value in names.items()
+        if name not in before or before[name] is not value
+    }
+    _print_results(f'Solution of task {task}', _requirements.get(task, ()))
+
+
+@contextmanager
+def _without_solution(task: int) -> Iterator[None]:
+    """Hide what the solution gave to names: a check is about the student's code only."""
+    shell = get_ipython()
+    names = shell.user_ns if shell else {}
+    given = {
+        name: value for name, value in _given.get(task, {}).items() if names.get(name) is value
+    }
+    for name in given:
+        del names[name]
+    try:
+        yield
+    finally:
+        for name, value in given.items():
+            names.setdefault(name, value)
 
 
 def _print(text: str) -> None:
@@ -107,7 +189,7 @@ def _plain(value: object) -> object:
 
 
 def _kind(value: object) -> str | None:
-    """Name the kind of a guess or an outcome, as a reader is told it."""
+    """Name the kind of a guess or an outcome, as a sentence to the reader says it."""
     if isinstance(value, bool):
         return 'True or False'
     if isinstance(value, Real):
@@ -149,12 +231,47 @@ def _written(value: object) -> str:
 
 
 def _run(test: object) -> tuple[bool, str]:
-    """Return whether the test is met, and what was found instead, where that is known."""
+    """Return whether the test is met, and what was found instead, if that is known."""
     try:
-        result = test() if callable(test) else test
+        with _limited():
+            result = test() if callable(test) else test
         return (False, result) if isinstance(result, str) else (bool(result), '')
-    except Exception as error:  # whatever a reader's code raises is an answer that is not right
+    except Exception as error:  # whatever a student's code raises is an answer that is not right
         return False, _found(error)
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """Interrupt what takes too long, as the student would. Raises TimeoutError after that.
+
+    An endless loop uses CPU, which a busy machine does not use up for us; a wait does not.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    over = []
+
+    def interrupt(signal_number: int, _) -> None:
+        over.append(signal_number)
+        signal.raise_signal(signal.SIGINT)
+
+    timers = {
+        signal.SIGPROF: (signal.ITIMER_PROF, CPU_LIMIT_S),
+        signal.SIGALRM: (signal.ITIMER_REAL, LIMIT_S),
+    }
+    handlers = {number: signal.signal(number, interrupt) for number in timers}
+    try:
+        for timer, limit_s in timers.values():
+            signal.setitimer(timer, limit_s)
+        yield
+    except KeyboardInterrupt:
+        if not over:
+            raise
+        raise TimeoutError('it did not end. Is there a loop that never ends?') from None
+    finally:
+        for number, (timer, _) in timers.items():
+            signal.setitimer(timer, 0)
+            signal.signal(number, handlers[number])
 
 
 def _found(error: Exception) -> str:
@@ -167,6 +284,12 @@ def _found(error: Exception) -> str:
     # The second line of a time-out says what was waited for.
     text = ' '.join(lines[: 2 if isinstance(error, TimeoutError) else 1])
     found = re.sub(r' at 0x[0-9a-fA-F]+', '', f'{type(error).__name__}: {text}')
+    if isinstance(error, NameError) and error.name:
+        found += '. Does the cell of the task give this name, and did you run it?'
     if re.match(r'[A-Z]\w*\.\w+\(\) missing 1 required positional argument', text):
         found += '. Are () missing after a class, or too many after a callback?'
     return found
+
+
+if shell := get_ipython():
+    shell.register_magic_function(solution, 'cell')

@@ -1,7 +1,7 @@
-"""A class that sees itself: guesses, exercises and steps, told to the class that one has joined.
+"""A class that sees itself: guesses, tasks and steps, told to the class that one has joined.
 
     join_class('192.0.2.5:8765', 'blue-otter-lamp')   once, from what is on the wall
-    my_guess = guess('How many are heard?', 41)       returns 41, and tells the class
+    my_guess = guess('How many are heard?', 41)       returns 41, and sends it
     raise_hand(), lower_hand(), leave_class()
 
 Without a class nothing is sent, shown or waited for. With one, a thread in the background writes
@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from helpers import progress
-from helpers.text import wrap
+from helpers._plumbing.text import wrap
 
 __all__ = ['guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand']
 
@@ -39,7 +39,7 @@ JOINED_FOR_S = 12 * 3600  # a class that was not left is forgotten, so that noth
 ADDRESS = re.compile(r'(https?://)?[\w.-]+(:\d+)?(/[\w./-]*)?')
 ANSWER_LIMIT_S = 5.0
 TRY_AGAIN_S = 2.0
-TOGETHER_S = 0.05  # what a cell tells in this time is one message
+TOGETHER_S = 0.05  # events of this time are one message
 BATCH = 50
 WAITING = 1000  # events that are kept while the class does not answer; the oldest ones go first
 LARGEST = 2**53  # of numbers, which a browser holds exactly
@@ -47,9 +47,13 @@ TEXT = 200  # letters of a text, at most
 ITEMS = 20  # of a list or a set, at most
 UNUSABLE = 'The class hears nothing, because {} cannot be used ({}): remove it, then join again.'
 NOT_JOINED = 'You are in no class: join_class(address, code) joins one.'
-NO_LESSON = 'Nothing is told, because this notebook is no lesson: do it in the lesson itself.'
+NO_LESSON = 'Nothing is sent, because this notebook is no lesson: do it in the lesson itself.'
+ONE_ANSWER = (
+    'A guess is one answer after the question: write 0.65 with a point, and several answers as a '
+    "list, such as ['A', 'B']. Change it and run the cell again."
+)
 SENT = (
-    'Sent to it: your guesses and what you measured, which exercises you tried and solved, at '
+    'Sent to it: your guesses and what you measured, which tasks you tried and solved, at '
     'which step you are, and a raised hand. Not sent: your code and its outputs.'
 )
 TABLES = """
@@ -61,7 +65,7 @@ CREATE TABLE IF NOT EXISTS waiting (
 
 
 class Class(NamedTuple):
-    """Where events go, and the token that says who sends them. Left, on a hub: an empty address."""
+    """Where events go, and the token of the sender. Left, on a hub: an empty address."""
 
     url: str
     token: str
@@ -70,21 +74,27 @@ class Class(NamedTuple):
 # --- What a notebook calls -----------------------------------------------------------------------
 
 
-def guess(question: str, value: object) -> object:
-    """Return the value. Where there is a class, tell it in the background.
+def guess(question: str, *answers: object) -> object:
+    """Return the answer that a student gives to a question; `...` if there is none yet.
 
-    The class counts the last guess of each student, of questions that the lesson has. The value
-    is a number, True or False, a text, or a few of them in a list, a tuple or a set.
+    If there is a class, it is told in the background. The class counts the last guess of each
+    student, of questions that the lesson has. An answer is a number, True or False, a text, or a
+    few of them in a list, a tuple or a set.
     """
-    _tell('guess', question=question, value=value)
-    _outbox.say_trouble()
+    if len(answers) != 1:
+        print(*wrap(ONE_ANSWER), sep='\n')
+        return ...
+    [value] = answers
+    if value is not ...:
+        _tell('guess', question=question, value=value)
+        _outbox.say_trouble()
     return value
 
 
 def join_class(address: str = '', code: str = '', name: str = '') -> None:
     """Join a class, and say what is sent: `join_class('192.0.2.5:8765', 'blue-otter-lamp')`.
 
-    The address and the code are on the wall. A name is given only by who wants to be called by it.
+    The address and the code are on the wall. A name is optional.
     On a JupyterHub `join_class()` joins again after `leave_class()`. What does not work is said in
     one sentence; nothing is raised.
     """
@@ -98,7 +108,7 @@ def join_class(address: str = '', code: str = '', name: str = '') -> None:
 
 
 def leave_class() -> None:
-    """Leave the class: it is asked to delete what it was told, and nothing more is sent."""
+    """Leave the class: it is asked to delete what it has, and nothing more is sent."""
     text, known = NOT_JOINED, None
     if path := _file_of_class():
         with suppress(sqlite3.Error), closing(_open(path)) as db, db:
@@ -112,14 +122,14 @@ def leave_class() -> None:
     if known:
         try:
             _ask(known, 'leave', {})
-            text = 'You have left the class. What you told it is deleted.'
+            text = 'You have left the class. What you sent is deleted.'
         except (OSError, ValueError):
-            text = 'You have left the class. It did not answer: what it was told stays there.'
+            text = 'You have left the class. It did not answer: what you sent stays there.'
     print(text)
 
 
 def raise_hand() -> None:
-    """Tell the class "I am lost", until `lower_hand()`."""
+    """Show the class "I am lost", until `lower_hand()`."""
     _hand(True, 'Your hand is up. lower_hand() takes it down.')
 
 
@@ -128,18 +138,17 @@ def lower_hand() -> None:
     _hand(False, 'Your hand is down.')
 
 
-# --- What `helpers.checks` tells -----------------------------------------------------------------
+# --- What `helpers.checks` sends -----------------------------------------------------------------
 
 
 def tell_outcome(question: str, value: object) -> None:
-    """Tell the class what was measured after a guess."""
+    """Send what was measured after a guess."""
     _tell('outcome', question=question, value=value)
 
 
-def tell_exercise(title: str, solved: bool) -> None:
-    """Tell the class that an exercise was tried. Titles of other checks are not told."""
-    if found := progress.TITLE.fullmatch(title):
-        _tell('exercise', exercise=int(found[1]), solved=solved)
+def tell_task(task: int, solved: bool) -> None:
+    """Tell the class that a task was tried."""
+    _tell('task', task=task, solved=solved)
 
 
 # --- In the background ---------------------------------------------------------------------------
@@ -167,13 +176,13 @@ class _Outbox:
                 self._thread.start()
 
     def say_trouble(self) -> None:
-        """Print one line where the class has not answered since the last line."""
+        """Print one line if the class has not answered since the last line."""
         if self._trouble and self._trouble != self._said:
             print(*wrap(self._trouble), sep='\n')
         self._said = self._trouble
 
     def _run(self) -> None:
-        """End where there is no class, or where the file cannot be used; `put` starts again."""
+        """End if there is no class, or if the file cannot be used; `put` starts again."""
         try:
             with closing(_open(_file())) as db:
                 while _class(db) is not None:
@@ -235,7 +244,7 @@ _outbox = _Outbox()
 
 def _tell(kind: str, **what: object) -> None:
     """Hand an event over, if this is a lesson and there is a class. Nothing is raised."""
-    lesson = _lesson()
+    lesson = progress.this_lesson()
     if not lesson or not _file_of_class():
         return
     with suppress(Exception):  # a value that no class can show; no lesson may fail because of it
@@ -249,7 +258,7 @@ def _hand(up: bool, text: str) -> None:
     with suppress(OSError, sqlite3.Error):
         known = _known()
     _tell('hand', up=up)
-    print((text if _lesson() else NO_LESSON) if known else NOT_JOINED)
+    print((text if progress.this_lesson() else NO_LESSON) if known else NOT_JOINED)
     _outbox.say_trouble()
 
 
@@ -263,7 +272,7 @@ def _join(address: str, code: str, name: str) -> str:
     url = hub or f'{"" if "://" in address else "http://"}{address.rstrip("/")}'
     address = address or 'the hub'
     known = _known()
-    # Who joins again, as after a restart of the kernel, keeps the seat, and is counted once.
+    # A student who joins again, as after a restart of the kernel, keeps the seat.
     token = known.token if known and known.url == url else _hub_token()
     try:
         answer = _ask(Class(url, token), 'join', {'code': code, 'name': name})
@@ -288,8 +297,8 @@ def _join(address: str, code: str, name: str) -> str:
 
 
 def _ask(known: Class, what: str, body: object) -> dict:
-    """Ask the class. Raises OSError where no class answers, ValueError where it refuses."""
-    from urllib import error, request  # only who is in a class waits for this import
+    """Ask the class. Raises OSError if no class answers, ValueError if it refuses."""
+    from urllib import error, request  # only students in a class wait for this import
 
     headers = {'Content-Type': 'application/json', 'Authorization': f'token {known.token}'}
     wanted = request.Request(f'{known.url}/{what}', json.dumps(body).encode(), headers)
@@ -337,15 +346,9 @@ def _file() -> Path | None:
 
 
 def _file_of_class() -> Path | None:
-    """Return the file if there may be a class: who has joined none has no file."""
+    """Return the file if there may be a class: a student who has joined none has no file."""
     path = _file()
     return path if path and (path.exists() or os.environ.get(HUB_VARIABLE)) else None
-
-
-def _lesson() -> str:
-    """Return the name of the lesson that this kernel runs, empty where it runs none."""
-    found = re.search(r'(?:^|/)\d\d_(\w+)\.ipynb$', os.environ.get('JPY_SESSION_NAME', ''))
-    return found[1] if found else ''
 
 
 def _open(path: Path) -> sqlite3.Connection:
@@ -357,7 +360,7 @@ def _open(path: Path) -> sqlite3.Connection:
 
 
 def _known() -> Class | None:
-    """Return the class of this student, without making a file for one who has joined none."""
+    """Return the class of this student. No file is made for a student who has joined none."""
     if path := _file_of_class():
         with closing(_open(path)) as db:
             return _class(db)
@@ -373,7 +376,7 @@ def _class(db: sqlite3.Connection) -> Class | None:
 
 
 def _hub_token() -> str:
-    """Return what says to a JupyterHub's class whose server this is; nothing elsewhere."""
+    """Return the token that a JupyterHub's class knows this server by; elsewhere an empty text."""
     return os.environ.get('JUPYTERHUB_API_TOKEN', '') if os.environ.get(HUB_VARIABLE) else ''
 
 
@@ -383,7 +386,11 @@ def _first(db: sqlite3.Connection) -> list[tuple[int, str]]:
 
 def _follow_cells() -> None:
     """Tell the class which cell runs; it knows the steps. JupyterLab names the cell to IPython."""
-    if _lesson() and 'IPython' in sys.modules and (shell := sys.modules['IPython'].get_ipython()):
+    if (
+        progress.this_lesson()
+        and 'IPython' in sys.modules
+        and (shell := sys.modules['IPython'].get_ipython())
+    ):
         shell.events.register('pre_run_cell', _cell_runs)
 
 

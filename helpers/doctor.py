@@ -1,6 +1,6 @@
 """Is this machine ready for the notebooks, and if not, what to do.
 
-`python -m helpers.doctor` prints a table of checks and exits with 1 where a required one fails.
+`python -m helpers.doctor` prints a table of checks and exits with 1 if a required one fails.
 It runs on Python 3.10 and newer, and with any installation of ROS 2, also with none.
 """
 
@@ -18,9 +18,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from helpers.build_tools import build_tools, from_wheels
-from helpers.interrupts import uninterrupted
-from helpers.text import table
+from helpers._plumbing.build_tools import build_tools, from_wheels
+from helpers._plumbing.interrupts import uninterrupted
+from helpers._plumbing.text import table
 
 JAZZY = '7.1.'  # the versions of rclpy in ROS 2 Jazzy
 SHARED_MEMORY = Path('/dev/shm')
@@ -41,7 +41,7 @@ FAILED_IMPORTS = {
 
 @dataclass(frozen=True)
 class Check:
-    """One row of the table. `to_do` is empty where the check is ok."""
+    """One row of the table. `to_do` is empty if the check is ok."""
 
     name: str
     found: str
@@ -75,7 +75,7 @@ def check_python() -> Check:
 
 
 def check_platform(has_rclpy: bool) -> Check:
-    """Check the machine. Where rclpy is there, any machine will do."""
+    """Check the machine. If rclpy is there, any machine will do."""
     fits = has_rclpy or (sys.platform, platform.machine()) == ('linux', 'x86_64')
     to_do = 'ROS 2 wheels are for x86-64 Linux: see "A door for every machine" in environment.md'
     return Check('platform', f'{platform.system()} {platform.machine()}', '' if fits else to_do)
@@ -84,7 +84,7 @@ def check_platform(has_rclpy: bool) -> Check:
 def check_rclpy() -> Check:
     """Check that rclpy can be imported, and that it is the one of ROS 2 Jazzy."""
     if 'rclpy' not in sys.modules:
-        # In a process of its own: rcl ends the whole process where RMW_IMPLEMENTATION is wrong.
+        # In a process of its own: rcl ends the whole process if RMW_IMPLEMENTATION is wrong.
         trial = _run([sys.executable, '-c', 'import rclpy, std_msgs.msg, rosgraph_msgs.msg'])
         if trial.returncode != 0:
             return Check('rclpy', *_why_import_failed(trial))
@@ -126,10 +126,10 @@ def check_message() -> Check:
         rmw = rclpy.get_rmw_implementation_identifier()
         took_s = _seconds_to_hear()
     except TimeoutError as error:
-        to_do = 'allow UDP on the loopback interface, and see "Trouble" in environment.md'
+        to_do = 'allow UDP on the loopback interface, and see "It does not work" in environment.md'
         return Check(name, f'{rmw}: {str(error).splitlines()[0]}', to_do)
     except Exception as error:  # whatever the RMW raises is what was found
-        return Check(name, _last_line(str(error)), 'see "Trouble" in environment.md')
+        return Check(name, _last_line(str(error)), 'see "It does not work" in environment.md')
     return Check(name, f'{rmw}: heard after {took_s * 1000:.1f} ms')
 
 
@@ -142,7 +142,7 @@ def _seconds_to_hear() -> float:
 
     from helpers.session import ros_session
 
-    # Transient local: the message arrives also where discovery ends after publish().
+    # Transient local: the message arrives also if discovery ends after publish().
     qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     heard_s = []
     with ros_session() as session:
@@ -256,7 +256,7 @@ def _summary(rows: list[Check]) -> str:
 
 
 def main() -> int:
-    """Print the table and the summary. Return 1 where a required check fails, otherwise 0."""
+    """Print the table and the summary. Return 1 if a required check fails, otherwise 0."""
     rows = checks()
     print(_table(rows))
     print()

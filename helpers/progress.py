@@ -1,10 +1,9 @@
-"""The student's own progress: which exercises are solved, kept on this computer only.
+"""The student's own progress: which tasks are solved, kept on this computer only.
 
-`checks.check` records each exercise that passes, and lesson 00 shows the table. The file has one
-line for each exercise, such as `lose_messages 1`: the lesson's name and not its number, which
-changes when a lesson is added before it. Lines are only ever added, so kernels that write at once
-lose nothing. Titles and exercises are read from the notebooks, as text: also from one that a
-student has broken.
+`checks.check` records each task that passes, and lesson 00 shows the table. The file has one line
+for each task, such as `lose_messages 1`: the lesson's name and not its number, which changes when
+a lesson is added before it. Lines are only ever added, so kernels that write at once lose nothing.
+Titles and tasks are read from the notebooks, as text: also from one that a student has broken.
 """
 
 from __future__ import annotations
@@ -17,37 +16,42 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
+from IPython import get_ipython
 from jupyter_core.paths import jupyter_data_dir
 
-from helpers import text
+from helpers._plumbing import text
 
 FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progress is kept
-TITLE = re.compile(r'Exercise (\d+) of lesson (\d\d)')
+LESSON = re.compile(r'(?:^|/)\d\d_(\w+)\.ipynb$')
 
 
-class Lesson(NamedTuple):
+class Tasks(NamedTuple):
     """What the table says of a notebook: '02', 'lose_messages', 'Lose messages', 2."""
 
     number: str
     name: str
     title: str
-    exercises: int
+    tasks: int
 
     def lines(self) -> list[str]:
         """Return the lines of the progress file that this lesson may have."""
-        return [f'{self.name} {count}' for count in range(1, self.exercises + 1)]
+        return [f'{self.name} {count}' for count in range(1, self.tasks + 1)]
 
 
-def title_of(lesson: str, exercise: int) -> str:
-    """Return the title under which `checks.check` checks an exercise, and not its solution."""
-    return f'Exercise {exercise} of lesson {lesson}'
+def this_lesson() -> str:
+    """Return the name of the lesson that this kernel runs, empty if it runs none."""
+    shell = get_ipython()
+    # JupyterLab says the notebook's path in this variable, VS Code in that name.
+    path = (shell.user_ns if shell else {}).get('__vsc_ipynb_file__', '')
+    found = LESSON.search(path or os.environ.get('JPY_SESSION_NAME', ''))
+    return found[1] if found else ''
 
 
-def lessons() -> list[Lesson]:
-    """Return the notebooks that have exercises, in teaching order.
+def with_tasks() -> list[Tasks]:
+    """Return the notebooks that have tasks, in teaching order.
 
-    They are those in the folder of the running notebook, or else those of this checkout. What
-    cannot be read of a notebook is taken from its file name.
+    They are those in the folder of the running notebook, or else those of this checkout. A title
+    that cannot be read is taken from the file name.
     """
     found = []
     for path in _notebooks():
@@ -55,16 +59,16 @@ def lessons() -> list[Lesson]:
         title = re.search(r'^\s*"# \d\d (.*?)(?:\\n)?",?$', source, re.MULTILINE)
         words = path.stem[3:].replace('_', ' ').capitalize()
         words = json.loads(f'"{title[1]}"') if title else words
-        numbers = re.findall(r'^\s*"### Exercise (\d+)', source, re.MULTILINE)
-        found.append(Lesson(path.name[:2], path.stem[3:], words, len(set(numbers))))
-    return [lesson for lesson in found if lesson.exercises]
+        numbers = re.findall(r'^\s*"### (?:✎ )?(?:Task|Exercise) (\d+)', source, re.MULTILINE)
+        found.append(Tasks(path.name[:2], path.stem[3:], words, len(set(numbers))))
+    return [lesson for lesson in found if lesson.tasks]
 
 
 def file() -> Path | None:
-    """Return the file that holds the progress, or None where none is kept.
+    """Return the file that holds the progress, or None if none is kept.
 
-    It lies where Jupyter keeps a user's data: after `make lab` in `.jupyter` of this checkout, on a
-    JupyterHub in the student's home folder.
+    It is in Jupyter's folder of a user's data: after `make lab` in `.jupyter` of this checkout, on
+    a JupyterHub in the student's home folder.
     """
     named = os.environ.get(FILE_VARIABLE)
     if named is None:
@@ -72,26 +76,25 @@ def file() -> Path | None:
     return Path(named) if named else None
 
 
-def record(title: str) -> None:
-    """Keep that the exercise with this title is solved. Other titles are not kept.
+def record(task: int) -> None:
+    """Keep that this task of the running lesson is solved.
 
-    Where the file cannot be written nothing happens, since no lesson may fail because of it.
-    `show` tells the reader.
+    If the file cannot be written nothing happens, since no lesson may fail because of it. `show`
+    says so.
     """
-    path, found = file(), TITLE.fullmatch(title)
-    if path is None or not found:
+    path, lesson = file(), this_lesson()
+    if path is None or not lesson:
         return
     with suppress(OSError):
-        for notebook in _notebooks(found[2]):
-            key = f'{notebook.stem[3:]} {found[1]}'
-            if key not in _read(path).splitlines():
-                with path.open('ab', buffering=0) as lines:  # a short write is one system call
-                    lines.write(f'{key}\n'.encode())
+        key = f'{lesson} {task}'
+        if key not in _read(path).splitlines():
+            with path.open('ab', buffering=0) as lines:  # a short write is one system call
+                lines.write(f'{key}\n'.encode())
 
 
 def show() -> None:
-    """Print for each lesson which exercises are solved, and where progress cannot be kept, why."""
-    path, lines, known = file(), [], lessons()
+    """Print for each lesson which tasks are solved, and where progress cannot be kept, why."""
+    path, lines, known = file(), [], with_tasks()
     if path is not None:
         try:
             lines = _read(path).splitlines()
@@ -110,18 +113,17 @@ def start_again() -> None:
     print('Your table is empty again.')
 
 
-def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
+def table(known: Iterable[Tasks], solved: Collection[str] = ()) -> str:
     """Return a row for each lesson, and a line with the sum; `solved` holds lines of the file."""
-    known = list(known)
-    states = [[line in solved for line in lesson.lines()] for lesson in known]
-    most = max(map(len, states), default=0)
-    rows = [['lesson', 'solved', *(f'exercise {count}' for count in range(1, most + 1))]]
-    for lesson, done in zip(known, states, strict=True):
-        words = ['solved' if one else 'open' for one in done] + [''] * (most - len(done))
-        count = f'{sum(done)} of {len(done)}'
-        rows.append([f'{lesson.number} {lesson.title}', count, *words])
-    done = sum(states, [])
-    return f'{text.table(rows)}\n{sum(done)} of {len(done)} exercises are solved.'
+    rows, sums = [['lesson', 'solved', 'open']], [0, 0]
+    for lesson in known:
+        tasks = enumerate(lesson.lines(), 1)
+        left = [str(count) for count, line in tasks if line not in solved]
+        done = lesson.tasks - len(left)
+        sums = [sums[0] + done, sums[1] + lesson.tasks]
+        words = f'task{"s" * (len(left) > 1)} {", ".join(left)}' if left else ''
+        rows.append([f'{lesson.number} {lesson.title}', f'{done} of {lesson.tasks}', words])
+    return f'{text.table(rows)}\n{sums[0]} of {sums[1]} tasks are solved.'
 
 
 def _notebooks(number: str = '[0-9][0-9]') -> list[Path]:
@@ -133,7 +135,7 @@ def _notebooks(number: str = '[0-9][0-9]') -> list[Path]:
 
 
 def _read(path: Path) -> str:
-    """Return the text of the file, which is made where it does not exist."""
+    """Return the text of the file, which is made if it does not exist."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open('a+b') as lines:
         lines.seek(0)

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from helpers.values import check_table, shown
+from helpers._plumbing.values import check_count, check_table, shown
 
 # A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
 # long as callbacks and timers of the same run were late.
@@ -166,7 +166,7 @@ def _impossible_rows(table: pd.DataFrame) -> list[str]:
 def take_bounds(table: pd.DataFrame, depth: int, threads: int) -> dict[int, tuple[float, float]]:
     """Return for each heard message when it was taken: not before, and not after (seconds).
 
-    The takes are in the order of the messages, each as early as possible. Where none is possible,
+    The takes are in the order of the messages, each as early as possible. If none is possible,
     the first time is later than the second. `table` is as `check_table` returns it.
     """
     published = [*table['published_s'], *[math.inf] * (depth + 1)]
@@ -216,7 +216,7 @@ def _too_many_at_once(heard: pd.DataFrame, threads: int) -> list[str]:
 
 
 def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -> list[str]:
-    """Where a worker was free for long while messages waited that were then pushed out."""
+    """Return when a worker was free for long while messages waited that were then pushed out."""
     published = table['published_s'].to_numpy()
     lost = np.flatnonzero(table['started_s'].isna())
     lost = lost[lost + depth < len(table)]
@@ -260,12 +260,6 @@ def _regular(durations: pd.Series) -> bool:
     """Whether all durations are alike. If not, a late worker proves nothing."""
     longest = durations.max()  # NaN of none, infinite while a callback is running
     return longest < math.inf and longest <= 2 * durations.median()
-
-
-def check_count(name: str, value: int) -> None:
-    """Raise ValueError unless the value is a whole number from 1 up."""
-    if not isinstance(value, numbers.Integral) or value < 1:
-        raise ValueError(f'{name} must be a whole number from 1 up, not {shown(value)}.')
 
 
 def _nanoseconds(name: str, value: float, least: float) -> int:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 import threading
 import time
 from array import array
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import pandas as pd
 from rclpy.callback_groups import ReentrantCallbackGroup
 
-from helpers.values import COLUMNS
+from helpers._plumbing.values import RUN_COLUMNS
 
 CALL_COLUMNS = ['client', 'service', 'caller', 'run', 'style', 'sent_s', 'answered_s', 'answer']
 CALL_COLUMNS += ['resumed_by']
@@ -21,7 +23,7 @@ CALL_COLUMNS += ['resumed_by']
 def number_of(message) -> int:
     """Return the number at the end of `message.data`: 7 for `Hello World: 7`, or 7 itself.
 
-    Of a picture with one pixel it is the pixel. Raises ValueError where there is no number.
+    The number of a picture with one pixel is the pixel. Raises ValueError if there is none.
     """
     data = getattr(message, 'data', None)
     if isinstance(data, array) and len(data) == 1:
@@ -37,23 +39,43 @@ def number_of(message) -> int:
     return int(word)
 
 
+@dataclass(slots=True, eq=False)
+class CallbackRun:
+    """One run of a callback: when it started (`time.monotonic`, in seconds), and in which thread.
+
+    `finished_s` is None while it runs. `seq` is the number of its message, if that is recorded.
+    `resumed_by` is the thread that finished it, if it is a coroutine. Threads are their idents.
+    """
+
+    started_s: float
+    thread: int
+    finished_s: float | None = None
+    seq: int | None = None
+    resumed_by: int | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not finished yet."""
+        return self.finished_s is None
+
+
 class Recording:
     """Records the messages from one publisher to one subscription, from now on.
 
-    The two are plain rclpy objects, and stay what they are. `parameters`, for example
+    Both stay plain rclpy objects. `parameters`, for example
     `period_s=0.05`, are what the run was made with: they are in `table().attrs`.
 
-    `Recording.latest` is the one that was made last, also where its cell was interrupted.
+    `Recording.latest` is the newest one, also if its cell was interrupted.
     """
 
     latest: Recording | None = None
+    number_of = staticmethod(number_of)
 
     def __init__(self, publisher, subscription, **parameters) -> None:
         self.parameters = parameters
         self._published: list[tuple[int, float]] = []
-        # [seq, started, finished, thread id]; finished is NaN while the callback runs
-        self._heard: list[list] = []
-        self._finished: list[list] = []  # the same rows, in the order in which they finished
+        self._heard: list[CallbackRun] = []
+        self._finished: list[CallbackRun] = []  # the same runs, in the order in which they finished
         self._watch_publisher(publisher)
         self._watch_subscription(subscription)
         Recording.latest = self
@@ -65,23 +87,24 @@ class Recording:
         def recorded_publish(msg):
             published_s = clock()
             publish(msg)
-            # Not before, where it would delay the message.
-            append((number_of(msg), published_s))
+            # Afterwards, so that it does not delay the message.
+            append((self.number_of(msg), published_s))
 
         publisher.publish = recorded_publish
 
     def _watch_subscription(self, subscription) -> None:
         clock, append, append_finished = time.monotonic, self._heard.append, self._finished.append
-        thread_id, nan = threading.get_ident, float('nan')
+        thread = threading.get_ident
 
-        def start(message, *info) -> list:
-            row = [number_of(message), clock(), nan, thread_id()]
-            append(row)
-            return row
+        def start(message, *info) -> CallbackRun:
+            seq = self.number_of(message)
+            run = CallbackRun(clock(), thread(), seq=seq)
+            append(run)
+            return run
 
-        def finish(row: list) -> None:
-            row[2] = clock()
-            append_finished(row)
+        def finish(run: CallbackRun) -> None:
+            run.finished_s = clock()
+            append_finished(run)
 
         subscription.callback = _surround(subscription.callback, start, finish)
 
@@ -99,6 +122,24 @@ class Recording:
     def in_flight(self) -> int:
         """How many callbacks have started and not yet finished."""
         return len(self._heard) - len(self._finished)
+
+    @property
+    def started_s(self) -> float:
+        """When `table` has its second 0, in seconds of `time.monotonic`; NaN before that."""
+        return min((at_s for _, at_s in self._published), default=float('nan'))
+
+    def now(self, depth: int) -> tuple[dict[int, float], dict[int, float]]:
+        """Return which messages have a callback now, and which wait in a queue of this depth.
+
+        Both are sequence numbers, oldest first, each with how old the message is, in seconds.
+        """
+        heard, published = self._heard[-64:], dict(self._published[-64 - depth :])
+        newest, now_s = max((run.seq for run in heard), default=-1), time.monotonic()
+        runs = [run.seq for run in heard if run.running]
+        waits = [seq for seq in list(published)[-depth:] if seq > newest]
+        return tuple(
+            {seq: now_s - published.get(seq, now_s) for seq in seqs} for seqs in (runs, waits)
+        )
 
     def wait_until_complete(self, messages: int, timeout_s: float = 60.0) -> None:
         """Wait until `messages` messages are published and the subscription has worked them off.
@@ -119,12 +160,12 @@ class Recording:
             if len(self._published) < messages:
                 return False
             newest = self._published[-1][0]
-            return self.in_flight == 0 and any(row[0] == newest for row in self._heard)
+            return self.in_flight == 0 and any(run.seq == newest for run in self._heard)
 
         def progress() -> float:
             if not (self._finished and self._published):
                 return 0.0
-            return (self._finished[-1][0] - self._published[0][0] + 1) / messages
+            return (self._finished[-1].seq - self._published[0][0] + 1) / messages
 
         def status() -> str:
             return f'Published {self.published}, heard {self.heard}.'
@@ -135,15 +176,16 @@ class Recording:
         """Return one row a message, in the order of their sequence numbers.
 
         Columns: `seq` (int), `published_s`, `started_s`, `finished_s` (seconds since the first
-        publish call; NaN where it did not happen), `thread` ('thread 1', 'thread 2', ... in the
-        order of their first callback; None where the message was never heard). `attrs` holds the
+        publish call; NaN if it did not happen), `thread` ('thread 1', 'thread 2', ... in the
+        order of their first callback; None if the message was never heard). `attrs` holds the
         parameters of the recording.
 
-        Raises ValueError where two messages have the same sequence number.
+        Raises ValueError if two messages have the same sequence number.
         """
         published = pd.DataFrame(list(self._published), columns=['seq', 'published_s'])
         heard = pd.DataFrame(
-            [list(row) for row in self._heard], columns=['seq', 'started_s', 'finished_s', 'thread']
+            [(run.seq, run.started_s, run.finished_s, run.thread) for run in list(self._heard)],
+            columns=['seq', 'started_s', 'finished_s', 'thread'],
         )
         for name, part in (('published', published), ('heard', heard)):
             twice = part.loc[part['seq'].duplicated(), 'seq']
@@ -159,7 +201,7 @@ class Recording:
         table = table.astype({'seq': int} | dict.fromkeys(times, float))
         table[times] -= table['published_s'].min()
         table['thread'] = table['thread'].astype(object).where(table['thread'].notna(), None)
-        table = table[COLUMNS]
+        table = table[RUN_COLUMNS]
         table.attrs = dict(self.parameters)
         return table
 
@@ -168,19 +210,17 @@ class CallbackRecording:
     """Records every run of some callbacks, from now on.
 
     `CallbackRecording(tick=node.timer, look=node.service)` watches timers, services, subscriptions
-    and clients, each under a name. They are plain rclpy objects, and stay what they are. Of a
-    client, a run is the moment when an executor takes an answer. `watch` is for what has no
+    and clients, each under a name. They stay plain rclpy objects. A
+    run of a client is the moment when an executor takes an answer. `watch` is for what has no
     `callback` of its own, such as an action server.
     """
 
     def __init__(self, **watched) -> None:
-        # For each name its runs: [started, finished, thread id]; finished is NaN while it runs.
-        # That of a coroutine that has finished ends with the id of the thread that finished it.
-        self.runs: dict[str, list[list]] = {name: [] for name in watched}
+        self.runs: dict[str, list[CallbackRun]] = {name: [] for name in watched}
         self._watched = watched
         self._coroutines: set[str] = set()  # the names of callbacks that can await
         self._calls: list[dict] = []
-        self._answers: list[tuple[object, list]] = []  # the future, and the run of the client
+        self._answers: dict[object, CallbackRun] = {}  # the client's run that took each future
         for name, thing in watched.items():
             if hasattr(thing, 'call_async'):
                 self._watch_client(name, thing)
@@ -193,15 +233,15 @@ class CallbackRecording:
         if inspect.iscoroutinefunction(callback):
             self._coroutines.add(name)
 
-        def start(*arguments) -> list:
-            row = [time.monotonic(), float('nan'), threading.get_ident()]
-            runs.append(row)
-            return row
+        def start(*arguments) -> CallbackRun:
+            run = CallbackRun(time.monotonic(), threading.get_ident())
+            runs.append(run)
+            return run
 
-        def finish(row: list) -> None:
+        def finish(run: CallbackRun) -> None:
             if name in self._coroutines:
-                row.append(threading.get_ident())
-            row[1] = time.monotonic()
+                run.resumed_by = threading.get_ident()
+            run.finished_s = time.monotonic()
 
         return _surround(callback, start, finish)
 
@@ -230,30 +270,32 @@ class CallbackRecording:
         def recorded_pending(sequence_number):
             future = pending(sequence_number)
             now = time.monotonic()
-            row = [now, now, threading.get_ident()]
-            self.runs[name].append(row)
-            self._answers.append((future, row))
+            run = CallbackRun(now, threading.get_ident(), finished_s=now)
+            self.runs[name].append(run)
+            self._answers[future] = run
             return future
 
         client.call, client.call_async = recorded_call, recorded_call_async
         client.get_pending_request = recorded_pending
 
-    def _running(self) -> list | None:
+    def _running(self) -> CallbackRun | None:
         """Return the run that this thread is in, of a callback that is watched."""
         here = threading.get_ident()
-        rows = [row for runs in self.runs.values() for row in runs if row[1] != row[1]]
-        return max((row for row in rows if row[2] == here), key=lambda row: row[0], default=None)
+        runs = [run for runs in self.runs.values() for run in runs if run.running]
+        own = (run for run in runs if run.thread == here)
+        return max(own, key=lambda run: run.started_s, default=None)
 
     def finished(self, name: str) -> int:
         """Return how many runs have finished."""
-        return sum(run[1] == run[1] for run in self.runs[name])  # NaN is not equal to itself
+        return sum(not run.running for run in self.runs[name])
 
     def inside(self, inner: str, outer: str) -> int:
         """Return how many runs of `inner` started while a run of `outer` was going on."""
         return sum(
             any(
-                started <= run[0] and not finished <= run[0]  # NaN: it still goes on
-                for started, finished, *_ in self.runs[outer]
+                other.started_s <= run.started_s
+                and (other.running or run.started_s < other.finished_s)
+                for other in self.runs[outer]
             )
             for run in self.runs[inner]
         )
@@ -268,28 +310,35 @@ class CallbackRecording:
         return {
             name: pd.DataFrame(
                 [
-                    [seq, run[0] - zero, run[0] - zero, run[1] - zero, names[run[2]]]
+                    (
+                        seq,
+                        run.started_s - zero,
+                        run.started_s - zero,
+                        math.nan if run.running else run.finished_s - zero,
+                        names[run.thread],
+                    )
                     for seq, run in enumerate(list(runs))
                 ],
-                columns=COLUMNS,
+                columns=RUN_COLUMNS,
             )
             for name, runs in self.runs.items()
         }
 
     def _zero_and_threads(self) -> tuple[float, dict[int, str]]:
         """Return when the first run of all started, and the names of the threads by their ids."""
-        every = sorted((row for runs in self.runs.values() for row in runs), key=lambda row: row[0])
-        idents = dict.fromkeys(ident for row in every for ident in row[2:])
-        names = {ident: f'thread {i}' for i, ident in enumerate(idents, 1)}
-        return (every[0][0] if every else 0.0), names
+        every = [run for runs in self.runs.values() for run in runs]
+        every.sort(key=lambda run: run.started_s)
+        idents = [ident for run in every for ident in (run.thread, run.resumed_by) if ident]
+        names = {ident: f'thread {i}' for i, ident in enumerate(dict.fromkeys(idents), 1)}
+        return (every[0].started_s if every else 0.0), names
 
     def calls(self) -> pd.DataFrame:
         """Return one row for each request that a client which is watched has sent.
 
-        Columns: `client` and `service` (names; the service is None where it is not watched),
-        `caller` and `run` (the callback that sent it, and which of its runs; None where none is
-        watched), `style` ('call', 'await' where a coroutine sent it, or 'send'), `sent_s` and
-        `answered_s` (seconds, as in `tables`; NaN where no answer was taken), `answer` (which of
+        Columns: `client` and `service` (names; the service is None if it is not watched),
+        `caller` and `run` (the callback that sent it, and which of its runs; None if none is
+        watched), `style` ('call', 'await' if a coroutine sent it, or 'send'), `sent_s` and
+        `answered_s` (seconds, as in `tables`; NaN if no answer was taken), `answer` (which of
         the client's runs took it), `resumed_by` (the thread that finished the coroutine, or None).
         """
         zero, names = self._zero_and_threads()
@@ -299,13 +348,12 @@ class CallbackRecording:
             if type(thing).__name__ == 'Service'
         }
         place = {
-            id(row): (name, seq) for name, runs in self.runs.items() for seq, row in enumerate(runs)
+            run: (name, seq) for name, runs in self.runs.items() for seq, run in enumerate(runs)
         }
-        answers = {id(future): row for future, row in list(self._answers)}
         rows = []
         for made in list(self._calls):
-            answer, run = answers.get(id(made['future'])), made['caller']
-            caller, seq = place.get(id(run), (None, None))
+            answer, run = self._answers.get(made['future']), made['caller']
+            caller, seq = place.get(run, (None, None))
             awaits = caller in self._coroutines
             rows.append(
                 {
@@ -315,9 +363,9 @@ class CallbackRecording:
                     'run': seq,
                     'style': 'call' if made['waits'] else 'await' if awaits else 'send',
                     'sent_s': made['sent'] - zero,
-                    'answered_s': answer[0] - zero if answer else float('nan'),
-                    'answer': place[id(answer)][1] if answer else None,
-                    'resumed_by': names[run[3]] if run and len(run) > 3 else None,
+                    'answered_s': answer.started_s - zero if answer else math.nan,
+                    'answer': place[answer][1] if answer else None,
+                    'resumed_by': names[run.resumed_by] if run and run.resumed_by else None,
                 }
             )
         return pd.DataFrame(rows, columns=CALL_COLUMNS)
@@ -339,25 +387,25 @@ class CallbackRecording:
 
 
 def _surround(callback: Callable, start: Callable, finish: Callable) -> Callable:
-    """Return the callback with `row = start(*arguments)` before it and `finish(row)` after it."""
+    """Return the callback with `run = start(*arguments)` before it and `finish(run)` after it."""
     if inspect.iscoroutinefunction(callback):
 
         @functools.wraps(callback)
         async def recorded_callback(*arguments):
-            row = start(*arguments)
+            run = start(*arguments)
             try:
                 return await callback(*arguments)
             finally:
-                finish(row)
+                finish(run)
 
     else:
 
         @functools.wraps(callback)
         def recorded_callback(*arguments):
-            row = start(*arguments)
+            run = start(*arguments)
             try:
                 return callback(*arguments)
             finally:
-                finish(row)
+                finish(run)
 
     return recorded_callback

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from itertools import chain
 from traceback import clear_frames
 
-from helpers.domain import (
+from helpers._plumbing.domain import (
     check_domain,
     configure_discovery,
     domain_variables,
@@ -25,12 +25,14 @@ from helpers.domain import (
     reserve_domain_id,
     share_domain_id,
 )
-from helpers.interrupts import uninterrupted
+from helpers._plumbing.interrupts import uninterrupted
+from helpers.ros2._sessions import recorded
 
 try:
     import rclpy
     from rclpy.action import ActionClient, ActionServer
     from rclpy.client import Client
+    from rclpy.exceptions import InvalidHandle
     from rclpy.executors import Executor, ExternalShutdownException
     from rclpy.node import Node
     from rclpy.publisher import Publisher
@@ -38,9 +40,10 @@ try:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.subscription import Subscription
 
-    from helpers import connections, rclpy_private
-    from helpers.progress_bar import ProgressBar
-    from helpers.rosout import Rosout
+    from helpers._plumbing import connections, rclpy_private
+    from helpers._plumbing.progress_bar import ProgressBar
+    from helpers._plumbing.rclpy_private import frames as frames
+    from helpers._plumbing.rosout import Rosout
 except ImportError as error:
     raise ImportError(
         f'rclpy cannot be imported in this Python ({error}): start JupyterLab with `make lab`, '
@@ -48,11 +51,14 @@ except ImportError as error:
     ) from error
 
 CLOSE_TIMEOUT_S = 5.0
+BREAK_OFF_S = 1.0
 LOG_NODE = '_session_log'
 POLL_S = 0.01
 QUIET_ROUNDS = 20
 SAY_AFTER_S = 5.0
 MADE_BY_NODES = Publisher, Subscription, Client, Service
+# What rclpy raises for a thing that is destroyed, and for one that was only half made.
+ALREADY_DESTROYED = InvalidHandle, AttributeError
 
 _open_session: Session | None = None
 
@@ -75,7 +81,7 @@ def ros_session(domain_id: int | None = None, discovery: str = 'LOCALHOST') -> S
 
 
 def current_session() -> Session:
-    """Return the open session. Raises RuntimeError where there is none."""
+    """Return the open session. Raises RuntimeError if there is none."""
     if _open_session is None:
         raise RuntimeError('No session is open: do this inside `with ros_session() as session:`.')
     return _open_session
@@ -92,7 +98,7 @@ def graph_environment() -> dict[str, str]:
 
 
 class SessionClosedError(Exception):
-    """Raised in a callback that still waits for the answer of a service when its session closes."""
+    """Raised in a callback that still waits, or loops without end, when its session closes."""
 
 
 class Session:
@@ -106,6 +112,7 @@ class Session:
         self._ended_by_exception = False
         self._spinning: dict[Executor, threading.Thread] = {}
         self._failures: list[BaseException] = []
+        self._endless: list[threading.Thread] = []
         self._rosout: Rosout | None = None
 
     # --- Opening
@@ -127,10 +134,12 @@ class Session:
         self.environment = domain_variables(self._domain_id, self._discovery)
         try:
             with uninterrupted():
+                # For the ros2 command, which looks where a session is open.
+                self._shared.enter_context(recorded(self.environment, is_open=True))
                 self._context = rclpy.get_default_context()
                 _open_session = self
                 self._initialise()
-        except BaseException as failure:  # nobody will close it
+        except BaseException as failure:  # __exit__ will not run
             clear_frames(failure.__traceback__)
             self._clean_up()
             raise
@@ -155,7 +164,7 @@ class Session:
         """Spin an executor in a background thread, until the session closes.
 
         Raises TypeError for anything but an rclpy executor, ValueError for one that spins already
-        or belongs to another session, and RuntimeError where the session is not open.
+        or belongs to another session, and RuntimeError if the session is not open.
         """
         if not isinstance(executor, Executor):
             raise TypeError(
@@ -217,15 +226,15 @@ class Session:
         `progress` returns the part that is done, 0 to 1. It is shown as a bar once the wait has
         taken 2 s; the bar disappears at the end. `status` returns a sentence on what has come.
 
-        Where something is not connected, or a callback waits, who watches the cell reads it after
-        5 s. The TimeoutError says it, too.
+        If something is not connected, or a callback waits, a person who watches the cell sees it
+        after 5 s. The TimeoutError says it, too.
 
         Raises TimeoutError when `timeout_s` seconds are over, and the exception of a callback as
         soon as one has failed.
         """
         __tracebackhide__ = True  # IPython shows the cell, and the callback that failed
         started, said = time.monotonic(), False
-        # Nobody sets it: an interruptible pause between two looks at the predicate.
+        # It is never set: an interruptible pause between two looks at the predicate.
         pause = threading.Event()
         with ProgressBar(progress) as bar:
             while not predicate():
@@ -245,7 +254,8 @@ class Session:
         return '\n'.join([first, *([status()] if status else []), *(self._findings() or none)])
 
     def _findings(self) -> list[str]:
-        nodes = [node for node in find(Node, self._context) if node.get_name() != LOG_NODE]
+        nodes = [node for node in find(Node, self._context) if is_used(node)]
+        nodes = [node for node in nodes if node.get_name() != LOG_NODE]
         frames = [frame for _, frame in rclpy_private.frames(self._threads())]
         return connections.findings(nodes, self._spinning, frames)
 
@@ -257,7 +267,7 @@ class Session:
         quiet when all its threads are held by callbacks that wait for an answer or an Event. No
         clock decides, so a busy machine only takes longer. Returns whether a thread is free.
 
-        Raises ValueError where the executor does not spin in this session, and what `wait_until`
+        Raises ValueError if the executor does not spin in this session, and what `wait_until`
         raises.
         """
         __tracebackhide__ = True
@@ -287,11 +297,15 @@ class Session:
 
     # --- Closing
 
+    def at_close(self, callback: Callable[[], None]) -> None:
+        """Call something when the session closes and its nodes are gone. It must not raise."""
+        self._shared.callback(callback)
+
     def __exit__(self, exception_type, exception, traceback) -> None:
         __tracebackhide__ = True
         with uninterrupted():
             if isinstance(exception, KeyboardInterrupt):
-                # What was half made is in the frames alone, and the traceback keeps them.
+                # The traceback keeps the frames, and they keep what was half made.
                 clear_frames(traceback)
             self._ended_by_exception = exception is not None
             try:
@@ -303,7 +317,7 @@ class Session:
                     exception.add_note(f'While the session closed: {failure!r}')
 
     def _close(self) -> None:
-        """Clean up, then say what went wrong: a failure, or a callback without end."""
+        """Clean up, then raise what went wrong: a failure, or a callback without end."""
         __tracebackhide__ = True
         if self._closed:
             return
@@ -311,15 +325,15 @@ class Session:
         self._rosout.print_warnings()
         if self._failures:
             raise self._failures[0]
-        stuck = [thread.name for thread in self._threads() if thread.is_alive()]
-        if stuck:
+        if self._endless:
+            stuck = any(thread.is_alive() for thread in self._endless)
             raise RuntimeError(
-                f'{len(stuck)} callback(s) did not end within {CLOSE_TIMEOUT_S:g} s: let every '
-                'callback end, or restart the kernel.'
+                f'{len(self._endless)} callback(s) did not end within {CLOSE_TIMEOUT_S:g} s: '
+                f'let every callback end{", and restart the kernel" if stuck else ""}.'
             )
 
     def _clean_up(self) -> None:
-        """End all that this session has begun."""
+        """End all that this session has started."""
         global _open_session
         if self._closed:
             return
@@ -330,7 +344,7 @@ class Session:
             executor.shutdown(timeout_sec=0)
         if self._rosout is not None:
             self._rosout.close()
-        destroy_nodes(self._context)
+        self._failures += destroy_nodes(self._context)
         rclpy.try_shutdown()
         self._shared.close()
         self._closed = True
@@ -346,6 +360,10 @@ class Session:
             rclpy_private.end_pool(executor)
         for thread in self._threads():
             self._join(thread, deadline)
+        self._endless = [thread for thread in self._threads() if thread.is_alive()]
+        for thread in self._endless:
+            rclpy_private.break_off(thread, SessionClosedError)
+            thread.join(BREAK_OFF_S)
 
     def _join(self, thread: threading.Thread, deadline: float) -> None:
         """Wait for the end of a thread. A call in it that waits for an answer fails.
@@ -353,9 +371,13 @@ class Session:
         After an interrupt or a failure, the cell will not set the Event at which a callback waits.
         """
         thread.join(min(2 * POLL_S, max(0.0, deadline - time.monotonic())))
+        started = time.monotonic()
         while thread.is_alive() and time.monotonic() < deadline:
+            if self._ended_by_exception and time.monotonic() > started + BREAK_OFF_S:
+                rclpy_private.break_off(thread, SessionClosedError)
             for client in find(Client, self._context):
                 rclpy_private.fail_calls(client, SessionClosedError('The session closes.'))
+            rclpy_private.end_answered_call(thread)
             if self._ended_by_exception:
                 # A long wait at once. A short one ends by itself, unless it comes again and again.
                 left_s = deadline - time.monotonic()
@@ -367,41 +389,65 @@ class Session:
         return [*self._spinning.values(), *(thread for pool in pools for thread in pool)]
 
 
-def destroy_nodes(context: rclpy.Context) -> None:
-    """Destroy all nodes of a context, also those that nobody knows any more.
+def is_used(node: Node) -> bool:
+    """Return whether a node can be asked: one that was destroyed cannot."""
+    try:
+        with node.handle:
+            return True
+    except InvalidHandle:
+        return False
+
+
+def destroy_nodes(context: rclpy.Context) -> list[Exception]:
+    """Destroy all nodes of a context, also those that no variable holds any more.
 
     Python collects the node of `Node('talker').create_publisher(...)`. What it has made stays, and
-    keeps the participant.
+    keeps the participant. Returns the failures.
     """
     found = _objects(Node, *MADE_BY_NODES)
     nodes = [thing for thing in found if isinstance(thing, Node)]
     kept = {id(made) for node in nodes if hasattr(node, 'handle') for made in _made_by(node)}
+    failures: list[Exception] = []
     with one_process_at_a_time():  # the last node ends the participant
         for node in _of(context, nodes):
-            _destroy(node)
+            failures += _destroy(node)
         for thing in found:
             if isinstance(thing, MADE_BY_NODES) and id(thing) not in kept:
-                with contextlib.suppress(Exception):
-                    thing.destroy()
+                failures += _failure(thing.destroy)
+    return failures
 
 
 def _made_by(node: Node) -> Iterator:
     return chain(node.publishers, node.subscriptions, node.clients, node.services)
 
 
-def _destroy(node: Node) -> None:
-    for destroy in (
-        # One that the cell spins itself holds what it found ready, as long as a variable holds it.
-        lambda: node.executor.shutdown(timeout_sec=0),
-        lambda: _destroy_actions(node),
-        node.destroy_node,
-        lambda: Node.destroy_node(node),  # past a mistake in an own destroy_node
+def _destroy(node: Node) -> list[Exception]:
+    """Destroy a node. Returns the failures."""
+    own = hasattr(node, 'handle') and type(node).destroy_node is not Node.destroy_node
+    return [
+        # An executor that the cell spins itself holds what it found ready, while a variable holds
+        # the executor.
+        *_failure(lambda: node.executor.shutdown(timeout_sec=0)),
+        *_failure(lambda: _destroy_actions(node)),
+        *_failure(node.destroy_node, () if own else ALREADY_DESTROYED),
+        *(_failure(lambda: Node.destroy_node(node)) if own else []),  # if its own one failed
         # A node whose __init__ failed or was interrupted has only some of its parts: destroy_node
         # misses one before it comes to the handle.
-        lambda: node.handle.destroy_when_not_in_use(),
-    ):
-        with contextlib.suppress(Exception):
-            destroy()
+        *_failure(lambda: node.handle.destroy_when_not_in_use()),
+    ]
+
+
+def _failure(
+    destroy: Callable[[], object], expected: tuple[type[Exception], ...] = ALREADY_DESTROYED
+) -> list[Exception]:
+    """Destroy something, and return what that raises and is not expected."""
+    try:
+        destroy()
+    except expected:
+        return []
+    except Exception as failure:  # whatever it is, the rest must be destroyed, too
+        return [failure]
+    return []
 
 
 def _destroy_actions(node: Node) -> None:

@@ -5,8 +5,8 @@ import sys
 
 from support.packages import HOSTILE
 
-from helpers import build_tools as module
-from helpers.build_tools import build_environment, build_tools
+from helpers._plumbing import build_tools as module
+from helpers._plumbing.build_tools import build_environment, build_tools
 
 
 def set_hostile(monkeypatch) -> None:
@@ -18,7 +18,7 @@ def missing(**options) -> list[str]:
     return [tool.name for tool in build_tools(**options) if not tool.found]
 
 
-def test_nothing_that_was_set_for_other_work_reaches_a_build(monkeypatch):
+def test_hostile_variables_reach_no_build(monkeypatch):
     set_hostile(monkeypatch)
     monkeypatch.setenv('LD_LIBRARY_PATH', f'{sys.prefix}/lib:/opt/ros/humble/lib:lib')
     monkeypatch.setenv('HTTPS_PROXY', 'proxy')
@@ -34,14 +34,14 @@ def test_nothing_that_was_set_for_other_work_reaches_a_build(monkeypatch):
     assert seen['LDFLAGS'] == '-Wl,--as-needed'
 
 
-def test_colcon_finds_a_python_in_a_folder_with_a_blank(monkeypatch):
+def test_colcon_finds_python_despite_a_space(monkeypatch):
     """Its setup.bash does not quote the folder."""
     assert 'COLCON_PYTHON_EXECUTABLE' not in build_environment()
     monkeypatch.setattr(sys, 'executable', '/my lessons/.venv/bin/python')
     assert build_environment()['COLCON_PYTHON_EXECUTABLE'] == sys._base_executable
 
 
-def test_without_the_wheels_the_sourced_ros_is_the_one_to_build_with(monkeypatch):
+def test_without_wheels_the_sourced_ros_stays(monkeypatch):
     set_hostile(monkeypatch)
     monkeypatch.setattr(module, 'from_wheels', lambda: False)
     kept = HOSTILE.items() & build_environment().items()
@@ -55,7 +55,7 @@ def test_without_the_wheels_the_sourced_ros_is_the_one_to_build_with(monkeypatch
     }
 
 
-def test_the_tools_that_a_machine_lacks(monkeypatch, tmp_path):
+def test_missing_tools_are_found(monkeypatch, tmp_path):
     assert missing() == []
     assert [tool.name for tool in build_tools(cmake=False)] == ['colcon']
     # CMake belongs to this Python.

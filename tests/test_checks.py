@@ -1,18 +1,20 @@
-"""What a reader is told about a guess and about an exercise."""
+"""What a reader reads about a guess and about an exercise."""
 
 import numpy as np
 import pandas as pd
 import pytest
+from support.kernel import Kernel
 
 from helpers.checks import NO_GUESS, check, compare_prediction
 
+AGAIN = ' Try again, or go on: see below.'
 QUESTION = 'How many of 41 messages are heard?'
 
 
 @pytest.fixture
-def title(request):
-    """A title of its own for each test: the tries at an exercise are counted by its title."""
-    return f'Exercise of {request.node.name}'
+def task(request):
+    """A number of its own for each test: the tries at a task are counted by its number."""
+    return hash(request.node.name)
 
 
 def told(capsys, *arguments, **options):
@@ -45,11 +47,11 @@ def told(capsys, *arguments, **options):
         ([[0]], set(), '[0]. Verdict: not those. The answer is none.'),
     ],
 )
-def test_each_kind_of_guess_gets_its_verdict_and_the_answer(capsys, guess, outcome, said):
+def test_each_guess_gets_verdict_and_answer(capsys, guess, outcome, said):
     assert told(capsys, guess, outcome) == [f'  Your guess: {said}']
 
 
-def test_text_does_not_move_with_a_number_that_moves(capsys):
+def test_tolerance_keeps_the_text_constant(capsys):
     texts = {tuple(told(capsys, 41, measured, tolerance=2)) for measured in range(15, 39)}
     assert texts == {('  Your guess: 41. Verdict: too many.',)}
     verdicts = [
@@ -69,15 +71,13 @@ def test_text_does_not_move_with_a_number_that_moves(capsys):
         ('012', [0, 1, 2], 'a list or a set'),
     ],
 )
-def test_a_guess_of_the_wrong_kind_is_told_the_right_kind_and_no_answer(
-    capsys, guess, outcome, wanted
-):
+def test_a_wrong_kind_of_guess_gets_the_kind(capsys, guess, outcome, wanted):
     assert told(capsys, guess, outcome, because='The queue keeps the last 10.') == [
         f'  Your guess: {guess!r}. Please change it: the answer must be {wanted}.'
     ]
 
 
-def test_a_reason_follows_a_guess_and_stays_secret_before(capsys):
+def test_the_reason_follows_only_a_guess(capsys):
     reason = 'The queue keeps the last 10.'
     assert told(capsys, 20, 20, because=reason)[1:] == [f'  {reason}']
     assert told(capsys, 41, 20, because=reason)[1:] == [f'  {reason}']
@@ -91,30 +91,30 @@ def test_an_outcome_of_no_known_kind_is_refused(capsys):
     assert capsys.readouterr().out == ''
 
 
-def tried(capsys, title, first=True, second=True):
+def tried(capsys, task, first=True, second=True):
     """Return what a check of two requirements prints."""
     check(
-        title,
+        task,
         ('the group is Reentrant', first, 'Look at the second argument.'),
         ('no message is lost', lambda: second, 'Count the threads.'),
     )
     return capsys.readouterr().out
 
 
-def test_hints_appear_at_the_second_wrong_try_of_this_exercise(capsys, title):
-    assert tried(capsys, title, second=False) == (
-        f'[ok] the group is Reentrant\n[not yet] no message is lost\n{title}: 1 of 2.\n'
+def test_hints_appear_at_the_second_wrong_try(capsys, task):
+    assert tried(capsys, task, second=False) == (
+        f'[ok] the group is Reentrant\n[not yet] no message is lost\nTask {task}: 1 of 2.{AGAIN}\n'
     )
-    assert 'Hint' not in tried(capsys, f'{title}, another', second=False)
-    assert tried(capsys, title, second=False) == (
+    assert 'Hint' not in tried(capsys, task + 1, second=False)
+    assert tried(capsys, task, second=False) == (
         '[ok] the group is Reentrant\n[not yet] no message is lost\n    Hint: Count the threads.\n'
-        f'{title}: 1 of 2.\n'
+        f'Task {task}: 1 of 2.{AGAIN}\n'
     )
 
 
-def test_a_second_run_in_the_same_kernel_prints_the_same(capsys, title):
+def test_a_second_run_prints_the_same(capsys, task):
     # Starter, then solution, as in a notebook that is run from top to bottom.
-    runs = [(tried(capsys, title, second=False), tried(capsys, title)) for _ in range(3)]
+    runs = [(tried(capsys, task, second=False), tried(capsys, task)) for _ in range(3)]
     assert runs[0] == runs[1] == runs[2]
 
 
@@ -122,7 +122,7 @@ class Group:
     def add(self, timer): ...
 
 
-def test_what_the_code_did_is_said(capsys, title):
+def test_what_the_code_did_is_said(capsys, task):
     heard = [1, 1, 2, 2]
 
     def broken():
@@ -137,8 +137,11 @@ def test_what_the_code_did_is_said(capsys, title):
     def hidden():  # as publish() does for a float in an Int32
         raise SystemError('returned a result with an exception set') from TypeError('a float')
 
+    def wrapped():
+        raise ValueError('the outer one') from TypeError('the inner one')
+
     check(
-        title,
+        task,
         ('2, 4, 42', lambda: heard == [2, 4, 42] or f'your node published {heard}', ''),
         ('1, 1, 2, 2', lambda: heard == [1, 1, 2, 2] or f'your node published {heard}', ''),
         ('it is built', 'the build failed', ''),
@@ -147,6 +150,7 @@ def test_what_the_code_did_is_said(capsys, title):
         ('it is heard', late, ''),
         ('it is in a group', lambda: Group.add('a timer'), ''),
         ('it publishes', hidden, ''),
+        ('it raises one from another', wrapped, ''),
         ('some', [], ''),
         ('equal', np.bool_(True), ''),
     )
@@ -168,25 +172,82 @@ def test_what_the_code_did_is_said(capsys, title):
         '          missing after a class, or too many after a callback?',
         '[not yet] it publishes',
         '    Found: TypeError: a float',
+        '[not yet] it raises one from another',
+        '    Found: ValueError: the outer one',
         '[not yet] some',
         '[ok] equal',
-        f'{title}: 2 of 10.',
+        f'Task {task}: 2 of 11.{AGAIN}',
     ]
 
 
-def test_interrupt_is_no_try(capsys, title):
+def test_interrupt_is_no_try(capsys, task):
     def interrupted():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        check(title, ('it ends', interrupted, ''))
-    assert 'Hint' not in tried(capsys, title, second=False)
+        check(task, ('it ends', interrupted, ''))
+    assert 'Hint' not in tried(capsys, task, second=False)
 
 
-def test_long_lines_are_broken_at_blanks(capsys, title):
+def test_long_lines_are_broken_at_blanks(capsys, task):
     words = ' '.join(f'word{number}' for number in range(40))
     for _ in range(2):
-        check(title, (words, lambda: words, words))
+        check(task, (words, lambda: words, words))
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 94
     assert ' '.join(' '.join(lines).split()).count(words) == 5
+
+
+def test_a_lesson_goes_on_with_the_code_that_passes():
+    with Kernel() as kernel:
+        kernel.run('from helpers.checks import check')
+        checked = "check(1, ('it is 2', lambda: two == 2 or f'it is {two}', 'One and one.'))"
+        solution = '%%solution 1\ntwo = 1 + 1'
+        assert '[not yet]' in kernel.run(f'two = 3\n{checked}')
+        assert kernel.run(solution) == '[ok] it is 2\nSolution of task 1: 1 of 1.\n'
+        assert kernel.run('two') == ''
+        # What the solution gave is not the student's, and stays for the later cells.
+        assert "name 'two' is not defined" in kernel.run(checked)
+        assert kernel.run('print(two)') == '2\n'
+        assert 'All done.' in kernel.run(f'two = 2.0\n{checked}')
+        assert 'goes on with your code' in kernel.run(solution)
+        assert kernel.run('print(two)') == '2.0\n'
+
+
+def test_a_callback_without_end_gets_a_sentence():
+    with Kernel() as kernel:
+        kernel.run(ENDLESS)
+        said = kernel.run("check(1, ('it counts', counts, ''))\nprint(threading.active_count())")
+        assert 'Found: TimeoutError: it did not end. Is there a loop that never ends?' in said
+        assert kernel.run('print(threading.active_count())') == said.splitlines()[-1] + '\n'
+        assert '[ok]' in kernel.run("loops = False\ncheck(1, ('it counts', counts, ''))")
+
+
+ENDLESS = """
+import threading
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from helpers.checks import check
+from helpers.session import ros_session
+
+loops = True
+
+class Counter(Node):
+    def __init__(self):
+        super().__init__('counter')
+        self.count = 0
+        self.create_timer(0.01, self.timer_callback)
+
+    def timer_callback(self):
+        while loops:
+            pass
+        self.count += 1
+
+def counts():
+    with ros_session() as session:
+        counter, executor = Counter(), SingleThreadedExecutor()
+        executor.add_node(counter)
+        session.spin(executor)
+        session.wait_until(lambda: counter.count)
+    return True
+"""

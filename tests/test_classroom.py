@@ -1,4 +1,4 @@
-"""What a lesson tells a class, and what it does without one."""
+"""What a lesson sends to a class, and what it does without one."""
 
 import contextlib
 import csv
@@ -11,7 +11,7 @@ import pytest
 from support.classes import LATER, OTHER, QUESTION, STEP, running_class, student
 from support.processes import running
 
-from helpers import checks, classroom, progress
+from helpers import checks, classroom
 
 VALUES = [41, 0.2, True, 'the way is free', {'D', 'C'}, [0, 1, 2], ('a', 1)]
 GUESSES = """
@@ -37,7 +37,7 @@ def folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def nobody():
-    """Yield an address where nobody answers."""
+    """Yield an address at which nothing answers."""
     with socket.socket() as taken:  # bound, and not listening
         taken.bind(('127.0.0.1', 0))
         yield f'127.0.0.1:{taken.getsockname()[1]}'
@@ -74,9 +74,9 @@ def join(opened, name=''):
 
 
 @pytest.mark.parametrize('value', [*VALUES, None, ..., object(), float('nan'), 'x' * 9999])
-def test_without_a_class_a_guess_is_the_value_and_nothing_else(folder, capsys, value):
+def test_without_a_class_a_guess_returns_its_value(folder, capsys, value):
     assert classroom.guess('How many?', value) is value
-    checks.check('Exercise 1 of lesson 02', ('it is right', False, ''))
+    checks.check(1, ('it is right', False, ''))
     assert list(folder.iterdir()) == []
     assert 'class' not in capsys.readouterr().out
 
@@ -94,7 +94,7 @@ def test_without_a_class_a_sentence_says_so(folder, capsys, call):
     ('address', 'code'),
     [('', ''), ('192.0.2.5:8765', ''), ('', 'blue-otter-lamp'), ('file:///etc', 'a'), ('a b', 'c')],
 )
-def test_what_is_no_address_is_said_in_one_sentence(folder, capsys, address, code):
+def test_a_bad_address_gets_one_sentence(folder, capsys, address, code):
     classroom.join_class(address, code)
     assert capsys.readouterr().out.startswith('Copy it from the wall: join_class(')
     assert list(folder.iterdir()) == []
@@ -116,17 +116,10 @@ def test_a_file_that_is_damaged_fails_no_lesson(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_where_no_progress_is_kept_there_is_no_class(folder, capsys, monkeypatch, nobody):
-    monkeypatch.setenv(progress.FILE_VARIABLE, '')
-    classroom.join_class(nobody, 'blue-otter-lamp')
-    assert classroom.guess('How many?', 41) == 41
-    assert capsys.readouterr().out.startswith('There is no class here, because')
-
-
 # --- In a class ----------------------------------------------------------------------------------
 
 
-def test_all_kinds_of_guesses_are_told_and_no_other(opened, tmp_path):
+def test_only_values_that_a_page_shows_are_sent(opened, tmp_path):
     others = '..., None, object(), "x" * 9999, [[1]], {"A": 1}, float("inf"), 2**99'
     script = f"""
 for value in ({others}, *{VALUES!r}):
@@ -139,14 +132,13 @@ guess({QUESTION!r}, 'the last one')
     assert [json.loads(row[-1]) for row in rows[1:-1]] == TOLD
 
 
-def test_what_a_student_does_reaches_the_page_and_nothing_else_does(opened, tmp_path):
+def test_the_page_gets_guesses_tasks_and_hands(opened, tmp_path):
     script = f"""
 my_secret = guess({QUESTION!r}, 7)
 my_secret = guess({QUESTION!r}, 9)
 checks.compare_prediction({QUESTION!r}, my_secret, 14)
-checks.check('Exercise 1 of lesson 02', ('it is so', True, ''))
-checks.check('Exercise 1 of lesson 02', ('it is so', False, ''))
-checks.check('Solution of exercise 1', ('it is so', True, ''))
+checks.check(1, ('it is so', True, ''))
+checks.check(1, ('it is so', False, ''))
 raise_hand()
 """
     with kernel(tmp_path, join(opened, 'Ada') + script) as said:
@@ -155,8 +147,8 @@ raise_hand()
     assert 'called Ada. Sent to it: your guesses' in said
     assert 'Your hand is up.' in said
     assert [hand['name'] for hand in view['hands']] == ['Ada']
-    [exercise] = view['exercises']
-    assert (exercise['solved'], exercise['tried']) == (1, 0)
+    [task] = view['tasks']
+    assert (task['solved'], task['tried']) == (1, 0)
     assert opened.bars() == {'9': 1}
     assert opened.view()['guesses'][0]['measured'] == ['14']
     rows = [line.split(',')[5:] for line in opened.csv()[1:]]
@@ -164,30 +156,23 @@ raise_hand()
         ['guess', QUESTION, '7'],
         ['guess', QUESTION, '9'],
         ['outcome', QUESTION, '14'],
-        ['exercise', '1', 'true'],
-        ['exercise', '1', 'false'],
+        ['task', '1', 'true'],
+        ['task', '1', 'false'],
         ['hand', '', 'true'],
     ]
 
 
-def test_the_next_notebook_is_in_the_class_until_the_student_leaves(opened, tmp_path):
+def test_membership_lasts_until_the_student_leaves(opened, tmp_path):
     in_kernel(tmp_path, join(opened))
     elsewhere = {'JPY_SESSION_NAME': '/home/ada/notes.ipynb'}
     in_kernel(tmp_path, f'guess({QUESTION!r}, 2)', **elsewhere)
     with kernel(tmp_path, f'guess({QUESTION!r}, 1)'):
         opened.wait_for(lambda view: view['guesses'][0]['answered'])
     assert [line[-1] for line in opened.csv()[1:]] == ['1']
-    assert in_kernel(tmp_path, 'leave_class()').endswith('What you told it is deleted.')
+    assert in_kernel(tmp_path, 'leave_class()').endswith('What you sent is deleted.')
     in_kernel(tmp_path, f'guess({QUESTION!r}, 3)')
     assert opened.csv()[1:] == []
     assert in_kernel(tmp_path, 'leave_class()') == classroom.NOT_JOINED
-
-
-def test_a_hand_in_a_notebook_that_is_no_lesson(opened, tmp_path):
-    in_kernel(tmp_path, join(opened))
-    copied = {'JPY_SESSION_NAME': '/home/ada/02_lose_messages-Copy1.ipynb'}
-    assert in_kernel(tmp_path, 'raise_hand()', **copied) == classroom.NO_LESSON
-    assert opened.csv()[1:] == []
 
 
 def test_the_steps_of_the_cells_that_run(opened, tmp_path):
@@ -256,17 +241,11 @@ print(said.getvalue())
     assert 'on seat 7' in said
     assert said.endswith('The class does not answer. What you tell is kept until it does.')
     said = in_kernel(tmp_path, 'leave_class()')
-    assert said == 'You have left the class. It did not answer: what it was told stays there.'
+    assert said == 'You have left the class. It did not answer: what you sent stays there.'
 
 
-def test_what_answers_without_a_seat_is_no_class(broken, folder, capsys, monkeypatch):
-    monkeypatch.setattr(Broken, 'seat', {'ok': True})
-    classroom.join_class(broken, 'a-b-c')
-    assert capsys.readouterr().out.startswith(f'No class answers at {broken} (')
-
-
-def test_who_joins_again_keeps_the_seat_and_what_waits(tmp_path):
-    """As where the kernel is restarted, and all cells above are run again."""
+def test_joining_again_keeps_seat_and_events(tmp_path):
+    """As if the kernel was restarted, and all cells above were run again."""
     with running_class(tmp_path / 'class') as opened:
         said = in_kernel(tmp_path / 'ada', join(opened) + f'guess({QUESTION!r}, 1)')
         opened.kill()
@@ -280,7 +259,7 @@ def test_who_joins_again_keeps_the_seat_and_what_waits(tmp_path):
         assert [line[-1] for line in opened.csv()[1:]] == ['1', '2', '3']
 
 
-def test_what_is_told_while_the_server_is_gone_is_counted_once(tmp_path):
+def test_events_survive_a_dead_server_exactly_once(tmp_path):
     """The server is killed in the middle; kernels end and begin; a clock is a year behind."""
     behind = 'import time\nreal = time.time\ntime.time = lambda: real() - 3e7\n'
     first, second, third = (GUESSES.format(n, n + 100, QUESTION) for n in (0, 100, 200))
@@ -301,7 +280,7 @@ def test_what_is_told_while_the_server_is_gone_is_counted_once(tmp_path):
         values = [int(line.rpartition(',')[2]) for line in opened.csv()[1:]]
         assert values == list(range(300))
 
-        # The class is over. Who does not know it yet is told by the next one.
+        # The class is over. Late students read it from the next one.
         assert opened.stop().endswith('The class is over. What it was told is deleted.\n')
         assert not list(tmp_path.glob('class/jupyter/class/*'))
         opened.start()

@@ -3,11 +3,13 @@
 import threading
 
 import pytest
+from rclpy.action import ActionClient, ActionServer
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Int64
 from support.nodes import Answerer, Asker, Listener, Talker, spin
+from test_msgs.action import Fibonacci
 
 from helpers.recording import Recording
 from helpers.session import ros_session
@@ -64,13 +66,25 @@ def test_qos_that_does_not_fit():
         ]
 
 
-def test_an_executor_that_does_not_spin_and_a_service_that_is_missing():
+def test_an_idle_executor_and_a_missing_service():
     with ros_session() as session:
         asker, executor = Asker(), SingleThreadedExecutor()
         executor.add_node(asker)
         assert said_by(session.wait_until, lambda: False) == [
             'The executor of the node asker does not spin: session.spin(...) is missing.',
             'asker calls /look, and nobody serves it.',
+        ]
+
+
+def test_a_mistyped_action_whose_server_does_not_spin():
+    with ros_session() as session:
+        robot, operator = Node('robot'), Node('operator')
+        ActionServer(robot, Fibonacci, 'patrol', lambda goal_handle: Fibonacci.Result())
+        ActionClient(operator, Fibonacci, 'Patrol')
+        spin(session, operator)
+        assert said_by(session.wait_until, lambda: False) == [
+            'The node robot is in no executor: executor.add_node(...) is missing.',
+            'operator sends goals to /Patrol, and nobody serves it. Nearly the same name: /patrol.',
         ]
 
 
@@ -123,9 +137,18 @@ def test_nothing_is_wrong():
         assert said_by(session.wait_until, lambda: False) == [NOTHING]
 
 
-def test_who_watches_reads_it_while_the_cell_waits(monkeypatch):
+def test_a_destroyed_node_is_passed_over():
+    with ros_session() as session:
+        gone = Talker(1)
+        gone.destroy_node()
+        assert said_by(session.wait_until, lambda: False) == [NOTHING]
+
+
+def test_findings_are_shown_while_the_cell_waits(monkeypatch):
     said = []
-    monkeypatch.setattr('helpers.progress_bar.ProgressBar.say', lambda bar, text: said.append(text))
+    monkeypatch.setattr(
+        'helpers._plumbing.progress_bar.ProgressBar.say', lambda bar, text: said.append(text)
+    )
     monkeypatch.setattr('helpers.session.SAY_AFTER_S', 0.3)
     with ros_session() as session:
         talker = Talker(1)  # never spun

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 from rclpy.executors import SingleThreadedExecutor
-from support.processes import put, traces
+from support.processes import put
 
 from helpers import doctor
 
@@ -104,18 +104,12 @@ def test_another_ros_is_not_jazzy(monkeypatch):
     assert doctor.check_rclpy().to_do.startswith('use ROS 2 Jazzy (rclpy 7.1.x)')
 
 
-def test_the_message_leaves_nothing():
-    before = traces()
-    assert doctor.check_message().to_do == ''
-    assert traces() <= before
-
-
 def test_what_the_middleware_raises_is_reported(monkeypatch):
     monkeypatch.setattr('helpers.session.reserve_domain_id', lambda: -5)
     row = doctor.check_message()
     assert row.required
     assert row.found
-    assert row.to_do == 'see "Trouble" in environment.md'
+    assert row.to_do == 'see "It does not work" in environment.md'
 
 
 def test_a_message_that_does_not_arrive_is_reported(monkeypatch):
@@ -126,17 +120,7 @@ def test_a_message_that_does_not_arrive_is_reported(monkeypatch):
     assert row.to_do.startswith('allow UDP on the loopback interface')
 
 
-def test_no_free_domain_id_is_reported(monkeypatch):
-    def none_left() -> int:
-        raise RuntimeError('All of them are in use: close some.')
-
-    monkeypatch.setattr('helpers.session.reserve_domain_id', none_left)
-    row = doctor.check_domain()
-    assert row.required
-    assert row.to_do == 'All of them are in use: close some.'
-
-
-def test_shared_memory_that_is_full_or_cannot_be_written_is_reported(monkeypatch):
+def test_full_or_readonly_shared_memory_is_reported(monkeypatch):
     assert doctor.check_shared_memory().to_do == ''
     monkeypatch.setattr(shutil, 'disk_usage', lambda path: SimpleNamespace(free=31 * 2**20))
     row = doctor.check_shared_memory()

@@ -14,8 +14,8 @@ from rclpy.node import Node
 from support.nodes import LIMIT_S, Listener, spin
 from support.processes import run_python, running
 
-from helpers import domain
-from helpers.domain import configure_discovery, reserve_domain_id
+from helpers._plumbing import domain
+from helpers._plumbing.domain import configure_discovery, reserve_domain_id
 from helpers.session import graph_environment, ros_session
 
 
@@ -52,7 +52,7 @@ def test_no_domain_left():
 
 @pytest.fixture
 def shared_id():
-    """Return a domain id that nobody on this machine has reserved."""
+    """Return a domain id that no process of this machine has reserved."""
     with reserved_domain_id(lambda: random.randint(30, 100)) as free:
         pass
     return free
@@ -137,7 +137,7 @@ def test_hostile_variables(monkeypatch, shared_id):
                 assert os.environ.get(name) == expected.get(name)
             assert 'ROS_LOCALHOST_ONLY' not in os.environ
         assert graph_environment() == narrow
-    configure_discovery('LOCALHOST')  # also where nothing is to be removed
+    configure_discovery('LOCALHOST')  # also if nothing is to be removed
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_the_ids_that_no_kernel_reserves(free_for_all):
 
 @pytest.fixture
 def turn(tmp_path, monkeypatch):
-    """Return an open folder. Who locks it has the turn to make or to end a participant."""
+    """Return an open folder. Its lock is the turn to make or to end a participant."""
     monkeypatch.setattr(domain, 'SHARED_MEMORY', str(tmp_path))
     folder = os.open(tmp_path, os.O_RDONLY)
     yield folder
@@ -193,7 +193,7 @@ def has(turn):
     return True
 
 
-def test_a_session_waits_for_its_turn_to_make_and_to_end_its_participant(turn, monkeypatch):
+def test_participants_are_made_and_ended_in_turn(turn, monkeypatch):
     free = set()
 
     class Noting(Node):
@@ -212,7 +212,7 @@ def test_a_session_waits_for_its_turn_to_make_and_to_end_its_participant(turn, m
     assert free == {('made', False), ('ended', False)}
 
 
-def test_a_session_opens_when_the_turn_of_another_process_is_over(turn, monkeypatch):
+def test_a_session_waits_for_another_process(turn, monkeypatch):
     lock, refused = fcntl.flock, []
 
     def flock(folder, operation):
@@ -239,7 +239,7 @@ def test_a_session_opens_without_a_turn(turn, folder, monkeypatch):
         assert rclpy.ok()
 
 
-def test_who_has_waited_in_vain_for_a_turn_only_asks(turn, monkeypatch):
+def test_a_timed_out_turn_is_not_awaited_again(turn, monkeypatch):
     lock, asked = fcntl.flock, []
 
     def flock(folder, operation):

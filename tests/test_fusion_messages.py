@@ -29,7 +29,7 @@ def rotated(orientation, vector):
 
 @settings(max_examples=20)
 @given(angles, angles, angles)
-def test_an_orientation_turns_about_x_then_y_then_z(roll, pitch, yaw):
+def test_orientations_turn_about_x_y_z(roll, pitch, yaw):
     turned = np.array([0.3, -2.0, 1.0])
     for axis, angle in enumerate((roll, pitch, yaw)):
         parts = [0.0, 0.0, 0.0]
@@ -54,6 +54,7 @@ def test_odometry_comes_back():
     assert (stamp_of(0).sec, stamp_of(0.5).nanosec) == (1, 500_000_000)
     pose = np.array([[1.0, 0.2, 0.3], [0.2, 2.0, 0.4], [0.3, 0.4, 3.0]])
     message = odometry_message(2.5, 'map', [1, 2, 0.5, 4, 5, 6, 7, 8], pose, 10 * pose)
+    assert message.pose.pose.orientation == quaternion(0, 0, 0.5)
     assert (message.header.frame_id, message.child_frame_id) == ('map', 'base_footprint')
     ((names, values, covariance),) = from_odometry(message)
     assert dict(zip(names, values, strict=True)) == {'vx': 4, 'vy': 5, 'vyaw': 6}

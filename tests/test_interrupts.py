@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from helpers.interrupts import uninterrupted
+from helpers._plumbing.interrupts import uninterrupted
 
 
 def test_an_interrupt_waits_for_the_end():
@@ -17,7 +17,7 @@ def test_an_interrupt_waits_for_the_end():
     assert signal.getsignal(signal.SIGINT) is handler
 
 
-def test_an_interrupt_is_not_lost_where_the_block_fails():
+def test_an_interrupt_survives_a_failing_block():
     with pytest.raises(KeyboardInterrupt) as interrupt, uninterrupted():
         signal.raise_signal(signal.SIGINT)
         raise ZeroDivisionError

@@ -3,8 +3,8 @@
 import pytest
 
 from helpers import progress
-from tools.lessons import rules, run, tables
-from tools.lessons.lesson import FOLDER, lessons
+from tools.lessons import rules, tables
+from tools.lessons.lesson import lessons
 
 LESSONS = lessons()
 TEXTS = tables.texts_of()
@@ -33,20 +33,13 @@ def test_what_follows_from_the_notebooks(path, made):
     )
 
 
-def test_lesson_00_shows_the_exercises_that_there_are():
+def test_lesson_00_shows_the_tasks_that_there_are():
     assert not tables.needs_run(LESSONS), (
         f'The table in notebook 00 is of other lessons: run `{tables.COMMAND}`.'
     )
 
 
-def test_a_kernel_reads_the_same_exercises_as_the_rules():
-    assert progress.lessons() == tables.with_exercises(LESSONS)
+def test_kernels_and_rules_read_the_same_tasks():
+    assert progress.with_tasks() == tables.with_tasks(LESSONS)
     for one in LESSONS:
-        assert one.exercises == list(rules.exercises(one))
-
-
-def test_pictures_are_those_of_the_notebooks():
-    found = {name: png for one in LESSONS for name, png in run.pictures(one.notebook).items()}
-    assert sorted(found) == sorted(run.PICTURES.values())
-    for name, picture in found.items():
-        assert (FOLDER / name).read_bytes() == picture, f'run `make notebooks` for {name}'
+        assert one.tasks == list(rules.tasks(one))

@@ -6,7 +6,7 @@ import pytest
 from jupyter_client.manager import run_kernel
 
 CELL = """
-    from helpers.progress_bar import ProgressBar
+    from helpers._plumbing.progress_bar import ProgressBar
     parts = iter([0.25, 0.5, 1.2])
     with ProgressBar({progress}) as bar:
         for waited_s in {waits}:
@@ -46,7 +46,7 @@ def bar(percent):
     return f'<progress value="{percent}" max="100"></progress> {percent} %'
 
 
-def test_a_long_wait_shows_a_bar_until_its_end(kernel):
+def test_a_long_wait_shows_a_bar(kernel):
     assert shown(kernel, [0, 1.99, 2, 2.1, 2.2, 2.3, 5]) == [
         ('display_data', bar(25)),
         ('update', bar(50)),
@@ -70,7 +70,7 @@ def test_a_bar_that_is_not_needed_shows_nothing(kernel):
 WHY = "bar.say('A node & no executor.')"
 
 
-def test_what_is_said_stays_where_the_cell_is_interrupted(kernel):
+def test_an_interrupted_wait_keeps_its_reason(kernel):
     said = '<pre>A node &amp; no executor.</pre>'
     first = [('display_data', bar(25)), ('update', bar(25) + said)]
     assert shown(kernel, [2], then=WHY) == [*first, ('update', ''), HEARD]

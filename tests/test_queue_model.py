@@ -24,10 +24,10 @@ from support.runs import (
     tries,
 )
 
+from helpers._plumbing.values import RUN_COLUMNS, check_table
 from helpers.queue_model import ALLOWED_REST, explain, predict
 from helpers.recording import Recording
 from helpers.session import ros_session
-from helpers.values import COLUMNS, check_table
 
 # predict
 
@@ -67,12 +67,12 @@ def test_predict_is_what_a_queue_does(run):
     table = predict(period / 1000, callback / 1000, depth, threads, messages)
     expected = slow_prediction(period, callback, depth, threads, messages)
     pd.testing.assert_frame_equal(check_table(table), table)
-    assert list(table.columns) == COLUMNS
+    assert list(table.columns) == RUN_COLUMNS
     assert table['seq'].tolist() == list(range(messages))
     assert heard(table) == list(expected)
     # To the nanosecond, in milliseconds.
     published, started, finished = (
-        table[name].dropna().mul(1000).round(6).tolist() for name in COLUMNS[1:4]
+        table[name].dropna().mul(1000).round(6).tolist() for name in RUN_COLUMNS[1:4]
     )
     assert published == [number * period for number in range(messages)]
     assert started == list(expected.values())
@@ -246,7 +246,7 @@ def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, data):
 # explain: examples
 
 
-def test_order_and_start_of_the_numbers_do_not_matter():
+def test_numbers_may_start_anywhere():
     table = predict(0.05, 0.2, 10, 1, 41)
     shifted = table.assign(seq=table['seq'] + 1000).sample(frac=1, random_state=1)
     before = shifted.copy()
@@ -290,7 +290,7 @@ LATE_PUBLISHED = [0, 51, 93, 128, 181, 228, 278, 357, 387, 435, 515, 529, *range
 LATE_HEARD = {0: (10, 357), 1: (444, 660), 4: (665, 870), 8: (871, 1076), 12: (1077, 1287)}
 
 
-def test_a_worker_may_be_as_late_as_its_callbacks():
+def test_a_worker_may_be_late():
     published = pd.Series(LATE_PUBLISHED[:23]) / 1e3
     table = pd.DataFrame({'seq': published.index, 'published_s': published})
     table[['started_s', 'finished_s']] = np.nan
@@ -305,7 +305,7 @@ def test_a_worker_may_be_as_late_as_its_callbacks():
     for seq, start in {1: 0.444, 4: 0.65, 8: 0.86, 12: 1.07}.items():
         table.loc[seq, ['started_s', 'finished_s']] = start, start + 0.2
     assert rested in explain(table, 10, 1).contradictions
-    # One worker is one worker, also where nobody knows its thread. Of two, nothing is known.
+    # One worker is one worker, also if its thread is unknown. Of two, nothing is known.
     table['thread'] = None
     assert rested in explain(table, 10, 1).contradictions
     assert rested not in explain(table, 10, 2).contradictions

@@ -87,7 +87,7 @@ def cancel(threads, charges, own_group):
         (3, True, True, ''),
     ],
 )
-def test_a_cancel_waits_for_what_rclpy_lets_it_wait(script, threads, charges, own_group, cause):
+def test_a_cancel_waits_as_in_rclpy(script, threads, charges, own_group, cause):
     shown, heard, accepted = cancel(threads, charges, own_group)
     steps = script.call('steps', shown.runs[0].record())
     said = [step['says'] for step in steps]

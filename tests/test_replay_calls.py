@@ -1,4 +1,4 @@
-"""Calls of services, recorded with the real rclpy and replayed: who waits for whom."""
+"""Calls of services, recorded with the real rclpy and replayed."""
 
 import math
 import re
@@ -36,7 +36,7 @@ def watch(asker, answerer):
 @pytest.mark.parametrize('style', STYLES)
 @pytest.mark.parametrize('groups', [1, 2])
 @pytest.mark.parametrize('threads', [1, 2, 4])
-def test_what_rclpy_did_is_a_walk_and_waits_where_rclpy_waits(script, threads, groups, style):
+def test_a_replay_waits_where_rclpy_waits(script, threads, groups, style):
     for _ in range(4):
         shown, calls, answer = record(threads, groups, style)
         assert [(c.style, c.caller, c.service) for c in calls.itertuples()] == [
@@ -70,7 +70,7 @@ def test_the_circle_closes_when_the_question_is_asked(script):
     assert steps[-1]['queues'] == [0, 0, 1]
 
 
-def test_await_gives_the_thread_back_and_not_the_group(script):
+def test_await_gives_back_only_the_thread(script):
     shown, *_ = record(1, 1, 'await')
     last = script.call('steps', shown.runs[0].record())[-1]
     assert last['running'] == [None]
@@ -174,7 +174,7 @@ def test_more_threads_than_were_said():
             replay_calls(recording, 1)
 
 
-def test_a_call_from_outside_is_a_request_that_comes():
+def test_a_call_from_outside_arrives():
     with ros_session() as session:
         answerer = Answerer()
         client = answerer.create_client(Trigger, 'look')

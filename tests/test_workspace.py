@@ -26,7 +26,7 @@ from support.packages import (
 from support.processes import running
 from support.waits import wait_for
 
-from helpers.domain import reserve_domain_id
+from helpers._plumbing.domain import reserve_domain_id
 from helpers.session import ros_session
 from helpers.workspace import Workspace, folders, processes
 from helpers.workspace.build_output import lines_that_matter
@@ -40,7 +40,7 @@ ROOT = Path(__file__).resolve().parent.parent
 def built():
     """Return a workspace in which packages with libraries and with a node have been built."""
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in HOSTILE.items() | {('HOME', '/proc')}:  # nobody can write there
+        for name, value in HOSTILE.items() | {('HOME', '/proc')}:  # a folder that cannot be written
             patch.setenv(name, value)
         workspace = Workspace('test_workspace')
         write_library(workspace)
@@ -74,14 +74,14 @@ def shell():
 # --- Build ---------------------------------------------------------------------------------------
 
 
-def test_nothing_that_was_set_for_other_work_reaches_a_build(built):
+def test_hostile_variables_reach_no_build(built):
     assert built.result.ok, built.result
     assert built.result.failed is None
     assert str(built.result).endswith('\n\nSummary: 3 packages finished')
     assert (built.path / built.result.log).is_file()
 
 
-def test_of_a_build_that_fails_the_lines_that_matter_are_shown(other):
+def test_a_failed_build_shows_its_error(other):
     cmake = 'cmake_minimum_required(VERSION 3.8)\nproject(before LANGUAGES NONE)\n'
     other.write('src/before/package.xml', package_xml('before', 'ament_cmake'))
     other.write(
@@ -124,13 +124,13 @@ def test_mistakes_of_a_python_package(other):
     assert str(result).endswith('\n\nSummary: 0 packages finished')
 
 
-def test_without_a_compiler_one_sentence_says_what_to_install(other, monkeypatch, tmp_path):
+def test_a_missing_compiler_gets_one_sentence(other, monkeypatch, tmp_path):
     write_library(other)
     monkeypatch.setenv('PATH', str(tmp_path))  # only what belongs to this Python is left
-    told = (
+    said = (
         r'^Missing for this build: C\+\+ compiler. Run `sudo apt install g\+\+`, then run this cell'
     )
-    with pytest.raises(RuntimeError, match=told):
+    with pytest.raises(RuntimeError, match=said):
         other.build()
 
 
@@ -167,7 +167,7 @@ if '--editable' in sys.argv:
 """
 
 
-def test_a_build_goes_on_after_an_interrupt_between_copies_and_links(other):
+def test_an_interrupted_change_to_links_is_mended(other):
     write_talker(other)
     assert other.build().ok
     write_talker(other, setup=LINKS_WAIT + SETUP_PY)
@@ -295,7 +295,7 @@ EXPORT = 'INTERFACE_INCLUDE_DIRECTORIES "{0}/include/python3.11;{0}/lib/python3.
 BUILT_AT = '/opt/python/cp311-cp311'
 
 
-def test_the_wheels_are_fixed_once_and_their_cache_is_not_touched(tmp_path):
+def test_wheels_are_fixed_once_outside_the_cache(tmp_path):
     cached = tmp_path / 'cached'
     cached.write_text(EXPORT.format(BUILT_AT, 'site-packages/numpy/_core/include'))
     cached.chmod(0o640)
@@ -325,8 +325,8 @@ def test_wheels_that_cannot_be_fixed_get_one_sentence(tmp_path):
         capture_output=True,
         text=True,
     )
-    told = 'cannot be written: use an environment of your own, made with `make lab`.'
-    assert answer.stderr.strip().endswith(told)
+    said = 'cannot be written: use an environment of your own, made with `make lab`.'
+    assert answer.stderr.strip().endswith(said)
     assert [path.name for path in file.parent.iterdir()] == [file.name]
 
 
@@ -346,7 +346,7 @@ def test_a_built_library_is_one_of_this_process(used):
     assert ctypes.CDLL(None).doubled() == 42
 
 
-def test_what_was_built_again_is_used_or_the_kernel_must_be_restarted(used):
+def test_a_rebuilt_package_is_used_or_refused(used):
     import talker_pkg.talker
 
     assert talker_pkg.talker.GREETING == 'Hello World'
@@ -377,7 +377,7 @@ def test_without_a_build_one_sentence(other):
 
 
 @pytest.mark.parametrize('shared_id', [None, 101])
-def test_a_running_node_is_heard_by_this_kernel_and_ends(built, shared_id):
+def test_a_node_is_heard_and_ends(built, shared_id):
     with ros_session(shared_id) as session, built.run('talker_pkg', 'talker') as talker:
         listener = Listener()
         spin(session, listener)
@@ -412,8 +412,8 @@ def test_waiting_is_bounded_and_says_what_was_printed(built, capsys):
         talker.wait_for('Publishing: 1')
         talker.print_output(first=1)
         assert capsys.readouterr().out == '[INFO] [talker]: Publishing: 0\n'
-        told = r"^Waited 0.1 s in vain for a line with 'never' of talker. Its last lines: .*Publish"
-        with pytest.raises(TimeoutError, match=told):
+        said = r"^Waited 0.1 s in vain for a line with 'never' of talker. Its last lines: .*Publish"
+        with pytest.raises(TimeoutError, match=said):
             talker.wait_for('never', timeout_s=0.1)
         with pytest.raises(TimeoutError, match='^Waited 0.1 s in vain for the end of talker. Its'):
             talker.wait(timeout_s=0.1)
@@ -426,15 +426,15 @@ def run_script(workspace: Workspace, name: str, text: str) -> Process:
     return workspace.run('talker_pkg', name)
 
 
-def test_of_a_traceback_the_last_line_is_told(built):
+def test_a_traceback_is_reported_by_its_last_line(built):
     wrong = run_script(built, 'wrong.sh', f"""exec {sys.executable} -c 'int("a" + str(1))'""")
     with pytest.raises(RuntimeError) as failure:
         wrong.wait_for('up')
-    told = "Its last line: ValueError: invalid literal for int() with base 10: 'a1'"
-    assert str(failure.value) == f"wrong.sh ended with code 1 before a line with 'up'. {told}"
+    said = "Its last line: ValueError: invalid literal for int() with base 10: 'a1'"
+    assert str(failure.value) == f"wrong.sh ended with code 1 before a line with 'up'. {said}"
 
 
-def test_a_process_that_ignores_ctrl_c_is_killed_and_so_is_what_one_leaves(built, monkeypatch):
+def test_deaf_and_orphaned_processes_are_killed(built, monkeypatch):
     ignores = 'trap "" INT TERM; printf "up "; echo and running; sleep 60; true'
     with monkeypatch.context() as impatient, run_script(built, 'deaf.sh', ignores) as deaf:
         impatient.setattr(processes, 'STOP_TIMEOUT_S', 0.3)
@@ -488,7 +488,7 @@ def test_an_interrupt_while_a_process_starts_leaves_none(built, shell, monkeypat
     assert [process.poll() is None for process in started] == [False] * 4
 
 
-# When it is told to end, it first interrupts who tells it, and takes its time.
+# When it has to end, it first interrupts its parent, and takes its time.
 INTERRUPTS = """
 import os, signal, sys, time
 def end(*_):
@@ -509,10 +509,71 @@ def test_an_interrupt_while_a_process_ends_leaves_none(tmp_path):
     assert psutil.Process().children() == []
 
 
+# --- Terminals -----------------------------------------------------------------------------------
+
+
+def test_a_terminal_knows_packages_after_source(built):
+    assert built.terminal('ros2 run talker_pkg talker') == "Package 'talker_pkg' not found"
+    source = 'source install/setup.bash; '
+    executables = built.terminal(f'{source}ros2 pkg executables talker_pkg')
+    assert 'talker_pkg talker' in executables.splitlines()
+    with built.start(f'{source}ros2 run talker_pkg talker', 'first') as talker:
+        talker.wait_for('Publishing: 2')
+        assert built.terminal('ros2 node list') == '/talker'
+        again = built.start('echo again', 'first')
+        assert not talker.running
+        assert again.wait() == 0
+    assert talker.lines[-1] == 'The talker ends.'
+
+
+def test_a_wait_in_vain_names_topics_that_do_not_meet(other):
+    publish = 'ros2 topic pub /topik std_msgs/msg/String "data: a"'
+    with (
+        other.start(publish, 'publish') as publisher,
+        other.start('ros2 topic echo /topic std_msgs/msg/String', 'echo') as echo,
+    ):
+        publisher.wait_for('publishing')
+        with pytest.raises(TimeoutError) as failure:
+            echo.wait_for('data', timeout_s=1)
+    assert str(failure.value) == (
+        "Waited 1 s in vain for a line with 'data' of echo. Its last lines: none. The topic /topik "
+        'has a publisher and no subscription. Nearly the same name: /topic. The topic /topic has a '
+        'subscription and no publisher. Nearly the same name: /topik'
+    )
+
+
+def test_a_build_in_a_terminal_prints_no_times(other):
+    write_talker(other)
+    assert other.terminal('colcon build').splitlines() == [
+        'Starting >>> talker_pkg',
+        'Finished <<< talker_pkg',
+        '',
+        'Summary: 1 package finished',
+    ]
+
+
+def test_a_killed_kernel_closes_its_terminals(built):
+    script = f"""
+        from helpers.workspace import Workspace
+        workspace = Workspace('test_killed')
+        (workspace.path / 'install').symlink_to('{built.path}/install')
+        run = 'source install/setup.bash; ros2 run talker_pkg talker; true'
+        workspace.start(run).wait_for('Publishing')
+        print(workspace.path, flush=True)
+        input()
+    """
+    with running(script) as kernel:
+        path = Path(kernel.stdout.readline().strip())
+        assert len(processes_of(path)) > 1
+        kernel.kill()
+        kernel.wait()
+        wait_for(lambda: processes_of(path) == [], timeout_s=60)
+
+
 # --- The folder ----------------------------------------------------------------------------------
 
 
-def test_a_terminal_is_a_new_one_in_the_workspace(other, monkeypatch):
+def test_a_terminal_starts_clean_in_the_workspace(other, monkeypatch):
     monkeypatch.setenv('GIT_DIR', '/proc')
     monkeypatch.setenv('PYTHONPATH', '/proc')
     said = other.terminal('cd src; git init --quiet .; git status --short; pwd; echo "$PYTHONPATH"')
@@ -520,11 +581,11 @@ def test_a_terminal_is_a_new_one_in_the_workspace(other, monkeypatch):
     assert other.terminal('pwd; false; echo two >&2') == '.\ntwo'
 
 
-def test_git_in_a_workspace_never_finds_the_repository_of_the_checkout(other):
+def test_git_does_not_see_the_checkout(other):
     assert 'not a git repository' in other.terminal('cd src; git status')
 
 
-def test_a_new_workspace_is_empty_and_git_does_not_see_it(other):
+def test_a_new_workspace_is_empty_and_ignored(other):
     other.write('src/a/b.txt', 'text')
     again = Workspace(other.path.name)
     assert again.path == other.path
@@ -533,7 +594,7 @@ def test_a_new_workspace_is_empty_and_git_does_not_see_it(other):
         subprocess.run(['git', 'check-ignore', '-q', again.path], cwd=ROOT, check=True)
 
 
-def test_an_interrupt_while_a_file_is_written_loses_nothing(other, monkeypatch):
+def test_an_interrupted_write_loses_nothing(other, monkeypatch):
     write_text = Path.write_text
 
     def interrupted(path, text, **options):
@@ -547,7 +608,7 @@ def test_an_interrupt_while_a_file_is_written_loses_nothing(other, monkeypatch):
     assert other.file('src/a.txt').read_text() == 'text'
 
 
-def test_an_interrupt_while_a_folder_is_emptied_is_an_interrupt(other, monkeypatch):
+def test_an_interrupt_while_emptying_is_raised(other, monkeypatch):
     for number in range(3):
         other.write(f'src/{number}.txt', 'text')
     unlink = os.unlink
@@ -563,7 +624,7 @@ def test_an_interrupt_while_a_folder_is_emptied_is_an_interrupt(other, monkeypat
 
 
 def test_two_kernels_do_not_share_a_folder():
-    """Not even where the other kernel has been killed, and its build goes on."""
+    """Not even if the other kernel has been killed, and its build goes on."""
     script = """
         from helpers.workspace import Workspace
         from support.packages import write_talker
@@ -616,7 +677,7 @@ def test_a_file_stays_in_its_workspace(other, path):
 # --- In a notebook -------------------------------------------------------------------------------
 
 
-def test_two_cells_write_a_file_in_any_order_and_again(shell, capsys):
+def test_several_cells_write_one_file(shell, capsys):
     file = Workspace('test_workspace_other').file('src/a b.py')
     shell.run_cell('%%write src/a b.py part 2\nlast = 1\n')
     assert 'Write part 1 of src/a b.py first.' in capsys.readouterr().err
@@ -630,6 +691,16 @@ def test_two_cells_write_a_file_in_any_order_and_again(shell, capsys):
     assert file.read_text() == 'whole = 1\n'
     shell.run_cell('%%write ../up\ntext\n')
     assert 'Give a path inside the workspace' in capsys.readouterr().err
+
+
+def test_cells_are_terminals(shell, capsys):
+    workspace = Workspace('test_workspace_other')
+    shell.run_cell('%%terminal\necho one; ls')
+    assert capsys.readouterr().out == 'one\nsrc\n'
+    shell.run_cell('%%terminal a_name\nsleep 60')
+    assert workspace.terminals['a_name'].running
+    workspace.close()
+    assert workspace.terminals == {}
 
 
 def test_an_interrupted_cell_ends_the_processes(shell, built):

@@ -8,7 +8,7 @@ own names, because they need ROS.
 """
 
 from helpers.fusion.drives import simulate
-from helpers.fusion.evaluation import chi_square_bounds, covariances, errors, nees, rmse
+from helpers.fusion.evaluation import covariances, errors, rmse
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter
 from helpers.fusion.tables import (
     SENSORS,
@@ -23,13 +23,11 @@ __all__ = [
     'STATE',
     'VARIANCES',
     'ExtendedKalmanFilter',
-    'chi_square_bounds',
     'covariances',
     'errors',
     'fuse',
     'fuse_with_innovations',
     'innovations',
-    'nees',
     'rmse',
     'simulate',
 ]

@@ -21,6 +21,7 @@ WHEEL_SCALE = 1.04
 TURN_SCALE = 1.05
 TURN_BIAS = 0.012  # rad/s
 GYRO_BIAS = 0.002  # rad/s
+SLIP_SPEED = 0.5  # m/s, what the wheels say too much while they slip
 GPS_JUMP_M = 20.0
 
 
@@ -36,7 +37,7 @@ def simulate(
     seconds: float = 120.0,
     *,
     slip: tuple[float, float] | None = None,
-    slip_speed: float = 0.5,
+    slip_speed: float = SLIP_SPEED,
     gps_outliers: int = 0,
     gps_gap: tuple[float, float] | None = None,
     imu_mounting: float = 0.0,
@@ -70,7 +71,7 @@ def simulate(
     later = np.flatnonzero(fix)[1:]
     truth = _path(t)
     rng = np.random.default_rng(seed)
-    measurements = _said(truth, slip_speed * _during(slip, t), imu_mounting)
+    measurements = pd.DataFrame(said(truth, slip_speed * _during(slip, t), imu_mounting))
     sigma = np.sqrt([variances['ax' if name == 'ay' else name] for name in measurements])
     measurements += rng.normal(0, sigma, measurements.shape)
     measurements['imu_yaw'] = _angle(measurements['imu_yaw'])
@@ -83,21 +84,22 @@ def simulate(
     return Drive(measurements, truth)
 
 
-def _said(truth: pd.DataFrame, slipping: np.ndarray, imu_mounting: float) -> pd.DataFrame:
-    """Return what the sensors would say without noise."""
+def said(truth: Mapping, slipping=0.0, imu_mounting: float = 0.0) -> dict:
+    """Return what the sensors would say without noise, of a moment (numbers) or of many (columns).
+
+    `truth` has x, y, yaw, vx, vyaw, ax and ay; `slipping` is what the wheels say too much (m/s).
+    """
     cos, sin = math.cos(imu_mounting), math.sin(imu_mounting)
-    return pd.DataFrame(
-        {
-            'vx': WHEEL_SCALE * truth['vx'] + slipping,
-            'vyaw': TURN_SCALE * truth['vyaw'] + TURN_BIAS,
-            'imu_yaw': truth['yaw'] + imu_mounting,
-            'imu_vyaw': truth['vyaw'] + GYRO_BIAS,
-            'ax': cos * truth['ax'] + sin * truth['ay'],
-            'ay': cos * truth['ay'] - sin * truth['ax'],
-            'gps_x': truth['x'],
-            'gps_y': truth['y'],
-        }
-    )
+    return {
+        'vx': WHEEL_SCALE * truth['vx'] + slipping,
+        'vyaw': TURN_SCALE * truth['vyaw'] + TURN_BIAS,
+        'imu_yaw': truth['yaw'] + imu_mounting,
+        'imu_vyaw': truth['vyaw'] + GYRO_BIAS,
+        'ax': cos * truth['ax'] + sin * truth['ay'],
+        'ay': cos * truth['ay'] - sin * truth['ax'],
+        'gps_x': truth['x'],
+        'gps_y': truth['y'],
+    }
 
 
 def _during(interval: tuple[float, float] | None, t: np.ndarray) -> np.ndarray:

@@ -44,38 +44,3 @@ def rmse(estimate: pd.DataFrame, truth: pd.DataFrame) -> float:
     Rows of the estimate that are NaN do not count.
     """
     return float(np.sqrt((errors(estimate, truth)['distance'] ** 2).mean()))
-
-
-def nees(estimate: pd.DataFrame, truth: pd.DataFrame) -> np.ndarray:
-    """Return the normalised estimation error squared of each row: error' covariance^-1 error.
-
-    The error is that of the position: in a consistent filter it is chi-square with 2 degrees of
-    freedom.
-    """
-    off = errors(estimate, truth)[['x', 'y']].to_numpy()
-    weighted = np.linalg.solve(covariances(estimate), off[..., None])[..., 0]
-    return np.sum(off * weighted, axis=1)
-
-
-def chi_square_bounds(dof: int, runs: int = 1) -> tuple[float, float]:
-    """Return the two values between which the mean of `runs` NIS or NEES lies in 95 % of cases.
-
-    `dof` is how many numbers each has: 1 for a yaw, 2 for a position. The runs are independent,
-    and the same probability is left on both sides.
-    """
-    return tuple(_chi_square(dof * runs, p) / runs for p in (0.025, 0.975))
-
-
-def _chi_square(dof: int, probability: float) -> float:
-    """Return the value that a chi-square number stays below with this probability."""
-    # P(more than x) = [erfc(sqrt(x / 2)) if dof is odd] + sum of exp(-x / 2) (x / 2)^j / j!
-    j = np.arange(dof % 2 / 2, dof / 2)
-    factorials = np.array([math.lgamma(i + 1) for i in j])
-    low, high = 0.0, dof + 40 * math.sqrt(dof) + 100
-    for _ in range(60):
-        x = (low + high) / 2
-        more = np.exp(j * math.log(x / 2) - x / 2 - factorials).sum()
-        if dof % 2:
-            more += math.erfc(math.sqrt(x / 2))
-        low, high = (x, high) if 1 - more < probability else (low, x)
-    return x

@@ -9,7 +9,7 @@ robot_localization's `ekf_node` in its two-dimensional mode (T. Moore and D. Sto
 Extended Kalman Filter Implementation for the Robot Operating System", 2014; src/ekf.cpp and
 src/filter_base.cpp of that package). On the drives in tests/data both give the same path, to a
 hundredth of a millimetre. Two things differ. A variance of zero is refused here; that package takes
-1e-9 instead. And a message without a value is for the caller to leave out.
+1e-9 instead. And the caller leaves out a message without a value.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from helpers._plumbing.values import shown
 from helpers.fusion import settings
-from helpers.values import shown
 
 STATE = ('x', 'y', 'yaw', 'vx', 'vy', 'vyaw', 'ax', 'ay')
 
@@ -49,7 +49,7 @@ class Innovation(NamedTuple):
     `value` (k) is measured minus expected, the yaw between -pi and pi; `covariance` (k, k) is what
     the filter expected of `value`; `nis` is value' covariance^-1 value, the squared Mahalanobis
     distance (chi-square with k degrees of freedom in a consistent filter); `accepted` is False
-    where the gate kept the message out.
+    if the gate kept the message out.
     """
 
     value: np.ndarray
@@ -66,7 +66,7 @@ class Part(NamedTuple):
 
 
 def part_of_state(names: Sequence[str]) -> Part:
-    """Return where these names are in the state: as a slice, which is fast, where it can be one."""
+    """Return where these names are in the state: as a slice, which is fast, if possible."""
     places = [STATE.index(name) for name in names]
     neighbours = places == list(range(places[0], places[-1] + 1))
     return Part(
@@ -97,17 +97,24 @@ class ExtendedKalmanFilter:
     """The filter.
 
     `process_noise` replaces some of PROCESS_NOISE: {'x': 0.002, 'y': 0.002}. The first message sets
-    the part of the state that it measures; the rest is zero, with a variance of 1e-9.
+    the part of the state that it measures; the rest is zero, with a variance of 1e-9, or with those
+    of `initial_covariance`: {'x': 1.0, 'y': 1.0}.
 
     `state` (8) in the order of STATE and `covariance` (8, 8) are the estimate at the time `t` in
     seconds (None before the first message).
     """
 
-    def __init__(self, process_noise: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self,
+        process_noise: Mapping[str, float] | None = None,
+        initial_covariance: Mapping[str, float] | None = None,
+    ) -> None:
         noise = settings.variances('process_noise', process_noise, PROCESS_NOISE, or_zero=True)
+        sure = dict.fromkeys(STATE, INITIAL_VARIANCE)
+        initial = settings.variances('initial_covariance', initial_covariance, sure)
         self.process_noise = np.diag([noise[name] for name in STATE])
         self.state = np.zeros(len(STATE))
-        self.covariance = INITIAL_VARIANCE * _IDENTITY
+        self.covariance = np.diag([initial[name] for name in STATE])
         self.t: float | None = None
 
     def process(
@@ -142,7 +149,7 @@ class ExtendedKalmanFilter:
     def process_unchecked(
         self, t: float, part: Part, values: np.ndarray, covariance: np.ndarray, gate: float | None
     ) -> Innovation | None:
-        """Do what `process` does, without its checks: for who has made them once for many."""
+        """Do what `process` does, without its checks: a caller can make them once for many."""
         if self.t is None:
             self.t = t
             self.state[part.places] = values

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 
-from helpers.values import shown
+from helpers._plumbing.values import shown
 
 
 def positive(name: str, value, or_zero: bool = False) -> float:

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from helpers._plumbing.values import check_columns, column_of_numbers
 from helpers.fusion import settings
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter, Innovation, part_of_state
-from helpers.values import check_columns, column_of_numbers
 
 # The variance of the noise of each column, per axis. `vy` is no column: wheels that cannot move
 # sideways say 0.
@@ -38,13 +38,13 @@ MESSAGES = {
 }
 SENSORS = tuple(MESSAGES)
 POSE = STATE[:3]
-COLUMNS = ('t', 'sensor', 'variable', 'innovation', 'sigma', 'nis', 'dof', 'accepted')
+INNOVATION_COLUMNS = ('t', 'sensor', 'variable', 'innovation', 'sigma', 'nis', 'dof', 'accepted')
 
 
 def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options) -> pd.DataFrame:
     """Estimate the path from a table of what the sensors said.
 
-    `measurements` has the column `t` (s, increasing) and those of the chosen sensors, NaN where a
+    `measurements` has the column `t` (s, increasing) and those of the chosen sensors, NaN while a
     sensor is silent: `vx` (m/s) and `vyaw` (rad/s) for 'odom'; `imu_yaw` (rad), `imu_vyaw` (rad/s)
     and `ax` (m/s^2) for 'imu'; `gps_x` and `gps_y` (m) for 'gps'. In a row, odom is applied first
     (with vy = 0, because its wheels cannot move sideways), then yaw, vyaw and ax of the imu one
@@ -53,7 +53,7 @@ def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
     The options, each a dict:
     - `process_noise`: replaces some of PROCESS_NOISE, {'x': 0.002, 'y': 0.002};
     - `variances`: replaces some of VARIANCES, {'vx': 0.25};
-    - `config`: the parts of the state that a sensor measures, where not all that it can,
+    - `config`: the parts of the state that a sensor measures, if not all that it can,
       {'odom': ('vx', 'vy')};
     - `gate`: the Mahalanobis distance at which a message of a sensor is kept out, {'gps': 3.0}. The
       other sensors have none.
@@ -126,7 +126,7 @@ def _innovations(steps: list[_Step]) -> pd.DataFrame:
         for sensor, names, message in step.heard
         for number in zip(names, message.value, np.sqrt(message.covariance.diagonal()), strict=True)
     ]
-    return pd.DataFrame(rows, columns=COLUMNS)
+    return pd.DataFrame(rows, columns=INNOVATION_COLUMNS)
 
 
 def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -> list[_Step]:

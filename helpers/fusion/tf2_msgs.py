@@ -34,9 +34,9 @@ PACKAGE_XML = """\
 
 
 def provide_tf2_msgs(workspace: Workspace) -> None:
-    """Make `from tf2_msgs.msg import TFMessage` possible. Where ROS has it, nothing is built.
+    """Make `from tf2_msgs.msg import TFMessage` possible. If ROS has it, nothing is built.
 
-    Raises RuntimeError with what colcon says where the build fails.
+    Raises RuntimeError, with what colcon says, if the build fails.
     """
     if share_folder('tf2_msgs'):
         return

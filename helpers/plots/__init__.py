@@ -1,14 +1,13 @@
 """Pictures of recorded and of predicted runs, of graphs and of drives, all in one style.
 
 Every function takes tables and draws them; it knows no node and no filter. The axes have units, the
-legend counts, and no meaning hangs on a colour alone. Each picture is described in words, too: see
-`helpers.alt_text`. A run that cannot be drawn raises TypeError or ValueError, with one sentence.
+legend counts, and no meaning depends on a colour alone. Each picture has an alternative text. A run
+that cannot be drawn raises TypeError or ValueError, with one sentence.
 """
 
-from helpers.alt_text import describe
+from helpers._plumbing.alt_text import describe
 from helpers.plots.comparisons import bars, sweep
-from helpers.plots.drives import error, frame_tree, innovation, path, paths
-from helpers.plots.graphs import interface_tree, topic_graph
+from helpers.plots.drives import error, frame_tree, gate, innovation, path, paths, scans
 from helpers.plots.runs import before_and_after, latency, queue_length, sequence_gaps, timeline
 
 __all__ = [
@@ -17,14 +16,14 @@ __all__ = [
     'describe',
     'error',
     'frame_tree',
+    'gate',
     'innovation',
-    'interface_tree',
     'latency',
     'path',
     'paths',
     'queue_length',
+    'scans',
     'sequence_gaps',
     'sweep',
     'timeline',
-    'topic_graph',
 ]

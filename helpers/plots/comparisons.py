@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from helpers.alt_text import describe
+from helpers._plumbing.alt_text import describe
 from helpers.plots.style import (
     DPI,
     HEARD,
@@ -51,7 +51,7 @@ def sweep(results: pd.DataFrame, limit: float, limit_label: str, title: str) -> 
 def bars(values: pd.Series, xlabel: str, title: str = '', exact: bool = False) -> Axes:
     """Draw one horizontal bar a row of `values`, from the top, each with its value.
 
-    `exact` values do not move from run to run: the description in words tells them, too.
+    `exact` values do not move from run to run: the description in words has them, too.
     """
     ax = new_axes(height=1.3 + 0.6 * len(values))
     names = values.index.astype(str)

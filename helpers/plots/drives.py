@@ -1,9 +1,9 @@
-"""Pictures of a drive: where the robot was, how far off an estimate is, which frame is whose."""
+"""Pictures of a drive: the path, the error of an estimate, the tree of frames."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 
-from helpers.alt_text import describe
+from helpers._plumbing.alt_text import describe
 from helpers.plots.style import (
     DPI,
     GREY,
@@ -23,7 +23,7 @@ from helpers.plots.style import (
     NORMAL,
     SMALL,
     WIDTH,
-    check_count,
+    check_looks,
     crosses,
     in_words,
     label_axes,
@@ -35,7 +35,7 @@ NO_TREE = 'These transforms make no tree: it has one root, and each frame one pa
 
 
 def path(
-    truth: pd.DataFrame,
+    truth: pd.DataFrame | None,
     estimates: Mapping[str, pd.DataFrame],
     fixes: pd.DataFrame | None = None,
     ellipses_s: float | None = None,
@@ -43,16 +43,19 @@ def path(
 ) -> Axes:
     """Draw where the robot was, and where each of up to four estimates says that it was.
 
-    `truth` and each estimate have the columns `x` and `y` in metres. `fixes` adds what GPS said
-    (columns `gps_x`, `gps_y`). With `ellipses_s` each estimate needs `t` (s), `var_x`, `cov_x_y`
-    and `var_y` (m^2), too: every so many seconds an ellipse shows 3 sigma, where the robot should
-    be 99 times of 100.
+    `truth` (None: not known) and each estimate have the columns `x` and `y` in metres. `fixes`
+    adds what GPS said (columns `gps_x`, `gps_y`). With `ellipses_s` each estimate needs `t` (s),
+    `var_x`, `cov_x_y` and `var_y` (m^2), too: every so many seconds an ellipse shows 3 sigma: the
+    robot should be inside 99 times of 100.
 
     Raises ValueError for no or too many estimates.
     """
-    check_count('estimates', estimates, len(LINE_LOOKS))
+    check_looks('estimates', estimates, len(LINE_LOOKS))
     ax = new_axes(height=5.6)
-    handles = ax.plot(truth.x, truth.y, color=TRUTH, lw=6, label='truth', solid_capstyle='round')
+    handles, known = [], truth is not None
+    if known:
+        look = {'color': TRUTH, 'lw': 6, 'label': 'truth', 'solid_capstyle': 'round'}
+        handles += ax.plot(truth.x, truth.y, **look)
     if fixes is not None:
         look = {'marker': '+', 'color': GREY, 'ls': 'none', 'ms': 6}
         handles += ax.plot(fixes.gps_x, fixes.gps_y, label='GPS', **look)
@@ -61,14 +64,14 @@ def path(
         if ellipses_s:
             for row in table[(table.t // ellipses_s).diff() > 0].dropna().itertuples():
                 ax.add_patch(_ellipse(row, look))
-    start = truth.iloc[0]
+    start = (truth if known else next(iter(estimates.values()))).iloc[0]
     handles.append(ax.scatter(start.x, start.y, s=70, color=INK, zorder=5, label='start'))
     ax.set_aspect('equal', 'datalim')
     label_axes(ax, title, 'x (m)', 'y (m)', handles)
     describe(
         ax,
-        'Seen from above: a wide line for the truth, and a line for each of: '
-        + f'{in_words(estimates)}.'
+        f'Seen from above: {"a wide line for the truth, and " if known else ""}'
+        f'a line for each of: {in_words(estimates)}.'
         + (' Plus signs are the positions that GPS gave.' if fixes is not None else '')
         + (f' Ellipses show 3 sigma every {ellipses_s:g} seconds.' if ellipses_s else ''),
     )
@@ -86,7 +89,7 @@ def paths(
 
     Raises ValueError for no or too many estimates.
     """
-    check_count('estimates', estimates, 6)
+    check_looks('estimates', estimates, 6)
     columns = min(3, len(estimates))
     rows = math.ceil(len(estimates) / columns)
     figure = plt.figure(figsize=(3.6 * columns, 3.1 * rows + 0.7), dpi=DPI, layout='constrained')
@@ -111,11 +114,11 @@ def paths(
     return grid[: len(estimates)]
 
 
-def _ellipse(row, look: dict) -> Ellipse:
-    """Return the 3-sigma ellipse of a position, from the eigenvalues of its covariance."""
+def _ellipse(row, look: dict, sigmas: float = 3.0) -> Ellipse:
+    """Return the ellipse of so many sigmas, from the eigenvalues of the covariance."""
     covariance = np.array([[row.var_x, row.cov_x_y], [row.cov_x_y, row.var_y]])
     variances, axes = np.linalg.eigh(covariance)
-    width, height = 2 * 3 * np.sqrt(variances.clip(min=0))
+    width, height = 2 * sigmas * np.sqrt(variances.clip(min=0))
     angle = math.degrees(math.atan2(axes[1, 0], axes[0, 0]))
     return Ellipse((row.x, row.y), width, height, angle=angle, fill=False, lw=1.2, **look)
 
@@ -134,7 +137,7 @@ def error(
 
     Raises ValueError for no or too many tables.
     """
-    check_count('errors', errors, len(LINE_LOOKS))
+    check_looks('errors', errors, len(LINE_LOOKS))
     spans = spans_s or {}
     ax = new_axes()
     handles = []
@@ -182,17 +185,77 @@ def innovation(innovations: pd.DataFrame, title: str = 'Measured minus expected'
     return ax
 
 
+def gate(
+    innovations: Mapping[str, tuple[float, float]],
+    covariance: np.ndarray,
+    sigmas: float,
+    taken: Sequence[str],
+    title: str = 'What the gate takes',
+) -> Axes:
+    """Draw innovations of fixes by name (x, y in m), and the ellipse of a gate of so many sigmas.
+
+    `covariance` (2, 2) is that of the innovations. Those in `taken` are dots, the others crosses.
+    """
+    ax = new_axes()
+    row = pd.Series({'x': 0.0, 'y': 0.0, 'var_x': covariance[0, 0], 'cov_x_y': covariance[0, 1]})
+    row['var_y'] = covariance[1, 1]
+    ax.add_patch(_ellipse(row, {'color': HEARD}, sigmas))
+    for name, (x, y) in innovations.items():
+        if name in taken:
+            ax.plot(x, y, 'o', color=INK, ms=8)
+        else:
+            crosses(ax, [x], [y], '')
+        ax.annotate(name, (x, y), (8, 6), textcoords='offset points', fontsize=LARGE)
+    ax.set_aspect('equal', 'datalim')
+    label_axes(ax, title, 'innovation in x (m)', 'innovation in y (m)', [])
+    left = [name for name in innovations if name not in taken]
+    describe(
+        ax,
+        f'An ellipse of {sigmas:g} sigma around zero. Taken: {in_words(taken)}. '
+        f'Kept out, as crosses: {in_words(left)}.',
+    )
+    return ax
+
+
+def scans(
+    walls: Sequence[Sequence[float]],
+    pose: tuple[float, float, float],
+    points: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    title: str = 'What the lidar sees, on the map',
+) -> Axes:
+    """Draw walls (x0, y0, x1, y1 and more, in m), and what a robot sees from a pose among them.
+
+    `points` are up to four sets of points (x, y in m), seen from the pose (x, y in m, yaw in rad).
+    """
+    check_looks('points', points, len(LINE_LOOKS))
+    ax = new_axes(height=5.0)
+    for x0, y0, x1, y1, *_ in walls:
+        ax.add_patch(plt.Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor=TRUTH, lw=0))
+    x, y, yaw = pose
+    handles = [ax.scatter(x, y, s=70, color=INK, zorder=5, label='robot')]
+    for line, marker, (name, ends) in zip(LINE_LOOKS, 'o+xs', points.items(), strict=False):
+        ahead, left = np.array(ends)[:, np.isfinite(ends[0])]
+        look = {'color': line['color'], 'marker': marker, 'ls': 'none', 'ms': 5, 'label': name}
+        seen_x = x + ahead * math.cos(yaw) - left * math.sin(yaw)
+        seen_y = y + ahead * math.sin(yaw) + left * math.cos(yaw)
+        handles += ax.plot(seen_x, seen_y, **look)
+    ax.set_aspect('equal', 'datalim')
+    label_axes(ax, title, 'x (m)', 'y (m)', handles)
+    describe(ax, f'Walls from above, and points for each of: {in_words(points)}.')
+    return ax
+
+
 def frame_tree(transforms: pd.DataFrame, title: str = 'The tree of frames') -> Axes:
-    """Draw a tree of frames, from the left: one arrow a transform, its line tells who publishes it.
+    """Draw a tree of frames, from the left: one arrow a transform, one look a publisher.
 
     `transforms` has one row a transform, with the columns `parent`, `child` and `publisher` (all
     text).
 
-    Raises ValueError for more than four publishers, and where the transforms make no tree.
+    Raises ValueError for more than four publishers, and if the transforms make no tree.
     """
     depths, rows = _tree_layout(transforms)
     publishers = transforms.publisher.unique()
-    check_count('publishers', publishers, len(LINE_LOOKS))
+    check_looks('publishers', publishers, len(LINE_LOOKS))
     looks = dict(zip(publishers, LINE_LOOKS, strict=False))
     widths = pd.Series({frame: 0.13 * len(frame) + 0.25 for frame in depths})  # inches
     widest = widths.groupby(pd.Series(depths)).max()

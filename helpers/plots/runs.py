@@ -1,4 +1,4 @@
-"""Pictures of a run: what was heard and what was lost, which thread worked, who waited how long.
+"""Pictures of a run: what was heard and lost, which thread worked, how long messages waited.
 
 The tables are those of `recording` and `queue_model`: one row a message, columns `seq`,
 `published_s`, `started_s`, `finished_s`, `thread`. A table describes a finished run: a message that
@@ -20,7 +20,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
-from helpers.alt_text import describe
+from helpers._plumbing.alt_text import describe
+from helpers._plumbing.values import check_table, natural
 from helpers.plots.style import (
     DPI,
     GREY,
@@ -35,14 +36,13 @@ from helpers.plots.style import (
     PUBLISHED,
     SMALL,
     WIDE,
-    check_count,
+    check_looks,
     crosses,
     in_words,
     label_axes,
     new_axes,
     say,
 )
-from helpers.values import check_table, natural
 
 MAX_SEQ_LABELS, MAX_GAP_LABELS = 25, 15
 TIME_LABEL = 'time since the first publish (s)'
@@ -62,8 +62,8 @@ def sequence_gaps(
     The line from the small dot to the large one is the time that the message waited.
 
     A cross is a message that was lost. With `depth`, that of the subscription's KEEP_LAST queue, it
-    stands where the message was pushed out, and a dotted line joins it with the message that did
-    it, the `depth`-th newer one. Without, it stands where the message was published.
+    is at the time when the message was pushed out, and a dotted line joins it with the message that
+    did it, the `depth`-th newer one. Without, it is at the time of publishing.
 
     Draws into `ax`, or into a new figure. Raises TypeError or ValueError for a bad table.
     """
@@ -123,7 +123,7 @@ def _draw_gaps(
 def _pushed_out(table: pd.DataFrame, depth: int) -> pd.Series:
     """Return for each message when the `depth`-th newer one came, which would push it out.
 
-    NaN where there is none: such a message still waits at the end.
+    NaN if there is none: such a message still waits at the end.
     """
     return table.published_s.shift(-depth)
 
@@ -179,7 +179,7 @@ def timeline(
     time_label: str = TIME_LABEL,
     depth: int | None = None,
 ) -> Axes:
-    """Draw one lane a thread and one bar a callback, with its sequence number where it fits.
+    """Draw one lane a thread and one bar a callback, with its sequence number if it fits.
 
     `table` is one table, or one for each callback group: `{'group name': table, ...}`. Then each
     group has a colour and a hatch of its own. `span_s` shows only the time from `span_s[0]` to
@@ -190,7 +190,7 @@ def timeline(
     Raises TypeError or ValueError for a bad table, and for no or too many groups.
     """
     groups = table if isinstance(table, Mapping) else {'callbacks': table}
-    check_count('callback groups', groups, len(GROUP_COLOURS))
+    check_looks('callback groups', groups, len(GROUP_COLOURS))
     groups = {str(name): check_table(one) for name, one in groups.items()}
     bars = pd.concat([t[t.started_s.notna()].assign(group=name) for name, t in groups.items()])
     # A callback that had not finished when the recording ended runs to the end of the picture.
@@ -232,7 +232,7 @@ def timeline(
 def _draw_waiting(ax: Axes, table: pd.DataFrame, depth: int, top: float) -> tuple[float, str]:
     """Draw the messages while they wait, below `top`: one thin lane a place in the queue.
 
-    Returns where the lanes end, and what they show in words.
+    Returns the lower end of the lanes, and a description of them.
     """
     lost = table.started_s.isna()
     left_s = table.started_s.where(~lost, _pushed_out(table, depth)).fillna(table.published_s)
@@ -380,7 +380,7 @@ def _loss_in_words(table: pd.DataFrame, marks: str) -> str:
 
 
 def _unheard(table: pd.DataFrame) -> str:
-    """Name the messages without a callback. Where none was heard, they may wait, or never come."""
+    """Name the messages without a callback. If none was heard, they may wait, or never come."""
     return 'lost' if table.started_s.notna().any() else 'not heard'
 
 

@@ -19,7 +19,7 @@ INK, GREY, PALE = '#222222', '#555555', '#cfd6db'
 # One colour and one hatch a callback group. Light enough for black numbers on top.
 GROUP_COLOURS = ('#56B4E9', '#E69F00', '#009E73', '#CC79A7', '#F0E442')
 GROUP_HATCHES = ('', '//', '..', '\\\\', 'xx')
-# One look a line, where several are compared: all differ in colour, and in how they are dashed.
+# One look for each of several lines: all differ in colour, and in how they are dashed.
 LINE_LOOKS = (
     {'color': HEARD, 'ls': '-'},
     {'color': LOST, 'ls': (0, (5, 2))},
@@ -41,7 +41,7 @@ def new_axes(height: float = HEIGHT, width: float = WIDTH) -> Axes:
 def label_axes(
     ax: Axes, title: str, xlabel: str, ylabel: str, handles: list | None = None, grid: str = 'both'
 ) -> None:
-    """Give the axes their texts, a grid, and above them a legend, where it cannot hide data."""
+    """Give the axes their texts, a grid, and a legend above them, which hides no data."""
     ax.set_title(title, fontsize=LARGE, loc='left', pad=34 if handles else 10)
     ax.set_xlabel(xlabel, fontsize=NORMAL)
     ax.set_ylabel(ylabel, fontsize=NORMAL)
@@ -72,7 +72,7 @@ def crosses(ax: Axes, x, y, label: str, scale: float = 1.0) -> PathCollection:
 
 
 def say(ax: Axes, text: str) -> None:
-    """Write a text into the middle of the axes, where there is nothing to draw."""
+    """Write a text into the middle of empty axes."""
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha='center', va='center', fontsize=LARGE)
 
 
@@ -81,7 +81,7 @@ def in_words(names: Iterable) -> str:
     return '; '.join(map(str, names))
 
 
-def check_count(what: str, items, most: int) -> None:
+def check_looks(what: str, items, most: int) -> None:
     """Raise ValueError unless there are 1 to `most` items: each needs a look of its own."""
     if not 1 <= len(items) <= most:
         raise ValueError(f'One picture can show 1 to {most} {what}, not {len(items)}.')

@@ -1,8 +1,8 @@
 """Step through a run, recorded or predicted: what waits, what runs, what is lost, and why.
 
 A replay is an output of a cell: a sentence and a picture, and a script that makes them something to
-step through. The script asks for nothing, neither a kernel nor the network. Where a page does not
-run it, as in a notebook that JupyterLab does not trust yet, the picture stays.
+step through. The script needs neither a kernel nor the network. If a page does not run it, as in
+a notebook that JupyterLab does not trust yet, the picture stays.
 
 model.js decides what may happen, view.js shows it.
 """
@@ -17,7 +17,7 @@ from itertools import chain
 
 import pandas as pd
 
-from helpers.queue_model import check_count
+from helpers._plumbing.values import check_count, check_table, natural, shown
 from helpers.replay.events import ARRIVE, END, TAKE, events
 from helpers.replay.model import stories
 from helpers.replay.picture import (
@@ -30,10 +30,10 @@ from helpers.replay.picture import (
     picture,
 )
 from helpers.replay.script import attribute, script, source
-from helpers.values import check_table, natural, shown
 
 SCRIPT = 'model.js', 'walk.js', 'element.js', 'view.js'
 SCRIPT_OF_CALLS = 'circle.js', *SCRIPT
+SCRIPT_OF_DRIVES = 'element.js', 'view.js'
 KINDS = ARRIVE, TAKE, END, 'go', 'resume'  # as walk.js numbers them
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
 MAX_MESSAGES = 10_000
@@ -70,12 +70,12 @@ class Run:
 
     @cached_property
     def messages(self) -> list[dict]:
-        """What became of the first messages, as stories.js tells it."""
+        """What became of the first messages, as stories.js returns it."""
         return stories(self.record(), MAX_ROWS)['messages']
 
     @property
     def names(self) -> list[str]:
-        """What stands in front of each row of the picture."""
+        """The name of each row of the picture."""
         callbacks = self.setup['callbacks']
         if len(callbacks) == 1:
             return [f'{one["seq"]}' for one in self.messages]
@@ -127,11 +127,16 @@ class Replay:
             'plots': [plot for _, plot in pictures],
             'runs': [run.record() for run in self.runs],
         }
-        calls = any(has_calls(run.setup) for run in self.runs)
+        setups = [run.setup for run in self.runs]
+        names = SCRIPT_OF_CALLS if any(map(has_calls, filter(None, setups))) else SCRIPT
+        style = source('style.css')
+        if None in setups:  # the drive of a robot: see helpers.robot.view
+            names = ('drive.js', *(names if any(setups) else SCRIPT_OF_DRIVES))
+            style += source('drive.css')
         html = (
             f'<div class="replay" data-record={attribute(record)}>'
-            f'<style>{source("style.css")}</style><p>{escape(str(self))}</p>{figures}'
-            f'<script>{script(*(SCRIPT_OF_CALLS if calls else SCRIPT))}</script></div>'
+            f'<style>{style}</style><p>{escape(str(self))}</p>{figures}'
+            f'<script>{script(*names)}</script></div>'
         )
         return {'text/plain': str(self), 'text/html': html}
 
@@ -145,8 +150,8 @@ def replay(
     """Return a run to step through. `table` is one of `Recording.table` or of `predict`.
 
     `depth` is that of the subscription's KEEP_LAST queue, `threads` how many the executor has, and
-    `group` is 'mutually exclusive' or 'reentrant'. Where no callback ran at all, it is shown that
-    no executor took a message.
+    `group` is 'mutually exclusive' or 'reentrant'. If no callback ran at all, the replay shows
+    that no executor took a message.
 
     Raises TypeError or ValueError, with one sentence: for a table that is none, or that no such
     queue can have made, and for more than 10,000 messages.
@@ -192,7 +197,7 @@ def side_by_side(runs: Mapping[str, Replay]) -> Replay:
 def fill_up(found: set[str], threads: int) -> list[str]:
     """Return the names of threads in their order, with more names until there are `threads`.
 
-    Raises ValueError where there are more.
+    Raises ValueError if there are more.
     """
     if len(found) > threads:
         raise ValueError(f'Callbacks ran in {len(found)} threads, more than threads={threads}.')

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
+import pandas as pd
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 
-from helpers.queue_model import check_count
+from helpers._plumbing.values import check_count
 from helpers.recording import CallbackRecording
-from helpers.replay import KINDS, Replay, Run, fill_up
-from helpers.replay.calls import DEPTH, SAME_TIME
+from helpers.replay import Replay, fill_up
 from helpers.replay.events import ARRIVE, END, TAKE
+from helpers.replay.recorded import GO, Callback, Move, count_of, run_of
 
 REQUESTS = {'goal': 'send_goal', 'cancel': 'cancel_goal'}  # in `Waitable.execute`, and the service
 SAYS = 'publish_feedback', 'succeed', 'canceled', 'abort'  # methods of a goal handle
@@ -71,64 +73,44 @@ def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) 
     tables, runs = recording.tables(), recording.runs
     if any(len(runs[one]) != 1 for one in ('execute_callback', 'cancel_goal')):
         raise ValueError('A replay shows one job and its cancel: record the run of one goal.')
-    names = list(recording.group_of)
-    groups: dict = {}
-    for one, group in recording.group_of.items():
-        groups.setdefault(group, []).append(one)
-    thread_names = fill_up({one for table in tables.values() for one in table['thread']}, threads)
-    ended_s = runs['execute_callback'][0][1]
-    late = runs['cancel_goal'][0][0] > ended_s
+    names = fill_up({one for table in tables.values() for one in table['thread']}, threads)
+    late = runs['cancel_goal'][0].started_s > runs['execute_callback'][0].finished_s
     taken = 'is taken when the job has ended' if late else 'is taken while the job runs'
     does = {
         'execute_callback': [{'says': f'calls {said}'} for _, said in recording.said],
         'cancel_goal': [{'says': taken}],
     }
-    setup = {
-        'threads': thread_names,
-        'groups': [
-            {
-                'name': 'no group' if group is None else f'the group of {" and ".join(members)}',
-                'exclusive': isinstance(group, MutuallyExclusiveCallbackGroup),
-            }
-            for group, members in groups.items()
-        ],
-        'callbacks': [
-            {
-                'name': one,
-                'word': 'job' if one == 'execute_callback' else 'request',
-                'group': list(groups).index(group),
-                'depth': DEPTH,
-                'does': does.get(one, []),
-            }
-            for one, group in recording.group_of.items()
-        ],
-    }
-    moves = _moves(recording, names, thread_names, cancelled_s)
-    summary = f'{"One thread" if threads == 1 else f"{threads} threads"}. The cancel {taken}.'
-    return Replay((Run('', summary, False, setup, moves, TIME_LABEL),))
+    callbacks = [
+        Callback(
+            name,
+            'job' if name == 'execute_callback' else 'request',
+            group,
+            isinstance(group, MutuallyExclusiveCallbackGroup),
+            does.get(name, []),
+        )
+        for name, group in recording.group_of.items()
+    ]
+    run = run_of(names, callbacks, _moves(recording, names, cancelled_s), TIME_LABEL)
+    return Replay((replace(run, summary=f'{count_of(threads)} The cancel {taken}.'),))
 
 
-def _moves(
-    recording: ActionRecording, names: list[str], threads: list[str], cancelled_s: float
-) -> list:
-    """Return the moves of model.js that make the recorded run, in their order."""
-    tables, runs = recording.tables(), recording.runs
-    zero = runs['send_goal'][0][0]
-    moves = []
-    for one, table in tables.items():
-        callback = names.index(one)
+def _moves(recording: ActionRecording, threads: list[str], cancelled_s: float) -> Iterator[Move]:
+    """Yield the moves of model.js that make the recorded run."""
+    names, goal = list(recording.group_of), recording.runs['send_goal'][0]
+    zero = goal.started_s
+    for name, table in recording.tables().items():
+        callback = names.index(name)
         for run in table.itertuples():
             thread = threads.index(run.thread)
             arrived_s = run.started_s
-            if one == 'execute_callback':  # the request for the goal has made it
-                arrived_s = min(arrived_s, runs['send_goal'][0][1] - zero)
-                moves += [(at_s - zero, 'go', 0, thread) for at_s, _ in recording.said]
-            if one == 'cancel_goal':
+            if name == 'execute_callback':  # the request for the goal has made it
+                arrived_s = min(arrived_s, goal.finished_s - zero)
+                for at_s, _ in recording.said:
+                    yield Move(at_s - zero, GO, callback, thread)
+            if name == 'cancel_goal':
                 arrived_s = cancelled_s - zero
-                moves.append((run.started_s, 'go', 0, thread))
-            moves.append((arrived_s, ARRIVE, callback, run.seq))
-            moves.append((run.started_s, TAKE, callback, thread))
-            if run.finished_s == run.finished_s:
-                moves.append((run.finished_s, END, callback, thread))
-    moves.sort(key=lambda move: (move[0], SAME_TIME.index(move[1])))
-    return [[round(1e6 * at_s), KINDS.index(do), one, other] for at_s, do, one, other in moves]
+                yield Move(run.started_s, GO, callback, thread)
+            yield Move(arrived_s, ARRIVE, callback, run.seq)
+            yield Move(run.started_s, TAKE, callback, thread)
+            if pd.notna(run.finished_s):
+                yield Move(run.finished_s, END, callback, thread)

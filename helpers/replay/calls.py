@@ -1,21 +1,23 @@
-"""Step through calls of services: who waits for whom, from what was recorded."""
+"""Step through calls of services: which recorded callbacks wait for which."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import replace
+
 import pandas as pd
 
-from helpers.queue_model import check_count
+from helpers._plumbing.values import check_count
 from helpers.recording import CallbackRecording
-from helpers.replay import KINDS, Replay, Run, fill_up
+from helpers.replay import Replay, fill_up
 from helpers.replay.events import ARRIVE, END, TAKE
 from helpers.replay.model import stories
 from helpers.replay.picture import MAX_ROWS
+from helpers.replay.recorded import GO, RESUME, Callback, Move, count_of, run_of
 
-DEPTH = 10  # of services and clients, by default; a tick that is seen is taken
 WORDS = {'Timer': 'tick', 'Service': 'request', 'Client': 'answer'}
 TIME_LABEL = 'time since the first callback (s)'
 HANGS_S = 0.1  # so much is shown of a wait that never ends
-SAME_TIME = [ARRIVE, TAKE, 'go', 'resume', END]
 
 
 def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
@@ -25,46 +27,31 @@ def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
     services, clients: each with its own callback group. Call it while a callback hangs, or when
     all have ended.
 
-    Raises ValueError, with one sentence, where nothing ran, where a call gave up without an answer,
-    and where the runs of one callback called differently.
+    Raises ValueError, with one sentence, if nothing ran, if a call gave up without an answer, or if
+    the runs of one callback called differently.
     """
     check_count('threads', threads)
     tables, calls, groups = recording.tables(), recording.calls(), recording.groups()
-    names = list(groups.index)
     found = {thread for table in tables.values() for thread in table['thread']}
     found |= set(calls['resumed_by'].dropna())
     if not found:
         raise ValueError('No callback has run yet: there is nothing to step through.')
     thread_names = fill_up(found, threads)
-    group_names = list(dict.fromkeys(groups['group']))
-    setup = {
-        'threads': thread_names,
-        'groups': [
-            {
-                'name': f'the group of {" and ".join(groups.index[groups["group"] == one])}',
-                'exclusive': bool(groups.loc[one, 'exclusive']),
-            }
-            for one in group_names
-        ],
-        'callbacks': [
-            {
-                'name': one,
-                'word': WORDS.get(groups.loc[one, 'kind'], 'message'),
-                'group': group_names.index(groups.loc[one, 'group']),
-                'depth': DEPTH,
-                'does': _steps(one, calls, tables, groups),
-            }
-            for one in names
-        ],
-    }
-    moves = _moves(tables, calls, names, thread_names)
-    stuck = stories({'setup': setup, 'moves': moves}, MAX_ROWS)['stuck']
-    summary = ' '.join(
-        ['One thread.' if threads == 1 else f'{threads} threads.']
-        + (stuck or ['Nobody waits for ever.'])
-    )
-    after_s = HANGS_S if stuck else 0.0
-    return Replay((Run('', summary, False, setup, moves, TIME_LABEL, after_s),))
+    callbacks = [
+        Callback(
+            name,
+            WORDS.get(row.kind, 'message'),
+            row.group,
+            row.exclusive,
+            _steps(name, calls, tables, groups),
+        )
+        for name, row in groups.iterrows()
+    ]
+    moves = _moves(tables, calls, list(groups.index), thread_names)
+    run = run_of(thread_names, callbacks, moves, TIME_LABEL)
+    stuck = stories(run.record(), MAX_ROWS)['stuck']
+    summary = ' '.join([count_of(threads), *(stuck or ['Nobody waits for ever.'])])
+    return Replay((replace(run, summary=summary, after_s=HANGS_S if stuck else 0.0),))
 
 
 def _steps(name: str, calls: pd.DataFrame, tables: dict, groups: pd.DataFrame) -> list[dict] | None:
@@ -92,10 +79,12 @@ def _steps(name: str, calls: pd.DataFrame, tables: dict, groups: pd.DataFrame) -
     return seen[0] if seen else []
 
 
-def _moves(tables: dict, calls: pd.DataFrame, names: list[str], threads: list[str]) -> list:
-    """Return the moves of model.js that make the recorded run, in their order."""
+def _moves(
+    tables: dict, calls: pd.DataFrame, names: list[str], threads: list[str]
+) -> Iterator[Move]:
+    """Yield the moves of model.js that make the recorded run."""
     known = calls[calls['caller'].notna()]
-    # Requests and answers of which it is known who asked: they come by themselves, in the model.
+    # In the model, requests and answers of known callers come by themselves.
     asked = {(call.client, call.answer) for call in known.itertuples()}
     for call in known.itertuples():
         runs = enumerate(tables[call.service]['started_s'])
@@ -106,26 +95,19 @@ def _moves(tables: dict, calls: pd.DataFrame, names: list[str], threads: list[st
         for call in known[known['style'] == 'await'].itertuples()
     }
 
-    found = []
     for name, table in tables.items():
         callback = names.index(name)
         for run in table.itertuples():
             thread = threads.index(run.thread)
             key = name, run.seq
             if key not in asked:
-                found.append((run.started_s, ARRIVE, callback, run.seq, key))
-            found.append((run.started_s, TAKE, callback, thread, key))
-            if run.finished_s == run.finished_s:
+                yield Move(run.started_s, ARRIVE, callback, run.seq)
+            yield Move(run.started_s, TAKE, callback, thread, key)
+            if pd.notna(run.finished_s):
                 if key in awaits:
                     thread = threads.index(awaits[key])
-                    found.append((run.finished_s, 'resume', key, thread, key))
-                found.append((run.finished_s, END, callback, thread, key))
+                    yield Move(run.finished_s, RESUME, callback, thread, key)
+                yield Move(run.finished_s, END, callback, thread)
     for call in known.itertuples():
         thread = threads.index(tables[call.caller]['thread'][call.run])
-        found.append((call.sent_s, 'go', 0, thread, (call.caller, call.run)))
-    found.sort(key=lambda move: (move[0], SAME_TIME.index(move[1])))
-    order = [key for _, do, *_, key in found if do == TAKE]
-    return [
-        [round(1e6 * at_s), KINDS.index(do), order.index(key) if do == 'resume' else one, other]
-        for at_s, do, one, other, key in found
-    ]
+        yield Move(call.sent_s, GO, names.index(call.caller), thread)

@@ -1,6 +1,6 @@
 """The steps of a run, in an order in which a queue can have made them.
 
-A recording does not say when a thread took a message, and when the message arrived: both lie
+A recording does not say when a thread took a message, and when the message arrived: both are
 between known times (see `queue_model.take_bounds`). Here each gets one: a take as near to the start
 of its callback as the queue allows, an arrival as near to its publish call as the takes allow.
 """
@@ -42,7 +42,7 @@ def events(table: pd.DataFrame, depth: int, workers: int) -> list[Event]:
     arrivals = _arrivals(table, takes, depth)
     seqs = table['seq'].tolist()
     made: list[Event] = []
-    running: list[tuple[float, int, str]] = []  # a heap: who ends first
+    running: list[tuple[float, int, str]] = []  # a heap: the first to end
     arrived = 0
 
     def go_on(until_s: float, arrivals_wanted: int, at_most: int) -> None:
@@ -105,9 +105,9 @@ def _check(table: pd.DataFrame, heard: pd.DataFrame) -> None:
     earlier = table.loc[table['published_s'].diff() < 0, 'seq']
     if len(earlier):
         raise ValueError(f'Message {earlier.iloc[0]} was published before the one in front of it.')
-    nobody = heard.loc[heard['thread'].isna(), 'seq']
-    if len(nobody):
-        raise ValueError(f'It is not known which thread ran message {nobody.iloc[0]}.')
+    unknown = heard.loc[heard['thread'].isna(), 'seq']
+    if len(unknown):
+        raise ValueError(f'It is not known which thread ran message {unknown.iloc[0]}.')
     backwards = heard.loc[heard['finished_s'] < heard['started_s'], 'seq']
     if len(backwards):
         raise ValueError(f'The callback of message {backwards.iloc[0]} ended before it started.')

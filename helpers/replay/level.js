@@ -1,5 +1,5 @@
 // A level as a page shows it: lists that can be read, buttons, keys. What may be tried is decided in
-// game.js. Nothing is global: many levels stand on a page.
+// game.js. Nothing is global: a page may have many levels.
 
 // A level is {goal, options: [{name, values}], variants: [{setup, begun, code, lesson, rclpy}]}: one
 // variant for each combination of the options, the last option changing first.

@@ -1,7 +1,7 @@
 """Levels: the learner is the executor, and chooses what runs next.
 
 A level is an output of a cell, as a replay is: a script that needs neither a kernel nor the
-network. Where a page does not run it, the task stays as a text. What may happen is decided in
+network. If a page does not run it, the task stays as a text. What may happen is decided in
 model.js, what may be tried and how well it went in game.js; level.js shows it.
 
 What rclpy did is a fact of a real run: `rclpy` of a variant is how many messages were lost, how
@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from html import escape
 from itertools import product
 
+from helpers._plumbing.values import shown
 from helpers.replay.script import attribute, script, source
-from helpers.values import shown
 
 SCRIPT = 'model.js', 'game.js', 'circle.js', 'element.js', 'level.js'
 ONE = 'SingleThreadedExecutor()'
@@ -83,7 +83,7 @@ class Level:
 
 
 def level(name: str) -> Level:
-    """Return a level by its name. Raises ValueError, with the names, where there is none."""
+    """Return a level by its name. Raises ValueError, with the names, if there is none."""
     if name not in LEVELS:
         raise ValueError(f'There is no level {shown(name)}. There are: {", ".join(LEVELS)}.')
     return LEVELS[name]
@@ -200,7 +200,7 @@ def _counter(lock: str) -> Variant:
             'callbacks': [{'name': 'topic', 'group': 0, 'depth': 2, 'does': steps}],
             'arrivals': _arrivals(0, [0, 0]),
         },
-        'No order loses one: who has the lock reads and writes before anybody else reads.'
+        'No order loses one: whoever has the lock reads and writes before anybody else reads.'
         if lock == 'with'
         else 'Two callbacks ran, and the count is 1: both read 0, and both wrote 1. One update is '
         'lost. Try it with a lock.',

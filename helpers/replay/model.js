@@ -3,7 +3,7 @@
 // waits for its answer. No page and no clock: what a page shows, and when, is not decided here.
 //
 // A setup is what the learner writes:
-//   threads    names of the executor's threads; none where nobody spins
+//   threads    names of the executor's threads; none if no executor spins
 //   groups     [{name, exclusive}]
 //   callbacks  [{name, group, depth, does, word}]: `group` is an index, `depth` that of the queue,
 //              `word` what waits in it ('message', 'tick', 'request', 'answer'), `does` its steps:
@@ -17,7 +17,7 @@
 //                {await: callback, client: callback}    waits, gives the thread back, not the group
 //                {send: callback, client: callback}     goes on; the client takes the answer
 //              Without `does` it is one work without a number.
-//   arrivals   [{at, callback, seq}] in their order, where a schedule says what arrives and when
+//   arrivals   [{at, callback, seq}] in their order, if a schedule says what arrives and when
 // Callbacks, threads and groups are named by their index. Times are seconds.
 //
 // A move is {do, at, ...}; `at` is left out for "now":
@@ -25,7 +25,7 @@
 //   {do: 'take', callback, thread}  a thread takes the oldest message and starts the callback; `seq`
 //                                   may say which one is meant
 //   {do: 'go', thread}              the callback on the thread does its next step
-//   {do: 'end', thread}             the callback ends, and an answer goes where it was asked for
+//   {do: 'end', thread}             the callback ends, and an answer goes to the client
 //   {do: 'resume', run, thread}     a thread goes on with a callback whose awaited answer has come
 
 function queueModel() {
@@ -83,7 +83,7 @@ function queueModel() {
   const holder = (setup, state, callback) =>
     holderOf(setup, state, setup.callbacks[callback].group);
 
-  // What the clock brings next, where a schedule or a work with a number says so.
+  // What the clock brings next, if a schedule or a work with a number says so.
   function due(setup, state) {
     const next = setup.arrivals?.[state.arrived];
     const found = next ? [{ do: 'arrive', ...next }] : [];
@@ -96,7 +96,7 @@ function queueModel() {
     return found.sort((one, other) => one.at - other.at);
   }
 
-  // The rules: '' where a move is allowed, else the sentence that forbids it.
+  // The rules: '' if a move is allowed, else the sentence that forbids it.
   function refusal(setup, state, move) {
     const at = move.at ?? state.now;
     if (at < state.now) return `Time does not run backwards: it is ${state.now} s.`;
@@ -158,7 +158,7 @@ function queueModel() {
     return found.filter(move => !refusal(setup, state, move));
   }
 
-  // Why does nobody take the oldest of a queue? '' where a thread may take it at once.
+  // Return why no thread takes the oldest of a queue: '' if a thread may take it at once.
   function cause(setup, state, callback) {
     if (!setup.threads.length) return 'no executor';
     if (!state.runs.includes(null)) {
@@ -245,7 +245,7 @@ function queueModel() {
     return exclusive && setup.threads.length > 1 ? `${says} Nobody else may run in ${name} now.` : says;
   }
 
-  // Return what is to be said of it: '' where it is the step that comes next.
+  // Return a sentence about it: '' if it is simply the next step.
   function nextStep(setup, state, run) {
     run.step += 1;
     const { work, unless } = step(setup, run) ?? {};
@@ -286,7 +286,7 @@ function queueModel() {
       says = `${who} gives ${now.unlock} back.`;
     } else if (now.set !== undefined) {
       state.values[now.set] = 1;
-      says = `${who} is heard: who looks, sees ${now.set} now.`;
+      says = `${who} is heard: whoever looks sees ${now.set} now.`;
     } else if (now.says !== undefined) {
       says = `${who} ${now.says}.`;
     } else if (now.client !== undefined) {

@@ -1,6 +1,6 @@
 """A run as one picture: a row for each message, and why it waited.
 
-It is SVG, a tenth of the size of a PNG, and stands in a notebook as an image does.
+It is SVG, a tenth of the size of a PNG, and shown as an image.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 
 from helpers.plots.style import GREY, GROUP_COLOURS, HEARD, INK, LOST, PALE, PUBLISHED
 
-WIDTH, NARROW = 760, 440  # pixels; the narrow ones stand side by side
+WIDTH, NARROW = 760, 440  # pixels; the narrow ones are side by side
 LEFT, RIGHT, TOP, BOTTOM = 46, 14, 14, 40
 LINE, MARK = 16, 28  # of the legend: a line's height, and how far its words are from its mark
 LETTER = 6.6  # about as wide as one of a name
@@ -45,10 +45,10 @@ def picture(
     left: int,
     time_label: str,
 ) -> tuple[str, list[float]]:
-    """Return an SVG of messages, as stories.js tells of them, in a span of seconds; and its plot.
+    """Return an SVG of messages, as stories.js returns them, in a span of seconds; and its plot.
 
     It is `width` pixels wide; `left` of them are for the names, one for each message. The plot is
-    where time is shown: its left, right, top and bottom, as parts of the width and of the height.
+    the area of the time axis: left, right, top and bottom, as parts of the width and the height.
     """
     frame = _Frame(*span_s, width, left, len(messages))
     drawn, entries = _runs(frame, messages)
@@ -65,7 +65,7 @@ def picture(
 
 
 class _Frame(NamedTuple):
-    """Where a time and a row stand, in pixels."""
+    """The places of times and rows, in pixels."""
 
     from_s: float
     until_s: float

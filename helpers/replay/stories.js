@@ -2,7 +2,7 @@
 
 // Return of the first `most` messages, in the order of their arrival: {callback, seq, arrived, waits,
 // left, by, runs, ended}. `waits` and `runs` are pairs of a time and the cause that holds from then
-// on; `by` is who pushed it out. And `stuck`, the sentences of those that can never go on.
+// on; `by` is the message that pushed it out. And `stuck`, the sentences of those that can never go on.
 function stories(record, most) {
   const { setup, moves } = record;
   const { seek } = walk(record);

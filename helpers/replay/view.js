@@ -1,11 +1,11 @@
 // A replay as a page shows it: lists that can be read, buttons, keys. What may happen is decided in
-// model.js; here each state is drawn. Nothing is global: many replays stand on a page.
+// model.js; here each state is drawn. Nothing is global: a page may have many replays.
 
 const MOST_ITEMS = 100; // of a list; what is more is counted
 const DELAYS = [800, 400, 200, 100, 50]; // ms a step, while it plays
 
 // Of many callbacks nothing is lost; where one asks a service, they may wait in a circle.
-const many = ({ setup }) => setup.callbacks.length > 1;
+const many = ({ setup }) => setup?.callbacks.length > 1;
 const asks = ({ setup }) => setup.callbacks.some(({ does = [] }) => does.some(step => 'client' in step));
 
 // The lists of one run.
@@ -81,31 +81,25 @@ function panel(run, record, picture, [from, until], [left, right, top, bottom], 
 }
 
 function show(root, record) {
-  const runs = record.runs.map(walk);
-  // Which run each step belongs to: the one whose next event comes first.
-  const order = [];
+  // One that has no setup is the drive of a robot: see drive.js.
+  const drives = record.runs.some(({ setup }) => !setup);
+  const runs = record.runs.map(one => (one.setup ? walk(one) : drive(one)));
+  // All steps in the order of time: when, of which run, and whether it says something.
+  const steps = runs.flatMap((run, who) => run.times.map(
+    (us, own) => ({ us, who, told: run.told?.[own] ?? true }))).sort((one, other) => one.us - other.us);
+  const last = steps.length;
+  // How many steps of each run are done after so many of all.
   const counts = runs.map(() => [0]);
-  const next = runs.map(() => 0);
-  for (;;) {
-    let who = -1;
-    for (let i = 0; i < runs.length; i += 1)
-      if (next[i] < runs[i].times.length
-        && (who < 0 || runs[i].times[next[i]] < runs[who].times[next[who]])) who = i;
-    if (who < 0) break;
-    order.push(who);
-    next[who] += 1;
-    for (let i = 0; i < runs.length; i += 1) counts[i].push(next[i]);
-  }
-  const last = order.length;
+  for (const { who } of steps) counts.forEach((count, i) => count.push(count.at(-1) + (i === who)));
   let position = 0;
   let playing = null;
   let delay = 0;
 
   const pictures = [...root.querySelectorAll('figure > img')];
   // One thread that runs one callback needs no group to be understood.
-  const grouped = record.runs.some(one => many(one) || one.setup.threads.length > 1);
+  const grouped = record.runs.some(one => many(one) || one.setup?.threads.length > 1);
   const panels = record.runs.map(
-    (one, i) => panel(runs[i], one, pictures[i], record.span, record.plots[i], grouped));
+    (one, i) => (one.setup ? panel : floor)(runs[i], one, pictures[i], record.span, record.plots[i], grouped));
   const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
   const slider = element('input', {
     type: 'range', min: 0, max: last, step: 1, 'aria-label': 'step', oninput: () => go(+slider.value),
@@ -114,9 +108,10 @@ function show(root, record) {
   const button = (name, onclick, label) =>
     element('button', { type: 'button', onclick, 'aria-label': label }, name);
   const play = button('Play', toggle);
+  const rate = () => DELAYS[0] / DELAYS[delay];
   const faster = button('Speed 1×', () => {
     delay = (delay + 1) % DELAYS.length;
-    faster.textContent = `Speed ${DELAYS[0] / DELAYS[delay]}×`;
+    faster.textContent = `Speed ${rate()}×`;
     if (playing) begin();
   });
   const loss = button('Next loss', () => {
@@ -124,15 +119,20 @@ function show(root, record) {
     if (step === undefined) says.textContent = 'No message is lost after this.';
     else go(step);
   });
-  const back = button('◀', () => go(position - 1), 'back');
-  const forth = button('▶', () => go(position + 1), 'forward');
+  const forward = () => step(1);
+  const backward = () => step(-1);
+  const back = button('◀', backward, 'back');
+  const forth = button('▶', forward, 'forward');
 
-  function go(to) {
+  // `us` is the time of a drive that plays, between two steps.
+  function go(to, us) {
     position = Math.min(Math.max(to, 0), last);
-    const texts = panels.map(({ draw }, i) => draw(counts[i][position]));
-    const who = order[position - 1];
-    const name = record.runs.length > 1 && position ? `${record.runs[who].name}: ` : '';
-    says.textContent = position ? name + texts[who] : 'Nothing has happened yet. Step forward: ▶ or →.';
+    const texts = panels.map(({ draw }, i) => draw(counts[i][position], us ?? steps[position - 1]?.us ?? 0));
+    const { who } = steps.slice(0, position).findLast(({ told }) => told) ?? {};
+    const name = record.runs[who]?.name;
+    const text = texts[who] ? (name && `${name}: `) + texts[who] : 'Nothing has happened yet. Step forward: ▶ or →.';
+    // A text that is set again is read out again.
+    if (says.textContent !== text) says.textContent = text;
     slider.value = position;
     slider.setAttribute('aria-valuetext', `step ${position} of ${last}`);
     back.disabled = position === 0;
@@ -140,21 +140,17 @@ function show(root, record) {
     if (position === last) stop();
   }
 
-  // After how many steps of all is the run's own step done?
-  function place(i, own) {
-    let low = 0;
-    for (let high = last; low < high; ) {
-      const middle = (low + high) >> 1;
-      if (counts[i][middle] < own) low = middle + 1;
-      else high = middle;
-    }
-    return low;
+  // To the next step that says something, one way or the other.
+  function step(way) {
+    let to = position + way;
+    while (to < last && steps[to - 1]?.told === false) to += way;
+    go(to);
   }
 
   function nextLoss() {
     const found = runs.flatMap((run, i) => {
       const own = run.scan().losses.find(step => step > counts[i][position]);
-      return own === undefined ? [] : [place(i, own)];
+      return own === undefined ? [] : [counts[i].indexOf(own)];
     });
     return found.length ? Math.min(...found) : undefined;
   }
@@ -162,16 +158,19 @@ function show(root, record) {
   // The next step, from here on and then from the start, that is about this message.
   function find() {
     const seq = +number.value;
-    const found = order.map((who, index) => [who, index + 1]).filter(
-      ([who, step]) => runs[who].scan().about[counts[who][step] - 1].includes(seq));
-    const [, step] = found.find(([, one]) => one > position) ?? found[0] ?? [];
-    if (step === undefined) says.textContent = `There is no message ${number.value}.`;
-    else go(step);
+    const found = steps.map((_, index) => index + 1).filter(to => {
+      const { who } = steps[to - 1];
+      return runs[who].scan().about[counts[who][to] - 1].includes(seq);
+    });
+    const to = found.find(one => one > position) ?? found[0];
+    if (to === undefined) says.textContent = `There is no message ${number.value}.`;
+    else go(to);
   }
 
   function begin() {
     clearInterval(playing);
-    playing = setInterval(() => (root.isConnected ? go(position + 1) : stop()), DELAYS[delay]);
+    const next = drives ? inTime(steps, position, rate(), go) : () => go(position + 1);
+    playing = setInterval(() => (root.isConnected ? next() : stop()), drives ? FRAME : DELAYS[delay]);
     play.textContent = 'Pause';
   }
 
@@ -190,13 +189,13 @@ function show(root, record) {
   // On a slide a clicker's keys step, too, and at the last step they walk on.
   const onSlide = () => Boolean(document.body.dataset.jpDeckMode || root.closest('.reveal'));
   const KEYS = {
-    ArrowRight: () => go(position + 1),
-    ArrowLeft: () => go(position - 1),
+    ArrowRight: forward,
+    ArrowLeft: backward,
     ' ': toggle,
     Home: () => go(0),
     End: () => go(last),
-    PageDown: () => go(position + 1),
-    PageUp: () => go(position - 1),
+    PageDown: forward,
+    PageUp: backward,
   };
 
   function leaves(key) {
@@ -226,7 +225,8 @@ function show(root, record) {
   root.querySelector('.replay-on > p').after(
     says,
     element('div', { class: 'replay-controls' }, back, forth, play, faster, slider,
-      ...(record.runs.some(many) ? [] : [loss, element('label', {}, 'Message ', number)])),
+      ...(record.runs.some(({ setup }) => setup?.callbacks.length === 1)
+        ? [loss, element('label', {}, 'Message ', number)] : [])),
     element('div', { class: 'replay-runs' }, ...panels.map(({ node }) => node)),
   );
   go(0);

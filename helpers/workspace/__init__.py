@@ -5,13 +5,14 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
 `source install/setup.bash`, and an end for every process.
 
     workspace     what lessons import: `Workspace`, and `%%write`
-    folders       where a workspace lies, and that no two kernels share one
+    folders       the folder of a workspace, which no two kernels share
     wheels        CMake files of the ROS 2 wheels, made to fit this machine
     processes     a process that prints lines, and ends
     build_output  what a build says, and which of its lines matter
+    small_rclcpp  a package in C++: the part of rclcpp that lesson 13 needs, over rcl
     sourcing      what `source install/setup.bash` gives, for a kernel that already runs
 """
 
-from helpers.workspace.workspace import Workspace
+from helpers.workspace.workspace import SMALL_RCLCPP, Workspace
 
-__all__ = ['Workspace']
+__all__ = ['SMALL_RCLCPP', 'Workspace']

@@ -1,4 +1,4 @@
-"""What a build says: its result, and of its many lines those that say what is wrong."""
+"""The result of a build, and those of its many lines that say what is wrong."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from helpers.text import wrap
+from helpers._plumbing.text import wrap
 
 STANDARD_LIBRARY = '.../lib/python3/'
 
@@ -123,14 +123,14 @@ def without_folders(text: str, workspace: Path) -> str:
     folders = {
         f'{workspace}/': '',
         str(workspace): '.',
-        f'{workspace.parent}/': '../',  # an overlay lies in its underlay
+        f'{workspace.parent}/': '../',  # an overlay is in its underlay
         sysconfig.get_path('purelib') + '/': '',
         sysconfig.get_path('stdlib') + '/': STANDARD_LIBRARY,
         sys.prefix: '...',
         sys.base_prefix: '...',
     }
     for folder, name in folders.items():
-        # CMake may break a line in the middle of a folder's name where that has a space.
+        # CMake may break a line at a space in a folder's name.
         pattern = r'\s+'.join(re.escape(part) for part in folder.split(' '))
         text = re.sub(pattern, lambda _, name=name: name, text)
     return text
@@ -151,8 +151,8 @@ def _cmake_error(block: list[str]) -> list[str]:
     """Shorten one error of CMake: its text, and the line of the CMakeLists.txt that led to it."""
     stack = next((i for i, x in enumerate(block) if x.startswith('Call Stack')), len(block))
     body = textwrap.dedent('\n'.join(block[1:stack])).strip('\n')
-    # CMake breaks lines where the name of a folder happens to end: join, and break again. What was
-    # indented, such as the frames of a traceback, it left as it was.
+    # The length of folders' names decides where CMake breaks lines: join, and break again. CMake
+    # leaves indented lines as they are, such as the frames of a traceback.
     said: list[str] = []
     for paragraph in re.split(r'\n\s*\n', body):
         if paragraph.startswith(' '):
@@ -193,9 +193,9 @@ def _without_notes(block: list[str]) -> list[str]:
 
 
 MESSAGES = (
-    # "Call Stack" stands at the margin, and has its own indented lines.
+    # "Call Stack" is at the margin, and has its own indented lines.
     _Message(r'CMake Error', r' |\s*$|Call Stack', _cmake_error),
-    # An exception's text may have more lines. It ends where a message of another program begins.
+    # An exception's text may have more lines. It ends at the next message of another program.
     _Message(
         r'Traceback \(most recent call last\)',
         r'(?!CMake |Traceback |g?make(\[\d+\])?: |error: )\s*\S',
@@ -219,8 +219,8 @@ def lines_that_matter(text: str) -> list[str]:
 
     Kept are: CMake's errors with the line of your CMakeLists.txt; of a Python traceback the last
     frame and the exception; the compiler's and linker's errors; what setup.py says at its end.
-    Not kept is what only reports that something before it has failed. Where none of these is found,
-    the last eight lines are kept.
+    Lines that only report an earlier failure are not kept. If none of these is found, the last
+    eight lines are kept.
     """
     lines = text.splitlines()
     kept: list[str] = []

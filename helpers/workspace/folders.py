@@ -1,4 +1,4 @@
-"""Where workspaces lie. While a kernel uses one, it is locked, and no other kernel takes it."""
+"""The folders of workspaces. While a kernel uses one, it is locked: no other kernel takes it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def locks() -> tuple[int, ...]:
 
 
 def _scratch() -> Path:
-    """Return the folder of all workspaces: in the checkout where that can be written."""
+    """Return the folder of all workspaces: in the checkout, if that can be written."""
     elsewhere = f'ros2_notebooks_{os.getuid()}'
     for folder in (
         ROOT / 'scratch',

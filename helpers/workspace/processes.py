@@ -6,38 +6,45 @@ import atexit
 import contextlib
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
-from helpers.interrupts import uninterrupted
+from helpers._plumbing.connections import NOT_OF_A_LESSON, nearly
+from helpers._plumbing.interrupts import uninterrupted
 from helpers.workspace.folders import locks
 
 STOP_TIMEOUT_S = 5.0
 POLL_S = 0.02
 # The process ends with the kernel, also when the kernel is killed: 1 is Linux's PR_SET_PDEATHSIG.
+# In a terminal, so do all that it has started: its window closes, which is a SIGHUP.
 WITH_KERNEL = """
 import ctypes, os, signal, sys
-parent = int(sys.argv[1])
+parent, window = int(sys.argv[1]), sys.argv[2]
 try:
     ctypes.CDLL(None).prctl(1, signal.SIGTERM)
 except (OSError, AttributeError):
     pass
+if window:
+    os.open(window, os.O_RDWR)
 if os.getppid() == parent:
-    os.execv(sys.argv[2], sys.argv[2:])
+    os.execv(sys.argv[3], sys.argv[3:])
 """
 
 _started: set[Process] = set()  # and not stopped
 
 
 class Process:
-    """A running process and what it has printed. See `Workspace.run`.
+    """A running process and what it has printed. See `Workspace.start`.
 
     It ends with its `with` block, with `stop()`, when a cell is interrupted, and with the kernel.
-    With `ends_with_kernel=False` it goes on when the kernel is killed.
+    With `ends_with_kernel=False` it goes on when the kernel is killed. With `terminal=True` it has
+    a terminal of its own, which closes with the kernel, and takes all programs in it along.
     """
 
     def __init__(
@@ -47,10 +54,14 @@ class Process:
         environment: dict[str, str],
         folder: Path,
         ends_with_kernel: bool = True,
+        terminal: bool = False,
     ) -> None:
+        self._window = os.openpty() if terminal else None
         if ends_with_kernel:
-            command = [sys.executable, '-I', '-S', '-c', WITH_KERNEL, str(os.getpid()), *command]
-        self.name = name
+            window = os.ttyname(self._window[1]) if self._window else ''
+            starter = [sys.executable, '-I', '-S', '-c', WITH_KERNEL, str(os.getpid()), window]
+            command = [*starter, *command]
+        self.name, self._environment = name, environment
         # Not a pipe, which would need a thread that reads it.
         self._output = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
         if 'IPython' in sys.modules and (shell := sys.modules['IPython'].get_ipython()):
@@ -63,8 +74,8 @@ class Process:
                 stdin=subprocess.DEVNULL,
                 stdout=self._output,
                 stderr=subprocess.STDOUT,
-                # What goes on when the kernel is killed, such as a build, keeps its workspace
-                # claimed.
+                # A process that outlives the kernel, such as a build, keeps its workspace
+                # locked.
                 pass_fds=locks(),
                 # Interrupting the kernel must not reach it: its owner ends it in order.
                 start_new_session=True,
@@ -75,7 +86,7 @@ class Process:
     def lines(self) -> list[str]:
         """What it has printed so far, stdout and stderr together, one string a line."""
         running, file = self.running, self._output.fileno()
-        # At a place of its own: a read() would move the place where the process writes.
+        # pread, because read() would move the position at which the process writes.
         text = os.pread(file, os.fstat(file).st_size, 0).decode(errors='replace')
         lines = text.split('\n')
         # The last line may not be complete yet.
@@ -94,7 +105,7 @@ class Process:
     def wait_for(self, text: str, timeout_s: float = 20.0) -> str:
         """Wait until a line contains `text`, and return this line.
 
-        Raises TimeoutError where that takes longer, and RuntimeError where the process has ended.
+        Raises TimeoutError if that takes longer, and RuntimeError if the process has ended.
         """
         deadline = time.monotonic() + timeout_s
         while True:
@@ -110,14 +121,14 @@ class Process:
             if time.monotonic() > deadline:
                 raise TimeoutError(
                     f'Waited {timeout_s:g} s in vain for a line with {text!r} of {self.name}. '
-                    f'{self._last()}'
+                    f'{". ".join([self._last(), *_lonely_topics(self._environment)])}'
                 )
             time.sleep(POLL_S)
 
     def wait(self, timeout_s: float = 20.0) -> int:
-        """Wait until it ends by itself, and return its exit code, -N where signal N ended it.
+        """Wait until it ends by itself, and return its exit code, -N if signal N ended it.
 
-        Raises TimeoutError where that takes longer.
+        Raises TimeoutError if that takes longer.
         """
         try:
             return self._process.wait(timeout_s)
@@ -138,13 +149,16 @@ class Process:
         with uninterrupted():
             if self.running:
                 self._stop()
+            for end in self._window or ():
+                os.close(end)
+            self._window = None
             _started.discard(self)
 
     def _stop(self) -> None:
         for sent, timeout_s in (
             (signal.SIGINT, STOP_TIMEOUT_S),
             (signal.SIGTERM, STOP_TIMEOUT_S / 5),
-            # The last time also for what it has started, such as a compiler, and has left.
+            # SIGKILL also ends what it has started and left, such as a compiler.
             (signal.SIGKILL, STOP_TIMEOUT_S),
         ):
             if self.running or sent == signal.SIGKILL:
@@ -160,6 +174,22 @@ class Process:
         self.stop()
 
 
+def _lonely_topics(environment: dict[str, str]) -> Iterator[str]:
+    """Yield a sentence for each topic in the graph of a process to which one side is missing."""
+    ros2 = shutil.which('ros2', path=environment.get('PATH'))
+    if ros2 is None or 'ROS_DOMAIN_ID' not in environment:
+        return
+    command = [ros2, 'topic', 'list', '--verbose']
+    said = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=20)
+    published, _, subscribed = said.stdout.partition('Subscribed topics:')
+    sides = [set(re.findall(r'^ \* (/\S+)', part, re.M)) for part in (published, subscribed)]
+    for own, others, there in ((*sides, 'publisher'), (*sides[::-1], 'subscription')):
+        missing = {'publisher': 'subscription', 'subscription': 'publisher'}[there]
+        for name in sorted(own.difference(others, NOT_OF_A_LESSON)):
+            near = nearly(name, sorted(others - own))
+            yield f'The topic {name} has a {there} and no {missing}.{near}'.rstrip('.')
+
+
 @atexit.register
 def _stop_all() -> None:
     with uninterrupted():
@@ -170,7 +200,7 @@ def _stop_all() -> None:
 def _after_cell(result) -> None:
     """End the processes when a cell was interrupted, in its code or in IPython's (no result).
 
-    The Interrupt may have come before who started one could keep it.
+    The Interrupt may have come before a variable held the process.
     """
     if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
         _stop_all()

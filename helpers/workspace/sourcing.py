@@ -10,8 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from helpers.build_tools import build_environment
-from helpers.interrupts import uninterrupted
+from helpers._plumbing.build_tools import build_environment
+from helpers._plumbing.interrupts import uninterrupted
 
 SOURCE_TIMEOUT_S = 20.0
 
@@ -21,7 +21,7 @@ _loaded: dict[str, dict[str, str]] = {}  # package -> library -> hash, as this p
 def source(workspace: Path) -> dict[str, str]:
     """Return the environment of a terminal that has sourced `install/setup.bash`.
 
-    Raises RuntimeError where nothing has been built.
+    Raises RuntimeError if nothing has been built.
     """
     setup = workspace / 'install' / 'setup.bash'
     if not setup.is_file():

@@ -17,10 +17,10 @@ def fix_wheels(prefix: str | Path = sys.prefix) -> None:
     The wheels were built in a container, and 21 of their CMake files name its folders, such as
     /opt/python/cp311-cp311/include/python3.11. CMake stops at a folder that does not exist. Here
     these are replaced by the folders of this Python and this NumPy. Fast DDS also asks for the
-    development files of two libraries which it brings along: nobody else needs them. A second call
-    finds nothing.
+    development files of two libraries which it brings along, and which no other package needs. A
+    second call finds nothing.
 
-    Raises RuntimeError where a file needs it and cannot be written.
+    Raises RuntimeError if a file needs it and cannot be written.
     """
     import numpy
 

@@ -11,9 +11,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
-from helpers.build_tools import build_environment, build_tools, from_wheels
-from helpers.interrupts import uninterrupted
-from helpers.progress_bar import ProgressBar
+from helpers._plumbing.build_tools import build_environment, build_tools, from_wheels
+from helpers._plumbing.interrupts import uninterrupted
+from helpers._plumbing.progress_bar import ProgressBar
 from helpers.session import graph_environment
 from helpers.workspace.build_output import BuildResult, read_result, without_folders
 from helpers.workspace.folders import claim
@@ -22,19 +22,24 @@ from helpers.workspace.sourcing import source, use
 from helpers.workspace.wheels import fix_wheels
 
 CMAKE_MODULES = Path(__file__).with_name('cmake')
+# What colcon prints in a terminal and differs from run to run: 'Finished <<< my_package [1.06s]',
+# and that the prefix of the wheels, which need not be one, is no colcon workspace.
+MOVING = r'(?<=\w) \[-?[\d.]+s(, .*)?\]$|^\[-?[\d.]+s\] WARNING.*any .local_setup\..*\n'
+# A package in C++ for lessons: copy it into `src`.
+SMALL_RCLCPP = Path(__file__).with_name('small_rclcpp')
 CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
 
 _open_workspace: Workspace | None = None
 
 
 class Workspace:
-    """A colcon workspace of this notebook, empty when it is made: `Workspace('lesson_08')`.
+    """A colcon workspace of this notebook, empty when it is made: `Workspace('lesson_09')`.
 
-    It lies in the folder `scratch` of this checkout, which git ignores. Where another kernel has a
-    workspace of this name, another folder is taken, so that the two do not meet. `path` is the
-    folder; all paths that this class takes and prints are relative to it.
+    It is in the folder `scratch` of this checkout, which git ignores. If another kernel has a
+    workspace of this name, another folder is taken. `path` is the folder; all paths that this class
+    takes and prints are relative to it. `terminals` are those that `start` has opened, by name.
 
-    With `underlay`, another workspace that has been built, this one is an overlay of it: it lies in
+    With `underlay`, another workspace that has been built, this one is an overlay of it: it is in
     a folder of the underlay, is built in a terminal that has sourced the underlay, and is closed
     with it. `%%write` goes on to write into the underlay.
 
@@ -46,7 +51,7 @@ class Workspace:
         global _open_workspace
         if not re.fullmatch(r'[A-Za-z0-9_-]+', name):
             raise ValueError(
-                f'Name a workspace with letters, digits, _ and -, such as lesson_08, not {name!r}.'
+                f'Name a workspace with letters, digits, _ and -, such as lesson_09, not {name!r}.'
             )
         if underlay and name in ('src', 'build', 'install', 'log'):
             raise ValueError(f'{name!r} is a folder of the underlay: choose another name.')
@@ -59,6 +64,7 @@ class Workspace:
         self._overlays: dict[str, Workspace] = {}
         self.path = underlay.path / name if underlay else claim(name)
         self._processes: dict[tuple[str, ...], Process] = {}
+        self.terminals: dict[str, Process] = {}
         self._sourced: dict[str, str] | None = None
         self._parts: dict[Path, list[str]] = {}  # of the files that several cells write
         if self.path.exists():
@@ -74,7 +80,7 @@ class Workspace:
     # --- Files ---
 
     def file(self, relative_path: str | os.PathLike) -> Path:
-        """Return the path of a file in this workspace. Raises ValueError where it is outside."""
+        """Return the path of a file in this workspace. Raises ValueError if it is outside."""
         path = PurePosixPath(relative_path)
         if path.is_absolute() or '..' in path.parts or not path.parts:
             raise ValueError(
@@ -86,8 +92,8 @@ class Workspace:
     def write(self, relative_path: str | os.PathLike, text: str, part: int | None = None) -> None:
         """Write a file of the workspace, and the folders above it.
 
-        With `part`, 1 or more, only this part of the file is written anew. An empty line stands
-        between the parts. Raises ValueError where the part before it was not written.
+        With `part`, 1 or more, only this part of the file is written anew. An empty line separates
+        the parts. Raises ValueError if the part before it was not written.
         """
         file = self.file(relative_path)
         with uninterrupted():  # a file of which one half is written would be lost
@@ -104,7 +110,7 @@ class Workspace:
     def print_tree(self, relative_path: str = 'src', hide: Sequence[str] = ()) -> None:
         """Print the files below a folder of the workspace. `hide` holds patterns such as '*.zsh'.
 
-        A folder with nothing but one folder stands in one line with it. Raises ValueError where
+        A folder that holds only one folder is printed in one line with it. Raises ValueError if
         there is no such folder.
         """
         top = self.file(relative_path)
@@ -120,7 +126,7 @@ class Workspace:
     ) -> BuildResult:
         """Run `colcon build` on all packages in `src`, or with `--packages-select` on these.
 
-        A build that fails is a result, not an exception: print it. Raises RuntimeError where this
+        A build that fails is a result, not an exception: print it. Raises RuntimeError if this
         machine lacks a tool, with the command that installs it.
         """
         with_cmake = any(self.path.glob('src/**/CMakeLists.txt'))
@@ -136,7 +142,7 @@ class Workspace:
         command = ['colcon', 'build']
         command += ['--symlink-install'] if symlink_install else []
         command += ['--packages-select', *packages] if packages else []
-        # An overlay lies in the folder of its underlay, and is not a part of it.
+        # An overlay is in the folder of its underlay, and no part of it.
         settings = ['--base-paths', 'src', '--event-handlers']
         settings += ['console_direct+', 'desktop_notification-', 'status-']
         # Without the first, CMake takes the newest Python on the PATH.
@@ -152,7 +158,7 @@ class Workspace:
         main = 'import sys; from colcon_core.command import main; sys.exit(main())'
         command = [sys.executable, '-c', main, '--log-base', 'log', *arguments]
         environment = self._underlay.environment() if self._underlay else build_environment()
-        # Killed, it would leave compilers without an owner: rather it builds to its end.
+        # If it were killed, its compilers would go on without an owner: it builds to its end.
         with Process('colcon', command, environment, self.path, ends_with_kernel=False) as colcon:
             try:
                 started = time.monotonic()
@@ -170,8 +176,8 @@ class Workspace:
     def _note_half_built(self, lines: Sequence[str]) -> None:
         """Let colcon replace the copies of packages that it began and did not finish.
 
-        Where the change of a Python package from copies to links is broken off, colcon 0.21.3 has
-        removed its list of copies. Without the file it refuses to put links in their place.
+        If the change of a Python package from copies to links is interrupted, colcon 0.21.3 has
+        removed its list of copies. Without this file it refuses to replace them by links.
         """
         begun, finished = (
             {line.split()[2] for line in lines if line.startswith(word)}
@@ -186,7 +192,7 @@ class Workspace:
     def environment(self) -> dict[str, str]:
         """Return the environment of a terminal that has sourced `install/setup.bash`.
 
-        Raises RuntimeError where nothing has been built.
+        Raises RuntimeError if nothing has been built.
         """
         if self._sourced is None:
             self._sourced = source(self.path)
@@ -196,7 +202,7 @@ class Workspace:
         """Make what was built importable in this kernel, as `source install/setup.bash` would.
 
         A package of pure Python that was built again replaces the old one at the next import.
-        Raises RuntimeError where a package with libraries (every interface package) was built again
+        Raises RuntimeError if a package with libraries (every interface package) was built again
         and has changed: a process cannot give a loaded library back. Then restart the kernel.
         """
         use(self.path / 'install', self.environment())
@@ -209,16 +215,11 @@ class Workspace:
         It has the sourced environment (`sourced=False` leaves that out), and the domain id and
         discovery range of the open session, or of this kernel's next one. It ends with its `with`
         block, with `stop()`, when the same is run again, when a cell is interrupted, and with the
-        kernel. Where the package or the executable is not there, it has printed what `ros2 run`
-        prints, and has ended with 1.
+        kernel. If there is no such package or executable, it has printed what `ros2 run` prints,
+        and has ended with 1.
         """
         environment = self.environment() if sourced else build_environment()
-        environment |= graph_environment() | {
-            'ROS_LOG_DIR': str(self.path / 'log' / 'ros'),  # not the home: it may be read-only
-            'PYTHONUNBUFFERED': '1',
-            # Without the time stamp.
-            'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] [{name}]: {message}',
-        }
+        environment |= self._environment_of_nodes()
         key = (package, executable, *arguments)
         if key in self._processes:
             self._processes[key].stop()
@@ -235,30 +236,60 @@ class Workspace:
     def terminal(self, commands: str) -> str:
         """Run commands in a new terminal, a bash in the folder of this workspace.
 
-        Nothing of the workspace is sourced in it. The user's settings of git do not count, and git
+        Nothing of the workspace is sourced in it. It is in the domain of the open session, or of
+        this kernel's next one. Its user is `you`. The user's settings of git do not count, and git
         sees no repository above the workspace.
-        Return what the commands print, without this machine's folders.
+        Return what the commands print, without this machine's folders and the times of colcon.
 
-        Raises TimeoutError where they take longer than 60 s.
+        Raises TimeoutError if they take longer than 60 s.
         """
-        environment = build_environment() | {
+        with self._bash('terminal', commands) as shell:
+            shell.wait(60)
+        for workspace in (self, *self._overlays.values()):
+            workspace._sourced = None  # the commands may have built
+        text = without_folders('\n'.join(shell.lines), self.path)
+        return re.sub(MOVING, '', text, flags=re.M)
+
+    def start(self, commands: str, name: str = 'terminal') -> Process:
+        """Run commands in a new terminal that stays open, and return its process.
+
+        It is as that of `terminal`, and nodes that run in it print no times before their lines. It
+        ends with its `with` block, with `stop()`, when another one of this `name` is started, when
+        a cell is interrupted, and with the kernel.
+        """
+        if name in self.terminals:
+            self.terminals[name].stop()
+        self.terminals[name] = self._bash(name, commands)
+        return self.terminals[name]
+
+    def _bash(self, name: str, commands: str) -> Process:
+        environment = build_environment() | self._environment_of_nodes()
+        environment |= {
             'GIT_CONFIG_GLOBAL': os.devnull,
             'GIT_CONFIG_NOSYSTEM': '1',
-            # Where the workspace has no repository, git would find that of this checkout.
+            # If the workspace has no repository, git would find that of this checkout.
             'GIT_CEILING_DIRECTORIES': str(self.path.parent),
+            'LOGNAME': 'you',
         }
         command = [shutil.which('bash') or '/bin/bash', '--norc', '-c', commands]
-        with Process('bash', command, environment, self.path) as shell:
-            shell.wait(60)
-        return without_folders('\n'.join(shell.lines), self.path)
+        return Process(name, command, environment, self.path, terminal=True)
+
+    def _environment_of_nodes(self) -> dict[str, str]:
+        return graph_environment() | {
+            'ROS_LOG_DIR': str(self.path / 'log' / 'ros'),  # not the home: it may be read-only
+            'PYTHONUNBUFFERED': '1',
+            # Without the time stamp.
+            'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] [{name}]: {message}',
+        }
 
     def close(self) -> None:
         """End every process of this workspace. Its files stay until it is made again."""
         for overlay in self._overlays.values():
             overlay.close()
-        for process in self._processes.values():
+        for process in [*self._processes.values(), *self.terminals.values()]:
             process.stop()
         self._processes.clear()
+        self.terminals.clear()
 
 
 def _print_below(folder: Path, hide: Sequence[str], indent: str) -> None:
@@ -313,7 +344,7 @@ def _command(package: str, executable: str, environment: dict[str, str]) -> list
 def write(line: str, cell: str) -> None:
     """`%%write PATH`: write the rest of the cell to a file of the open workspace.
 
-    A long file stands in several cells: `%%write PATH part 1`, `%%write PATH part 2`.
+    Several cells can write a long file: `%%write PATH part 1`, `%%write PATH part 2`.
     """
     from IPython.core.error import UsageError
 
@@ -328,10 +359,28 @@ def write(line: str, cell: str) -> None:
     print(f'Wrote part {part} of {path}' if part else f'Wrote {path}')
 
 
+def terminal(line: str, cell: str) -> None:
+    """`%%terminal`: run the rest of the cell in a new terminal of the open workspace, and print.
+
+    `%%terminal NAME`: the terminal stays open, and `workspace.terminals[NAME]` is its process.
+    """
+    from IPython.core.error import UsageError
+
+    name = line.strip()
+    if _open_workspace is None:
+        raise UsageError("Open a workspace first: workspace = Workspace('my_lesson').")
+    if not name:
+        if text := _open_workspace.terminal(cell):
+            print(text)
+    else:
+        _open_workspace.start(cell, name)
+
+
 def _register_in_ipython() -> None:
     from IPython import get_ipython
 
     shell = get_ipython()
-    if shell is None or 'write' in shell.magics_manager.magics['cell']:
+    if shell is None or 'terminal' in shell.magics_manager.magics['cell']:
         return
     shell.register_magic_function(write, 'cell')
+    shell.register_magic_function(terminal, 'cell')

@@ -21,7 +21,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_
 from helpers.classroom import HUB_VARIABLE
 from helpers.progress import FILE_VARIABLE
 from support.waits import LIMIT_S, wait_for
-from tools.class_server.__main__ import main
+from tools.classroom.class_page.__main__ import main
 
 LESSON = '02_lose_messages.ipynb'
 NAME = 'lose_messages'
@@ -36,7 +36,7 @@ OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 
 def write_lesson(root: Path) -> None:
-    """Write a lesson with two steps, two guesses and an exercise below `root`."""
+    """Write a lesson with two steps, two guesses and a task below `root`."""
     cells = [
         new_markdown_cell('# 02 Lose messages', id='title'),
         new_markdown_cell('## 1. Count', id='heading'),
@@ -54,7 +54,7 @@ def write_lesson(root: Path) -> None:
         new_markdown_cell('## 2. Look', id='heading-2'),
         new_code_cell(f'compare_prediction({QUESTION!r}, my_guess, 14)', id=LATER),
         new_code_cell('this is no Python', id='broken', metadata=PREDICT),
-        new_markdown_cell('### Exercise 1: Try', id='exercise'),
+        new_markdown_cell('### ✎ Task 1: Try', id='task'),
     ]
     (root / 'notebooks').mkdir(parents=True, exist_ok=True)
     nbformat.write(new_notebook(cells=cells), root / 'notebooks' / LESSON)

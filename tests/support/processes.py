@@ -72,6 +72,7 @@ def traces() -> set[str]:
 def put(folder: Path, name: str, script: str) -> Path:
     """Put a command into a folder, which does what a script in sh says."""
     program = folder / name
+    program.unlink(missing_ok=True)  # a link leads to a command of this machine
     program.write_text(f'#!/bin/sh\n{script}\n')
     program.chmod(0o755)
     return program

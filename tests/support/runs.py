@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 
+from helpers._plumbing.values import RUN_COLUMNS
 from helpers.recording import Recording
 from helpers.session import ros_session
-from helpers.values import COLUMNS
 from support.nodes import LIMIT_S, Listener, Talker, spin
 
 CALLBACK = ['started_s', 'finished_s', 'thread']
@@ -42,7 +42,7 @@ def runs(most_messages):
 def happenings(draw):
     """A run in which all is late by chance. Return its table, its depth and its workers."""
     depth, threads = draw(st.integers(1, 4)), draw(st.integers(1, 3))
-    # An exclusive group has one worker, who may have another thread each time.
+    # An exclusive group has one worker, which may have another thread each time.
     names = st.integers(1, draw(st.sampled_from([1, 3]))) if threads == 1 else None
     gaps = draw(st.lists(st.integers(0, 6), min_size=1, max_size=9))
     published = np.cumsum(gaps)
@@ -69,7 +69,8 @@ def happenings(draw):
 
 def made_table(published, rows):
     return pd.DataFrame(
-        [(seq, p, *rows.get(seq, NOT_HEARD)) for seq, p in enumerate(published)], columns=COLUMNS
+        [(seq, p, *rows.get(seq, NOT_HEARD)) for seq, p in enumerate(published)],
+        columns=RUN_COLUMNS,
     ).astype({'published_s': float, 'started_s': float, 'finished_s': float})
 
 
@@ -138,7 +139,7 @@ def assert_is_the_run(states, table, depth, accuracy_s=1e-6):
     """Each state is what the counts of arrivals and takes so far make of the table."""
     published, taken_in_order = table['seq'].tolist(), heard(table)
     published_s, started_s, finished_s = (
-        dict(zip(published, table[name], strict=True)) for name in COLUMNS[1:4]
+        dict(zip(published, table[name], strict=True)) for name in RUN_COLUMNS[1:4]
     )
     arrived, taken, lost = 0, [], []
     for before, state in zip(states, states[1:], strict=False):

@@ -3,7 +3,7 @@
 import time
 
 LIMIT_S = 20.0  # for every wait; never reached unless something is broken
-START_LIMIT_S = 60.0  # where a Python, or a machine, starts in this time
+START_LIMIT_S = 60.0  # for a Python or a machine that starts meanwhile
 
 
 def wait_for(read, right=bool, timeout_s: float = LIMIT_S):

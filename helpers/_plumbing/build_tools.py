@@ -18,7 +18,7 @@ HOSTILE = (
     *('CPATH', '*_INCLUDE_PATH', 'LIBRARY_PATH', 'PKG_CONFIG_PATH'),
     # The language of messages. ipykernel asks for colours: then no line starts with "CMake Error".
     *('LC_*', 'LANG*', 'CLICOLOR*', 'FORCE_COLOR'),
-    # What pytest, Python and git (in a hook) tell their children.
+    # What pytest, Python and git (in a hook) set for their children.
     *('PYTEST*', 'PYTHON*', 'GIT_*'),
     # A node gets its domain id and its discovery range from the session.
     *('RCUTILS_*', 'ROS_DOMAIN_ID', 'ROS_STATIC_PEERS', 'ROS_LOCALHOST_ONLY'),
@@ -51,7 +51,7 @@ def build_environment() -> dict[str, str]:
         for name, value in os.environ.items()
         if name in kept or not any(fnmatchcase(name, pattern) for pattern in unwanted)
     }
-    # Where several jobs write, the lines of one stay together. No -l, which colcon would add: on a
+    # -O keeps the lines of one job together. No -l, which colcon would add: on a
     # busy machine it lets make start one job at a time.
     cores = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else os.cpu_count()
     environment |= {'LC_ALL': 'C.UTF-8', 'MAKEFLAGS': f'-j{cores} -O', 'PYTHONUTF8': '1'}
@@ -74,7 +74,7 @@ def build_environment() -> dict[str, str]:
 
 
 class Tool(NamedTuple):
-    """A tool of a build: what was found, '' where it is missing, and what installs it."""
+    """A tool of a build: what was found, '' if it is missing, and the command that installs it."""
 
     name: str
     found: str

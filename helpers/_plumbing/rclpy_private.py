@@ -6,6 +6,7 @@ is gone, and another one that no other module touches any.
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import sys
 import threading
@@ -13,6 +14,7 @@ import warnings
 from concurrent.futures import thread as thread_pool
 from types import FrameType
 
+from rclpy.action import ActionClient
 from rclpy.client import Client
 from rclpy.executors import Executor
 
@@ -25,6 +27,7 @@ NAMES = {
     },
     'a MultiThreadedExecutor': {'_executor': 'rclpy 7.1.6', '_futures': 'rclpy 7.1.6'},
     'a client': {'_pending_requests': 'rclpy 7.1.6'},
+    'an action client': {'_action_name': 'rclpy 7.1.6'},
     'a ThreadPoolExecutor': {'_threads': 'Python 3.11.7', '_max_workers': 'Python 3.11.7'},
     'a kernel': {'_allow_stdin': 'ipykernel 7.4.0'},
 }
@@ -70,7 +73,24 @@ def fail_calls(client: Client, failure: Exception) -> None:
     for future in list(client._pending_requests.values()):
         with warnings.catch_warnings(action='ignore'):  # a done callback that fails
             future.set_exception(failure)
-        future.exception()  # or rclpy says that nobody has read it
+        future.exception()  # or rclpy warns that it was not read
+
+
+def end_answered_call(thread: threading.Thread) -> None:
+    """Let a thread go on that waits in `Client.call` for an answer which is there.
+
+    The executor that took the answer has ended before it could wake the thread.
+    """
+    for _, frame in frames([thread]):
+        while frame is not None and frame.f_code is not Client.call.__code__:
+            frame = frame.f_back
+        if frame is not None and 'future' in frame.f_locals and frame.f_locals['future'].done():
+            frame.f_locals['event'].set()
+
+
+def action_name(client: ActionClient) -> str:
+    """Return the name of an action, as its client was given it."""
+    return client._action_name
 
 
 def states(executor: Executor, spin_thread: threading.Thread) -> set[str]:
@@ -118,6 +138,14 @@ def end_wait(thread: threading.Thread, longer_than_s: float) -> None:
                 event.set()
 
 
+def break_off(thread: threading.Thread, error: type[Exception]) -> None:
+    """Raise an error in a thread at its next line of Python, if it does not wait."""
+    if any(_state(frame) == 'working' for _, frame in frames([thread])):
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(thread.ident), ctypes.py_object(error)
+        )
+
+
 def can_ask(kernel: object) -> bool:
-    """Return whether who runs the cell can answer input(): JupyterLab can, nbval cannot."""
+    """Return whether input() gets an answer: in JupyterLab it does, in nbval it does not."""
     return getattr(kernel, '_allow_stdin', False)

@@ -1,11 +1,11 @@
-"""What a cell shows while it waits. Afterwards only what explains an interrupted wait is seen."""
+"""What a cell shows while it waits. Afterwards only the reason of an interrupted wait stays."""
 
 from __future__ import annotations
 
 import html
 from collections.abc import Callable
 
-from helpers.rclpy_private import can_ask
+from helpers._plumbing.rclpy_private import can_ask
 
 SHOW_AFTER_S = 2.0
 REFRESH_S = 0.2
@@ -14,12 +14,12 @@ REFRESH_S = 0.2
 class ProgressBar:
     """Shows what `progress` returns (0 to 1), once the wait has taken `SHOW_AFTER_S`.
 
-    Without a `progress`, or where nobody watches, it shows nothing. At its end it becomes empty:
+    Without a `progress`, or if no person watches, it shows nothing. At its end it becomes empty:
     what the cell has printed before stays.
     """
 
     def __init__(self, progress: Callable[[], float] | None) -> None:
-        self._watched = _somebody_watches()
+        self._watched = somebody_watches()
         self._progress = progress if self._watched else None
         self._display = None
         self._bar = self._text = ''
@@ -38,7 +38,7 @@ class ProgressBar:
         self._show()
 
     def say(self, text: str) -> None:
-        """Show a text where somebody watches. It stays where the cell is interrupted."""
+        """Show a text if a person watches. It stays if the cell is interrupted."""
         if self._watched:
             self._text = f'<pre>{html.escape(text)}</pre>'
             self._show()
@@ -61,8 +61,8 @@ class ProgressBar:
         self._show()
 
 
-def _somebody_watches() -> bool:
-    """Whether a person runs this cell, and not nbval or nbclient."""
+def somebody_watches() -> bool:
+    """Return whether a person runs this cell, and not nbval or nbclient."""
     try:
         from IPython import get_ipython
     except ImportError:

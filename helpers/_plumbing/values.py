@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import numbers
 import re
 from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
 
-COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']  # of the table of a run
+RUN_COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']  # of the table of a run
 LONGEST = 200  # characters of a value that a sentence can hold
 
 
 def shown(value: object) -> str:
-    """Return how a value looks, for a sentence: its repr, or its type where that is long."""
+    """Return how a value looks, for a sentence: its repr, or its type if that is long."""
     text = repr(value)
     return f'this {type(value).__name__}' if '\n' in text or len(text) > LONGEST else text
+
+
+def check_count(name: str, value: int) -> None:
+    """Raise ValueError unless the value is a whole number from 1 up."""
+    if not isinstance(value, numbers.Integral) or value < 1:
+        raise ValueError(f'{name} must be a whole number from 1 up, not {shown(value)}.')
 
 
 def natural(name: str) -> list:
@@ -24,7 +31,7 @@ def natural(name: str) -> list:
 
 
 def check_columns(table: pd.DataFrame, names: Iterable[str]) -> None:
-    """Raise TypeError unless `table` is a DataFrame, ValueError where a column or all rows lack."""
+    """Raise TypeError unless it is a DataFrame, ValueError if a column or all rows are missing."""
     if not isinstance(table, pd.DataFrame):
         raise TypeError(f'The table must be a DataFrame, not {type(table).__name__}.')
     missing = [name for name in names if name not in table.columns]
@@ -35,7 +42,7 @@ def check_columns(table: pd.DataFrame, names: Iterable[str]) -> None:
 
 
 def column_of_numbers(table: pd.DataFrame, name: str) -> np.ndarray:
-    """Return a column as floats, NaN where it has no value. Raises TypeError for anything else."""
+    """Return a column as floats, NaN for a missing value. Raises TypeError for anything else."""
     try:
         return table[name].to_numpy(float, na_value=np.nan)
     except (TypeError, ValueError):
@@ -47,13 +54,13 @@ def check_table(table: pd.DataFrame) -> pd.DataFrame:
 
     `seq` is then int, the times are float, and `thread` is a str, or None.
 
-    Raises TypeError or ValueError, with one clear sentence, where `table` is not a recording.
+    Raises TypeError or ValueError, with one clear sentence, if `table` is not a recording.
     """
-    check_columns(table, COLUMNS)
+    check_columns(table, RUN_COLUMNS)
     seq = column_of_numbers(table, 'seq')
-    if not (seq % 1 == 0).all():  # nor where it is NaN
+    if not (seq % 1 == 0).all():  # NaN is none
         raise ValueError('The column seq must hold whole numbers.')
-    times = {name: column_of_numbers(table, name) for name in COLUMNS[1:4]}
+    times = {name: column_of_numbers(table, name) for name in RUN_COLUMNS[1:4]}
     thread = table['thread'].astype(object)
     thread = thread.where(thread.notna(), None)
     table = table.assign(seq=seq.astype(int), thread=thread, **times)

@@ -1,4 +1,4 @@
-"""What a figure shows, in words, for everybody who does not see it.
+"""The alternative text of a figure, for readers who do not see it.
 
 A notebook shows a figure as an `<img>` with this text as its `alt`. To a plain image/png output
 JupyterLab gives none, whatever its metadata say (github.com/jupyter/enhancement-proposals #120).
@@ -23,8 +23,8 @@ _described: WeakKeyDictionary[Axes, tuple[str, str | None]] = WeakKeyDictionary(
 def describe(ax: Axes, text: str, title: str | None = None) -> None:
     """Say in one or more sentences what is drawn into `ax`; the last call counts.
 
-    The title and the labels of `ax` are read out with it. Give `title` where the one that is seen
-    holds a number that moves.
+    The title and the labels of `ax` are read out with it. Give `title` if the visible one
+    has a number that moves.
     """
     _described[ax] = text, title
 
@@ -45,7 +45,7 @@ def show(figure: Figure) -> None:
     """Display a figure in the notebook, with its alternative text."""
     text = alt_text(figure)
     data = {'text/plain': text}
-    if png := print_figure(figure, base64=True):  # None where nothing is drawn
+    if png := print_figure(figure, base64=True):  # None if nothing is drawn
         data['text/html'] = f'<img alt="{escape(text)}" src="data:image/png;base64,{png}">'
     display(data, raw=True)
 

@@ -1,7 +1,8 @@
-"""Who can hear this process: its domain id, its discovery range, and its turn in shared memory."""
+"""The domain id of this process, its discovery range, and its turn in shared memory."""
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import fcntl
 import os
@@ -9,20 +10,23 @@ import socket
 import time
 from collections.abc import Iterator
 
+from helpers.ros2._sessions import recorded
+
 SHARED_MEMORY = '/dev/shm'
-MARK_ADDRESS = '127.0.0.2'  # of this machine, and nobody connects from it
+MARK_ADDRESS = '127.0.0.2'  # of this machine; no connection comes from it
 TURN_TIMEOUT_S = 5.0
 POLL_S = 0.01
 
 _reserved = contextlib.ExitStack()
+atexit.register(_reserved.close)
 _domain_id: int | None = None
-_in_vain = False  # this process has waited for its turn, and has had none since
+_timed_out = False  # the last wait for a turn timed out
 
 
 def reserve_domain_id() -> int:
     """Return a domain id (1 to 100) that belongs to this process until it ends.
 
-    Raises RuntimeError where all of them are taken.
+    Raises RuntimeError if all of them are taken.
     """
     global _domain_id
     if _domain_id is None:
@@ -30,6 +34,8 @@ def reserve_domain_id() -> int:
 
         try:
             _domain_id = _reserved.enter_context(domain_id())
+            # For the ros2 command, which looks where this user's kernels are.
+            _reserved.enter_context(recorded(domain_variables(_domain_id, 'LOCALHOST'), False))
         except RuntimeError as error:
             raise RuntimeError(
                 'All 100 ROS domain ids of this machine are in use: '
@@ -42,12 +48,12 @@ def reserve_domain_id() -> int:
 def share_domain_id(domain_id: int) -> Iterator[None]:
     """Keep `reserve_domain_id` of all processes away from this id, which several may share.
 
-    Raises ValueError where a process has reserved it for itself.
+    Raises ValueError if a process has reserved it for itself.
     """
     from domain_coordinator.impl import PORT_BASE
 
     # The coordinator holds the port of an id without this option. Two sockets can share a port
-    # only where both have it, or have other addresses: a connection may have the port by chance.
+    # only if both have it, or have other addresses: a connection may have the port by chance.
     with socket.socket() as mark:
         mark.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -61,7 +67,7 @@ def share_domain_id(domain_id: int) -> Iterator[None]:
 
 
 def check_domain(domain_id: int | None, discovery: str) -> None:
-    """Raise ValueError where a session cannot use this domain and this range."""
+    """Raise ValueError if a session cannot use this domain and this range."""
     whole = isinstance(domain_id, int) and not isinstance(domain_id, bool)
     if domain_id is not None and not (whole and 0 <= domain_id <= 101):
         raise ValueError(f'domain_id must be a whole number from 0 to 101, not {domain_id!r}.')
@@ -99,25 +105,26 @@ def one_process_at_a_time() -> Iterator[None]:
     """Wait for the turn of this process to make or to end a participant.
 
     Fast DDS counts some ports in shared memory through all domains. It reports an error, in the
-    middle of a cell, where one process wants the number that another one is just giving back, and
-    takes the next number. After `TURN_TIMEOUT_S` it is nobody's turn: the error is better than to
-    wait for a process that was stopped. Who has waited in vain only asks, until it has a turn.
+    middle of a cell, if one process wants the number that another one is just giving back, and
+    takes the next number. After `TURN_TIMEOUT_S` the process goes on without a turn: the error is
+    better than to wait for a process that was stopped. From then on it does not wait, until it gets
+    a turn.
     """
-    global _in_vain
+    global _timed_out
     try:
         folder = os.open(SHARED_MEMORY, os.O_RDONLY)
     except OSError:  # no shared memory, no such port
         yield
         return
     try:
-        deadline = time.monotonic() + (0.0 if _in_vain else TURN_TIMEOUT_S)
+        deadline = time.monotonic() + (0.0 if _timed_out else TURN_TIMEOUT_S)
         while True:
             with contextlib.suppress(BlockingIOError):
                 fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                _in_vain = False
+                _timed_out = False
                 break
             if time.monotonic() >= deadline:
-                _in_vain = True
+                _timed_out = True
                 break
             time.sleep(POLL_S)
         yield

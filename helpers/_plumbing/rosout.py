@@ -64,7 +64,7 @@ class Rosout:
                 record.print()
 
     def print_warnings(self) -> None:
-        """Print what nobody has printed yet and somebody should read, by node."""
+        """Print the warnings and errors that were not printed yet, by node."""
         # By node, because the executor's order of nodes is chance.
         for record in sorted(self._records, key=lambda record: record.node):
             if record.level in ('WARN', 'ERROR', 'FATAL') and not record.printed:

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 def uninterrupted() -> Iterator[None]:
     """Let an Interrupt wait for the end of the block.
 
-    A process or a thread that starts needs an owner who ends it: an Interrupt in the middle of
+    A process or a thread needs an owner that ends it: an Interrupt in the middle of
     `subprocess.Popen` or of `Thread.start` would leave it without one. A session that closes has to
     end all that it has begun.
     """

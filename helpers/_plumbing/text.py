@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Sequence
 
-COLUMNS = 94
+WIDTH = 94
 
 
 def wrap(text: str, first: str = '', rest: str = '') -> list[str]:
@@ -14,7 +14,7 @@ def wrap(text: str, first: str = '', rest: str = '') -> list[str]:
     """
     return textwrap.wrap(
         text,
-        COLUMNS,
+        WIDTH,
         initial_indent=first,
         subsequent_indent=rest,
         break_long_words=False,
@@ -25,7 +25,7 @@ def wrap(text: str, first: str = '', rest: str = '') -> list[str]:
 def table(rows: Sequence[Sequence[str]]) -> str:
     """Return rows of cells as text, with a line below the first row, the heading.
 
-    Where the last column is too long, it continues on lines of its own.
+    If the last column is too long, it continues on lines of its own.
     """
     widths = [max(map(len, column)) for column in list(zip(*rows, strict=True))[:-1]]
     indent = ' ' * sum(width + 2 for width in widths)

@@ -1,0 +1,1 @@
+"""What helpers need and no lesson imports."""

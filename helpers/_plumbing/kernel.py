@@ -1,0 +1,28 @@
+"""What each kernel of this environment gets: the environment's own settings of IPython load it."""
+
+import os
+import sys
+
+from IPython.core.error import UsageError
+
+NOT_RUN = (
+    'This kernel has not run the first cells of the lesson: choose Run > Run All Above Selected '
+    'Cell, then run this cell again.'
+)
+
+
+def load_ipython_extension(shell) -> None:
+    """Let `!ros2` be found, and a name or a magic that is missing say what to run.
+
+    The latter only as long as no helper is imported: later a missing name is the student's own.
+    """
+    commands, path = os.path.join(sys.prefix, 'bin'), os.environ.get('PATH', os.defpath)
+    if commands not in path.split(os.pathsep):
+        os.environ['PATH'] = f'{commands}{os.pathsep}{path}'
+
+    def explain(shell, kind, error, traceback, tb_offset=None) -> None:
+        shell.showtraceback((kind, error, traceback), tb_offset=tb_offset)
+        if 'helpers.session' not in sys.modules and 'helpers.workspace' not in sys.modules:
+            print(NOT_RUN)
+
+    shell.set_custom_exc((NameError, UsageError), explain)

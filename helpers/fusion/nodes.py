@@ -1,0 +1,345 @@
+"""Two nodes of robot_localization, as far as a lesson uses them, for an environment of wheels.
+
+`EkfNode` and `NavSatNode` read the parameters of `ekf_node` and `navsat_transform_node`, with the
+same names and meanings, and do with them what those do for a robot on a floor. Not read: all other
+parameters. Not done: what `helpers.fusion.filter` says, and the place of a sensor (only its yaw).
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pymap3d
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
+
+from helpers.fusion.filter import STATE, ExtendedKalmanFilter
+from helpers.fusion.messages import (
+    ON_THE_FLOOR,
+    from_odometry,
+    odometry_message,
+    quaternion,
+    seconds_of,
+    stamp_of,
+    table_of,
+    yaw_of,
+)
+from helpers.session import ros_session
+
+if TYPE_CHECKING:
+    from helpers.robot import Robot
+
+# The 15 numbers of each `..._config` and covariance, in their order.
+PARTS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw', 'vx', 'vy', 'vz', 'vroll', 'vpitch', 'vyaw')
+PARTS += ('ax', 'ay', 'az')
+DEPTH = 100
+
+
+class _Configured(Node):
+    """A node whose parameters are those of YAML files: a later one replaces an earlier one."""
+
+    def __init__(self, name: str, *files: str | os.PathLike) -> None:
+        arguments = ['--ros-args', *chain(*(('--params-file', str(file)) for file in files))]
+        super().__init__(
+            name, cli_args=arguments, automatically_declare_parameters_from_overrides=True
+        )
+        self.given = {key: one.value for key, one in self.get_parameters_by_prefix('').items()}
+
+    def hear(self, kind: type, topic: str, callback, qos=DEPTH) -> None:
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        self.create_subscription(kind, topic, callback, qos, event_callbacks=events)
+
+
+class EkfNode(_Configured):
+    """The filter node, with the parameters of `ekf_node` in a YAML file.
+
+    It hears `odomN` (Odometry) and `imuN` (Imu), of which `odomN_config` and `imuN_config` say what
+    is used, and `odomN_pose_rejection_threshold` the gate. It turns what an IMU says by the yaw of
+    its frame in `base_link_frame`, which it hears on /tf_static; without it, it leaves the message
+    out. It publishes its estimate on `<name>/odometry` with each message of `odom0`, and on /tf the
+    transform from `world_frame` to what is below it.
+
+    By the names of the inputs, such as `odom0`: `parts` are those of the state that it may use,
+    `used` counts the measurements that were used, `first_used_s` is when the first one was, and
+    `kept_out` has the times of those that the gate kept out (s). `initial` are the variances that
+    the files give it at the start.
+    """
+
+    def __init__(self, name: str, *files: str | os.PathLike) -> None:
+        from tf2_msgs.msg import TFMessage  # there only after provide_tf2_msgs
+
+        super().__init__(name, *files)
+        given = self.given
+        self.world = given.get('world_frame', 'odom')
+        self.base = given.get('base_link_frame', 'base_link')
+        self.initial = self._variances('initial_estimate_covariance')
+        noise = self._variances('process_noise_covariance')
+        self.ekf = ExtendedKalmanFilter(noise, self.initial)
+        self.parts: dict[str, list[str]] = {}
+        self.used: dict[str, int] = {}
+        self.first_used_s: dict[str, float] = {}
+        self.kept_out: dict[str, list[float]] = {}
+        self._parents: dict[str, tuple[str, float]] = {}  # each frame's parent, and its yaw in it
+        self._in_odom = 0.0, 0.0, 0.0
+        latched = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.hear(TFMessage, '/tf_static', self._on_static, latched)
+        if self.world == 'map':
+            self.hear(TFMessage, '/tf', self._on_tf)
+        self._tf = self.create_publisher(TFMessage, '/tf', DEPTH)
+        self._odometry = self.create_publisher(Odometry, f'{name}/odometry', DEPTH)
+        for key in sorted(given, key=lambda key: (not key.startswith('odom'), key)):
+            if re.fullmatch(r'odom\d+', key):
+                self._listen(key, Odometry, self._on_odometry)
+            elif re.fullmatch(r'imu\d+', key):
+                self._listen(key, Imu, self._on_imu)
+
+    def _variances(self, key: str) -> dict[str, float]:
+        given = self.given.get(key, ())
+        if given and len(given) != len(PARTS):
+            raise ValueError(f'{key} needs {len(PARTS)} variances, not {len(given)}.')
+        values = dict(zip(PARTS, given, strict=False))
+        return {name: value for name, value in values.items() if name in STATE}
+
+    def _listen(self, key: str, kind: type, callback) -> None:
+        config = self.given.get(f'{key}_config', [False] * len(PARTS))
+        if len(config) != len(PARTS):
+            raise ValueError(f'{key}_config needs 15 values, true or false, not {len(config)}.')
+        parts = [name for name, on in zip(PARTS, config, strict=True) if on]
+        self.parts[key] = parts
+        self.used[key], self.kept_out[key] = 0, []
+        gate = self.given.get(f'{key}_pose_rejection_threshold')
+        self.hear(kind, self.given[key], lambda message: callback(key, parts, gate, message))
+
+    def _on_odometry(
+        self, key: str, parts: list[str], gate: float | None, message: Odometry
+    ) -> None:
+        pose, twist = message.pose, message.twist
+        place, speed = pose.pose.position, twist.twist
+        for names, values, covariance, limit in (
+            (('x', 'y', 'yaw'), (place.x, place.y, yaw_of(pose.pose.orientation)), pose, gate),
+            (('vx', 'vy', 'vyaw'), (speed.linear.x, speed.linear.y, speed.angular.z), twist, None),
+        ):
+            kept = [number for number, name in enumerate(names) if name in parts]
+            matrix = np.reshape(covariance.covariance, (6, 6))[ON_THE_FLOOR]
+            self._process(
+                key,
+                message,
+                [names[number] for number in kept],
+                [values[number] for number in kept],
+                matrix[np.ix_(kept, kept)],
+                limit,
+            )
+        if key == 'odom0' and self.ekf.t is not None:
+            self._publish()
+
+    def _on_imu(self, key: str, parts: list[str], gate: float | None, message: Imu) -> None:
+        turn = self._yaw_in_base(message.header.frame_id)
+        if turn is None:
+            return
+        felt = message.linear_acceleration
+        ax = math.cos(turn) * felt.x - math.sin(turn) * felt.y
+        ay = math.sin(turn) * felt.x + math.cos(turn) * felt.y
+        acceleration = message.linear_acceleration_covariance
+        for name, value, covariance, place in (
+            ('yaw', yaw_of(message.orientation) - turn, message.orientation_covariance, 8),
+            ('vyaw', message.angular_velocity.z, message.angular_velocity_covariance, 8),
+            ('ax', ax, acceleration, 0),
+            ('ay', ay, acceleration, 4),
+        ):
+            if name in parts and covariance[0] >= 0:
+                self._process(key, message, [name], [value], [covariance[place]], gate)
+
+    def _process(self, key, message, names, values, covariance, gate) -> None:
+        if names:
+            t = seconds_of(message.header.stamp)
+            innovation = self.ekf.process(t, names, values, covariance, gate)
+            if innovation is None or innovation.accepted:
+                self.used[key] += 1
+                self.first_used_s.setdefault(key, t)
+            else:
+                self.kept_out[key].append(t)
+
+    def _yaw_in_base(self, frame: str) -> float | None:
+        """Return by how much a frame is turned in the robot's, or None if nobody says so."""
+        ways = []
+        for end in (frame, self.base):
+            yaw, way = 0.0, {end: 0.0}
+            while end in self._parents:
+                end, turn = self._parents[end]
+                yaw += turn
+                way[end] = yaw
+            ways.append(way)
+        common = [end for end in ways[0] if end in ways[1]]
+        return ways[0][common[0]] - ways[1][common[0]] if common else None
+
+    def _on_static(self, message) -> None:
+        for one in message.transforms:
+            yaw = yaw_of(one.transform.rotation)
+            self._parents[one.child_frame_id] = one.header.frame_id, yaw
+
+    def _on_tf(self, message) -> None:
+        for one in message.transforms:
+            if (one.header.frame_id, one.child_frame_id) == ('odom', self.base):
+                place = one.transform.translation
+                self._in_odom = place.x, place.y, yaw_of(one.transform.rotation)
+
+    def _publish(self) -> None:
+        ekf = self.ekf
+        covariance = ekf.covariance
+        self._odometry.publish(
+            odometry_message(ekf.t, self.world, ekf.state, covariance[:3, :3], covariance[3:6, 3:6])
+        )
+        x, y, yaw = map(float, ekf.state[:3])
+        child = self.base
+        if self.world == 'map':  # base_footprint has a parent already: say where odom is
+            far, left, turn = self._in_odom
+            child, yaw = 'odom', yaw - turn
+            x -= math.cos(yaw) * far - math.sin(yaw) * left
+            y -= math.sin(yaw) * far + math.cos(yaw) * left
+        made = TransformStamped(child_frame_id=child)
+        made.header.stamp, made.header.frame_id = stamp_of(ekf.t), self.world
+        made.transform.translation.x, made.transform.translation.y = x, y
+        made.transform.rotation = quaternion(0, 0, yaw)
+        self._tf.publish(self._tf.msg_type(transforms=[made]))
+
+
+class NavSatNode(_Configured):
+    """The node that turns each fix into a position in `map`, on `odometry/gps`, from `datum`."""
+
+    def __init__(self, name: str, *files: str | os.PathLike) -> None:
+        super().__init__(name, *files)
+        degrees_north, degrees_east, _ = self.given['datum']
+        self.datum = degrees_north, degrees_east, 0.0
+        self.publisher = self.create_publisher(Odometry, 'odometry/gps', DEPTH)
+        self.hear(NavSatFix, 'gps/fix', self._on_fix)
+
+    def _on_fix(self, fix: NavSatFix) -> None:
+        if fix.status.status < NavSatStatus.STATUS_FIX:
+            return
+        place = fix.latitude, fix.longitude, fix.altitude
+        east, north, _ = pymap3d.geodetic2enu(*place, *self.datum)
+        covariance = np.eye(3)
+        covariance[:2, :2] = np.reshape(fix.position_covariance, (3, 3))[:2, :2]
+        state = east, north, 0.0, 0.0, 0.0, 0.0
+        message = odometry_message(0.0, 'map', state, covariance, np.eye(3))
+        message.header.stamp = fix.header.stamp
+        self.publisher.publish(message)
+
+
+class SensorLog(Node):
+    """A node that keeps what the sensors of the robot say, and what a filter makes of it."""
+
+    def __init__(self) -> None:
+        super().__init__('sensor_log')
+        self.sensors: list = []
+        self.estimates: list[Odometry] = []
+        for kind, topic in ((Odometry, 'odom'), (Imu, 'imu/data'), (NavSatFix, 'gps/fix')):
+            self.create_subscription(kind, topic, self.sensors.append, DEPTH)
+        self.create_subscription(Odometry, 'odometry/filtered', self.estimates.append, DEPTH)
+
+    def table(self, from_imu: Callable, from_fix: Callable) -> pd.DataFrame:
+        """Return what `fuse` reads, as these functions and `from_odometry` read the messages."""
+        readers = {
+            Odometry: (from_odometry, {}),
+            Imu: (from_imu, {'yaw': 'imu_yaw', 'vyaw': 'imu_vyaw'}),
+            NavSatFix: (from_fix, {'x': 'gps_x', 'y': 'gps_y'}),
+        }
+        rows: dict[float, dict[str, float]] = {}
+        for message in self.sensors:
+            read, columns = readers[type(message)]
+            row = rows.setdefault(seconds_of(message.header.stamp), {})
+            for names, values, _ in read(message):
+                row |= {columns.get(n, n): value for n, value in zip(names, values, strict=True)}
+        table = pd.DataFrame.from_dict(rows, orient='index').sort_index()
+        return table.rename_axis('t').reset_index()
+
+
+class Localized(NamedTuple):
+    """A drive past filters: by their names, what `EkfNode` knows of itself; and what is true.
+
+    `estimates` are tables as `table_of` makes them, `truth` has `t` (s), x, y (m) and yaw (rad).
+    `frames` has the columns of `plots.frame_tree`; as publisher it has the topic.
+    """
+
+    estimates: dict[str, pd.DataFrame]
+    truth: pd.DataFrame
+    frames: pd.DataFrame
+    parts: dict[str, dict[str, list[str]]]
+    used: dict[str, dict[str, int]]
+    first_used_s: dict[str, dict[str, float]]
+    kept_out: dict[str, dict[str, list[float]]]
+    initial: dict[str, dict[str, float]]
+
+
+def localize(
+    files: Sequence[str | os.PathLike],
+    make_broadcaster: Callable[[], Node],
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    seconds: float = 25.0,
+    mounting: Mapping[str, float] | None = None,
+) -> Localized:
+    """Let a robot drive past `ekf_odom`, `ekf_map` and `navsat_transform`, in sim time.
+
+    `files` have their parameters, and the node of `make_broadcaster()` publishes /tf_static.
+    """
+    from tf2_msgs.msg import TFMessage
+
+    from helpers.robot import EMPTY, Pose, Robot
+
+    heard: dict[str, list] = {'ekf_odom': [], 'ekf_map': []}
+    frames: dict[str, tuple[str, str, str]] = {}
+
+    def note(topic: str) -> Callable:
+        return lambda message: frames.update(
+            (one.child_frame_id, (one.header.frame_id, one.child_frame_id, topic))
+            for one in message.transforms
+        )
+
+    with ros_session():
+        robot = Robot(EMPTY, start=Pose(*start), seed=1, sim_time=True, mounting=mounting)
+        filters = [EkfNode(name, *files) for name in heard]
+        listener, executor = Node('listener'), SingleThreadedExecutor()
+        for node in (
+            *filters,
+            NavSatNode('navsat_transform', *files),
+            make_broadcaster(),
+            listener,
+        ):
+            executor.add_node(node)
+        latched = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        listener.create_subscription(TFMessage, '/tf_static', note('/tf_static'), latched)
+        listener.create_subscription(TFMessage, '/tf', note('/tf'), DEPTH)
+        for name, messages in heard.items():
+            listener.create_subscription(Odometry, f'{name}/odometry', messages.append, DEPTH)
+        trip(robot, executor, seconds=seconds)
+    of_filters = [
+        {of: getattr(node, name) for of, node in zip(heard, filters, strict=True)}
+        for name in Localized._fields[3:]
+    ]
+    return Localized(
+        {name: table_of(messages) for name, messages in heard.items()},
+        robot.record.table('poses').rename(columns={'t_s': 't'}),
+        pd.DataFrame(list(frames.values()), columns=['parent', 'child', 'publisher']),
+        *of_filters,
+    )
+
+
+def trip(robot: Robot, *executors, seconds: float = 60.0) -> None:
+    """Drive a robot in sim time as `simulate` does: to and fro, to the left and to the right."""
+    for tenth in range(round(seconds * 10)):
+        t = tenth / 10
+        v = 0.5 * min(t, 2) + 0.75 * (math.sin(0.4 * t) - math.sin(0.8)) * (t > 2)
+        robot.command(v, 0.05 + 0.3 * math.sin(0.2 * t))
+        robot.run(0.1, *executors)

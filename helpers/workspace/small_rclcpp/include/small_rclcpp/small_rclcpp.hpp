@@ -1,0 +1,218 @@
+// A very small rclcpp for the lessons: nodes with publishers and subscriptions, over the same rcl.
+// What is here has the names and the arguments of rclcpp in Jazzy. What is not here: all the rest.
+#pragma once
+
+#include <csignal>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <rcl/error_handling.h>
+#include <rcl/rcl.h>
+#include <rosidl_typesupport_cpp/message_type_support.hpp>
+
+namespace small_rclcpp
+{
+
+// Functions of rcl return a number. Throws for any but "all is well".
+inline void check(rcl_ret_t result)
+{
+  if (result != RCL_RET_OK) {
+    const std::string error = rcl_get_error_string().str;
+    rcl_reset_error();
+    throw std::runtime_error(error);
+  }
+}
+
+inline rcl_context_t context = rcl_get_zero_initialized_context();
+inline volatile std::sig_atomic_t interrupted = 0;
+
+inline void init(int argc, char ** argv)
+{
+  auto options = rcl_get_zero_initialized_init_options();
+  check(rcl_init_options_init(&options, rcl_get_default_allocator()));
+  check(rcl_init(argc, argv, &options, &context));
+  check(rcl_init_options_fini(&options));
+  std::signal(SIGINT, [](int) {interrupted = 1;});
+  std::signal(SIGTERM, [](int) {interrupted = 1;});
+}
+
+inline bool ok() {return interrupted == 0;}
+
+inline void shutdown()
+{
+  check(rcl_shutdown(&context));
+  check(rcl_context_fini(&context));
+}
+
+// The rcl_node_t ends when nobody holds it any more: the node, its publishers, its subscriptions.
+using Handle = std::shared_ptr<rcl_node_t>;
+
+template<class Message>
+class Publisher
+{
+public:
+  using SharedPtr = std::shared_ptr<Publisher<Message>>;
+
+  Publisher(const Handle & node, const std::string & topic, std::size_t depth)
+  : node_(node)
+  {
+    auto options = rcl_publisher_get_default_options();  // RELIABLE, KEEP_LAST
+    options.qos.depth = depth;
+    const auto * type = rosidl_typesupport_cpp::get_message_type_support_handle<Message>();
+    check(rcl_publisher_init(&publisher_, node_.get(), type, topic.c_str(), &options));
+  }
+
+  ~Publisher()
+  {
+    if (rcl_publisher_fini(&publisher_, node_.get()) != RCL_RET_OK) {rcl_reset_error();}
+  }
+
+  void publish(const Message & message) {check(rcl_publish(&publisher_, &message, nullptr));}
+
+private:
+  Handle node_;
+  rcl_publisher_t publisher_ = rcl_get_zero_initialized_publisher();
+};
+
+// A subscription of any type: what an executor needs of it.
+class SubscriptionBase
+{
+public:
+  using SharedPtr = std::shared_ptr<SubscriptionBase>;
+
+  explicit SubscriptionBase(const Handle & node)
+  : node_(node) {}
+
+  virtual ~SubscriptionBase()
+  {
+    if (rcl_subscription_fini(&subscription_, node_.get()) != RCL_RET_OK) {rcl_reset_error();}
+  }
+
+  // Returns an empty message.
+  virtual std::shared_ptr<void> create_message() = 0;
+  // Calls the callback with a message.
+  virtual void handle_message(std::shared_ptr<void> & message) = 0;
+
+  // Takes the oldest message out of the queue. Returns whether there was one.
+  bool take_type_erased(void * message)
+  {
+    const auto result = rcl_take(&subscription_, message, nullptr, nullptr);
+    if (result == RCL_RET_SUBSCRIPTION_TAKE_FAILED) {
+      rcl_reset_error();
+      return false;
+    }
+    check(result);
+    return true;
+  }
+
+protected:
+  friend class Node;
+  Handle node_;
+  rcl_subscription_t subscription_ = rcl_get_zero_initialized_subscription();
+};
+
+template<class Message>
+class Subscription : public SubscriptionBase
+{
+public:
+  using SharedPtr = std::shared_ptr<Subscription<Message>>;
+  using Callback = std::function<void (const Message &)>;
+
+  Subscription(
+    const Handle & node, const std::string & topic, std::size_t depth, Callback callback)
+  : SubscriptionBase(node), callback_(std::move(callback))
+  {
+    auto options = rcl_subscription_get_default_options();
+    options.qos.depth = depth;
+    const auto * type = rosidl_typesupport_cpp::get_message_type_support_handle<Message>();
+    check(rcl_subscription_init(&subscription_, node_.get(), type, topic.c_str(), &options));
+  }
+
+  std::shared_ptr<void> create_message() override {return std::make_shared<Message>();}
+
+  void handle_message(std::shared_ptr<void> & message) override
+  {
+    callback_(*static_cast<const Message *>(message.get()));
+  }
+
+private:
+  Callback callback_;
+};
+
+class Node
+{
+public:
+  using SharedPtr = std::shared_ptr<Node>;
+
+  explicit Node(const std::string & name)
+  : handle_(new rcl_node_t(rcl_get_zero_initialized_node()), [](rcl_node_t * node) {
+        if (rcl_node_fini(node) != RCL_RET_OK) {rcl_reset_error();}
+        delete node;
+      })
+  {
+    const auto options = rcl_node_get_default_options();
+    check(rcl_node_init(handle_.get(), name.c_str(), "", &context, &options));
+  }
+
+  virtual ~Node() = default;
+
+  template<class Message>
+  auto create_publisher(const std::string & topic, std::size_t depth)
+  {
+    return std::make_shared<Publisher<Message>>(handle_, topic, depth);
+  }
+
+  template<class Message>
+  auto create_subscription(
+    const std::string & topic, std::size_t depth, std::function<void (const Message &)> callback)
+  {
+    auto made = std::make_shared<Subscription<Message>>(handle_, topic, depth, callback);
+    subscriptions_.push_back(made);
+    return made;
+  }
+
+  // Waits until a subscription has a message, 0.1 s at most. Returns those that have one.
+  // (In rclcpp this is the work of a WaitSet.)
+  std::vector<SubscriptionBase::SharedPtr> wait()
+  {
+    auto wait_set = rcl_get_zero_initialized_wait_set();
+    const auto allocator = rcl_get_default_allocator();
+    check(rcl_wait_set_init(&wait_set, subscriptions_.size(), 0, 0, 0, 0, 0, &context, allocator));
+    for (const auto & subscription : subscriptions_) {
+      check(rcl_wait_set_add_subscription(&wait_set, &subscription->subscription_, nullptr));
+    }
+    const auto result = rcl_wait(&wait_set, RCL_MS_TO_NS(100));
+    std::vector<SubscriptionBase::SharedPtr> ready;
+    if (result == RCL_RET_TIMEOUT) {
+      rcl_reset_error();
+    } else {
+      check(result);
+      for (std::size_t i = 0; i < subscriptions_.size(); ++i) {
+        if (wait_set.subscriptions[i] != nullptr) {ready.push_back(subscriptions_[i]);}
+      }
+    }
+    check(rcl_wait_set_fini(&wait_set));
+    return ready;
+  }
+
+private:
+  Handle handle_;
+  std::vector<SubscriptionBase::SharedPtr> subscriptions_;
+};
+
+// Waits, takes, calls, until Ctrl+C.
+inline void spin(const Node::SharedPtr & node)
+{
+  while (ok()) {
+    for (const auto & subscription : node->wait()) {
+      auto message = subscription->create_message();
+      if (subscription->take_type_erased(message.get())) {subscription->handle_message(message);}
+    }
+  }
+}
+
+}  // namespace small_rclcpp

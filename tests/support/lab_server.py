@@ -1,0 +1,75 @@
+"""A JupyterLab that `make lab` or `make present` started, for one run of the tests.
+
+The notebooks are a copy, and JupyterLab's state is in a folder of the tests: nothing is written
+into the checkout but what lessons build in `scratch`.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+NOTEBOOKS = sorted((ROOT / 'notebooks').glob('*.ipynb'))
+START_LIMIT_S = 60
+
+
+class Server(NamedTuple):
+    """A running JupyterLab."""
+
+    address: str  # as printed
+    url: str
+    token: str
+    folder: Path
+
+
+@contextmanager
+def made(folder: Path, printed: str, *make: str) -> Iterator[tuple[subprocess.Popen, re.Match]]:
+    """Run a command of the Makefile beside the block, as a process group of its own.
+
+    It yields the process, and what it has printed by which one sees that it has started.
+    """
+    # Two workers start servers at the same moment, and would both find the first free port. The
+    # system gives each a port of its own.
+    command = ['make', *make, 'PORT=0', 'BROWSER=no', f'ROOT={folder}']
+    state = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR')
+    command += [f'{name}={folder / name}' for name in state]
+    log = folder / f'{make[0]}.log'
+    with log.open('w') as file:
+        process = subprocess.Popen(
+            # If this test is killed, the server is told, and ends its kernels.
+            ['setpriv', '--pdeathsig', 'TERM', *command],
+            cwd=ROOT,
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=file,
+            start_new_session=True,
+        )
+    try:
+        end = time.monotonic() + START_LIMIT_S
+        while not (found := re.search(printed, log.read_text())):
+            if process.poll() is not None or time.monotonic() > end:
+                raise RuntimeError(f'{make[0]} did not start:\n{log.read_text()}')
+            time.sleep(0.05)
+        yield process, found
+    finally:
+        if process.poll() is None:
+            os.killpg(process.pid, signal.SIGTERM)
+        process.wait(START_LIMIT_S)
+
+
+@contextmanager
+def server(folder: Path, *make: str) -> Iterator[Server]:
+    """Run a command of the Makefile that starts JupyterLab, on a copy of the notebooks."""
+    shutil.copytree(ROOT / 'notebooks', folder / 'notebooks', dirs_exist_ok=True)
+    exposed = 'LAB_ARGS=--LabApp.expose_app_in_browser=True'
+    with made(folder, r'(http://localhost:\d+/)\S+token=(\w+)\n', *make, exposed) as (_, found):
+        yield Server(found[0].strip(), *found.groups(), folder)
