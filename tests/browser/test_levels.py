@@ -1,11 +1,8 @@
 """Levels as they are played: by keys alone, on a phone, in JupyterLab."""
 
-import nbformat
-from lab_page import WIDER
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from support.lab_page import WIDER
 
 from helpers.replay.levels import level
-from tools.lessons.clean import NOTEBOOK_METADATA
 
 START = 'Choose what happens next'
 
@@ -33,31 +30,20 @@ def test_the_first_level_by_keys_alone(phone, artefacts):
     )
     assert items(root, 'queue') == ['1']
     page.keyboard.press('1')
-    # The same by Tab and Enter, and by the arrows.
+    # The same by the arrows and Enter.
     page.keyboard.press('ArrowRight')
     page.keyboard.press('Enter')
     assert items(root, 'queue') == ['2', '3']
     assert items(root, 'lost') == ['1']
-    page.keyboard.press('Enter')
-    assert items(root, 'threads') == ['the program: free']
-    page.keyboard.press('ArrowRight')
-    page.keyboard.press('Enter')
-    page.keyboard.press('1')
-    page.keyboard.press('1')
-    assert 'You: 2 lost. The best possible: 2 lost.' in says.inner_text()
-    assert 'no order saves them all' in says.inner_text()
     page.screenshot(path=artefacts / 'level_save.png')
-    # The focus is on what can be done next, and Escape leaves.
-    page.keyboard.press('Enter')
-    assert says.inner_text().startswith(START)
     page.keyboard.press('Escape')
     assert root.evaluate('root => !root.contains(document.activeElement)')
 
 
-def test_a_deadlock_lights_up_and_other_groups_end_it(phone, artefacts):
+def test_a_deadlock_lights_up(phone, artefacts):
     page = phone(level('save'), level('deadlock'))
     root = page.get_by_role('group', name='level').nth(1)
-    threads, groups = root.get_by_label('threads').first, root.locator('select').nth(1)
+    threads = root.get_by_label('threads').first
     threads.select_option('2')
     for key in '1111':
         root.focus()
@@ -69,12 +55,6 @@ def test_a_deadlock_lights_up_and_other_groups_end_it(phone, artefacts):
     assert root.locator('.replay-stuck').count() == 2
     assert 'MultiThreadedExecutor(num_threads=2)' in root.locator('pre').inner_text()
     page.screenshot(path=artefacts / 'level_deadlock.png', full_page=True)
-    groups.select_option('two groups')
-    for key in '11111':
-        root.focus()
-        page.keyboard.press(key)
-    assert 'You: the answer comes.' in says.inner_text()
-    assert root.locator('.replay-stuck').count() == 0
 
 
 def test_on_a_phone(phone):
@@ -84,23 +64,3 @@ def test_on_a_phone(phone):
         box = button.bounding_box()
         assert box['height'] >= 44
         assert box['width'] >= 44
-
-
-def test_in_jupyterlab(lab):
-    source = "from helpers.replay.levels import level\nlevel('save')"
-    cells = [new_markdown_cell('# 98 Play'), new_code_cell(source)]
-    path = lab.server.folder / 'notebooks' / '98_play.ipynb'
-    nbformat.write(new_notebook(cells=cells, metadata=NOTEBOOK_METADATA), path)
-    lab.open(path.name)
-    lab.run(1)
-    root = lab.page.locator('.level')
-    root.focus()
-    before = [(cell['cell_type'], cell['source']) for cell in lab.cells()]
-    for key in ['2', 'd', 'd', 'm', 'b', 'ArrowDown', 'Enter', '1']:
-        lab.page.keyboard.press(key)
-    assert [(cell['cell_type'], cell['source']) for cell in lab.cells()] == before
-    assert items(root, 'threads') == ['the program: picture 0']
-    assert items(root, 'queue') == ['1', '2']
-    lab.screenshot('level_lab')
-    lab.page.keyboard.press('Escape')
-    assert root.evaluate('root => !root.contains(document.activeElement)')

@@ -1,18 +1,16 @@
 """The web site, opened from its folder without a network. `make test-browser` has written it."""
 
-import gzip
 import re
 from html.parser import HTMLParser
 from urllib.parse import unquote, urlparse
 
 import pytest
-from lab_page import AXE, WIDER
-from lab_server import ROOT
+from support.lab_page import WIDER
+from support.lab_server import ROOT
 
 SITE = ROOT / 'site'
 PAGES = sorted(path.relative_to(SITE).as_posix() for path in SITE.rglob('*.html'))
 LESSONS = [name for name in PAGES if re.match(r'notebooks/\d\d_', name)]
-MEGABYTE = 1_000_000
 FOUND = "[...document.querySelectorAll('#search-results li a')].map(link => link.href)"
 SERIOUS = """async () => (await axe.run()).violations
     .filter(found => ['serious', 'critical'].includes(found.impact))
@@ -75,20 +73,6 @@ def test_nothing_is_loaded_from_elsewhere(pages):
     assert [link for page in pages.values() for link in page.loaded if urlparse(link).netloc] == []
 
 
-def test_it_is_small():
-    assert sum(path.stat().st_size for path in SITE.rglob('*')) <= 15 * MEGABYTE
-
-
-@pytest.mark.parametrize('name', ['index.html', *LESSONS])
-def test_the_text_is_there_in_a_second_on_a_slow_line(pages, name):
-    # 1.6 Mbit/s is 200 kB a second, and half of it is left for the ways there and back. A web
-    # server packs what it sends. Figures and the Urdu font come after the text.
-    links = [link for link in pages[name].loaded if re.search(r'\.(css|js)(\?|$)', link)]
-    paths = ((SITE / name).parent / urlparse(link).path for link in links)
-    sent = [gzip.compress(path.read_bytes()) for path in (SITE / name, *paths)]
-    assert sum(map(len, sent)) <= 0.1 * MEGABYTE
-
-
 def test_a_lesson_is_downloaded_as_it_is(pages):
     lessons = sorted((ROOT / 'notebooks').glob('*.ipynb'))
     assert [f'notebooks/{path.stem}.html' for path in lessons] == LESSONS
@@ -99,22 +83,35 @@ def test_a_lesson_is_downloaded_as_it_is(pages):
 
 @on_screens
 @pytest.mark.parametrize('name', ['index.html', *LESSONS, 'teaching.html'])
-def test_a_page_fits_its_screen(tab, artefacts, name):
+def test_a_page_fits_its_screen(tab, artefacts, axe, name):
     tab.goto((SITE / name).as_uri())
     assert not tab.evaluate(WIDER)
     assert tab.evaluate("[...document.images].every(image => image.alt || image.closest('a'))")
-    tab.add_script_tag(path=AXE)
+    tab.add_script_tag(path=axe)
     assert tab.evaluate(SERIOUS) == []
     tab.screenshot(
         path=artefacts / f'site_{name.replace("/", "_")}_{tab.viewport_size["width"]}.png'
     )
 
 
-@on_screens
-def test_search_finds_a_term_in_each_language(file_page, width, scheme):
+def test_search_finds_a_term_in_each_language(file_page):
     # It also wants a piece of each page that it finds, which a browser does not read from a file.
-    with file_page(width, 740, expected=('Failed to fetch',), color_scheme=scheme) as tab:
+    with file_page(1280, 740, expected=('Failed to fetch',)) as tab:
         for word in WORDS:
             tab.goto(f'{(SITE / "search.html").as_uri()}?q={word}')
             tab.wait_for_function(f'{FOUND}.length > 0')
             assert any('/notebooks/' in link for link in tab.evaluate(FOUND)), word
+
+
+def test_paper_has_the_text_and_nothing_else(file_page, artefacts):
+    with file_page(794, 1123) as tab:  # A4
+        tab.goto((SITE / LESSONS[2]).as_uri())
+        tab.emulate_media(media='print')
+        for part in ('.sidebar-drawer', '.toc-drawer', '.related-pages', '.lesson-file'):
+            assert not tab.locator(part).first.is_visible()
+        assert tab.locator('h1').first.is_visible()
+        wide = (
+            "[...document.querySelectorAll('pre')].filter(p => p.scrollWidth > p.clientWidth + 1)"
+        )
+        assert tab.evaluate(f'{wide}.map(part => part.innerText.slice(0, 80))') == []
+        tab.screenshot(path=artefacts / 'site_print.png')

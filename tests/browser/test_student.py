@@ -4,7 +4,7 @@ That each lesson runs is what nbval checks, with the same kernel, and `make note
 else reaches JupyterLab. Here is what only a browser shows.
 """
 
-from lab_page import PANEL, complaints
+from support.lab_page import PANEL, complaints
 
 WITH_A_SLIDER = '04_choose_the_number_of_threads.ipynb'
 
@@ -40,7 +40,7 @@ def test_run_all_and_move_a_slider(lab):
 
 def test_interrupt_an_experiment_and_run_it_again(lab):
     lab.open('02_lose_messages.ipynb')
-    experiment = lab.find('def run(')
+    experiment = lab.find('as first_session')
     for index in range(experiment):
         if lab.cells()[index]['cell_type'] == 'code':
             lab.run(index)

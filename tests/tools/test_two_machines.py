@@ -70,7 +70,7 @@ def heard_by(listener: subprocess.Popen) -> list[str]:
     return listener.stdout.readline().split()
 
 
-def test_discovery_range_and_open_ports_that_two_machines_need(machines):
+def test_range_and_ports_that_two_machines_need(machines):
     one, two = machines
     first, *_, last = sorted(PORTS)
     rule = f'udp dport {first}-{last} accept'

@@ -13,6 +13,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
+from helpers._plumbing.fresh import AS_SAVED, MARK
 from tools.lessons.slides import slide_types
 
 NOTEBOOK_METADATA = {
@@ -22,6 +23,7 @@ NOTEBOOK_METADATA = {
         'name': 'python3',
     },
     'language_info': {'name': 'python'},
+    MARK: AS_SAVED,
 }
 WIDGET = 'application/vnd.jupyter.widget-view+json'
 OVERWRITTEN = re.compile(r'^.*\r(?=[^\n])', re.MULTILINE)
@@ -83,7 +85,7 @@ def text_of(notebook: NotebookNode) -> str:
 
 
 def write(path: Path, after: str, before: str = '') -> bool:
-    """Write a file, at once or not at all; return True where that changed it."""
+    """Write a file, at once or not at all; return whether that changed it."""
     if after == before:
         return False
     unfinished = path.with_suffix('.tmp')

@@ -8,15 +8,12 @@ where the lesson belongs:
     For the instructor: the lesson in a class
 
     Part: nodes
-    Timetables: 90 minutes (steps 1 to 5), half a day
-    When time runs out, leave out: step 8, exercise 2
+    When time runs out, leave out: step 8, task 2
 """
 
 import re
-from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil
 from pathlib import Path
 
 import nbformat
@@ -26,14 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / 'notebooks'
 START, GLOSSARY = '00', '99'  # the notebooks that are no lessons
 PARTS = ('nodes', 'packages', 'robot')
-WORDS_A_MINUTE = 110  # of text that asks something
-MINUTES_A_RUN = 3  # to run an exercise, and to read what its check says
-LANGUAGES = {'fr': 'French', 'ur': 'Urdu', 'vi': 'Vietnamese'}  # of the summaries, beside English
 NOTE = 'For the instructor'
-FOLDED = re.compile(
-    r'<details lang="(?P<lang>\w+)"(?P<rtl> dir="rtl")?>\n'
-    r'<summary>[^<]+</summary>\n(?P<text>[^\n]+)\n</details>'
-)
 
 
 @dataclass(frozen=True)
@@ -82,19 +72,6 @@ class Lesson:
         return self._find(rf'^Part: ({"|".join(PARTS)})$', self._class_note, line)[1]
 
     @property
-    def timetables(self) -> dict[str, tuple[int, int] | None]:
-        """The timetables with this lesson, and its first and last step there; None for all."""
-        found = {}
-        line = re.search(r'^Timetables: (.+)$', self._class_note, re.MULTILINE)
-        for entry in line[1].split(', ') if line else []:
-            form = r'^([^()]+?)(?: \(steps? (\d+)(?: to (\d+))?\))?$'
-            name, first, last = self._find(
-                form, entry, 'timetable such as `half a day (steps 1 to 3)` in its first note'
-            ).groups()
-            found[name] = (int(first), int(last or first)) if first else None
-        return found
-
-    @property
     def leave_out(self) -> str:
         """What a class leaves out first when time runs out; empty where nothing is named."""
         found = re.search(r'^When time runs out, leave out: (.+)$', self._class_note, re.MULTILINE)
@@ -106,23 +83,14 @@ class Lesson:
         return f'[{self.number} {self.title}]({self.file})'
 
     @property
-    def summaries(self) -> dict[str, str]:
-        """The texts of the cell after the opening by their languages, `en` among them."""
-        source = self.notebook.cells[1].source if len(self.notebook.cells) > 1 else ''
-        english = re.match(r'\*\*In short\*\*: ([^\n]+)', source)
-        return ({'en': english[1]} if english else {}) | {
-            found['lang']: found['text'] for found in FOLDED.finditer(source)
-        }
-
-    @property
-    def exercises(self) -> list[str]:
-        """The headings such as `Exercise 1: Two robots`, in their order."""
+    def tasks(self) -> list[str]:
+        """The headings such as `Task 1: Two robots`, in their order."""
         text = '\n'.join(c.source for c in self.notebook.cells if c.cell_type == 'markdown')
-        return re.findall(r'^### (Exercise \d.*)', text, re.MULTILINE)
+        return re.findall(r'^### (?:✎ )?((?:Task|Exercise) \d.*)', text, re.MULTILINE)
 
     @cached_property
     def minutes_by_step(self) -> dict[str, int]:
-        """The minutes of the instructor's notes: `1`, `2`, ..., `Exercises` to their sum."""
+        """The minutes of the instructor's notes: `1`, `2`, ... to their sum."""
         found: dict[str, int] = {}
         step = ''
         for cell in self.notebook.cells:
@@ -131,34 +99,6 @@ class Lesson:
             if minutes := minutes_of_note(cell.source):
                 found[step] = found.get(step, 0) + minutes
         return found
-
-    @cached_property
-    def minutes_alone(self) -> dict[str, int]:
-        """The minutes of `Exercise 1`, ..., `Recap` and `Quiz` for one who works alone.
-
-        They are computed, not measured: the words, and for an exercise MINUTES_A_RUN and a minute
-        for each line of its solution that its starter does not have.
-        """
-        words: Counter[str] = Counter()
-        work: Counter[str] = Counter()
-        part, given = '', set()
-        for cell in self.notebook.cells:
-            new = {line.strip() for line in cell.source.splitlines()} - given - {''}
-            if cell.cell_type == 'markdown':
-                headings = re.findall(r'^###? (Exercise \d+|\w+)', cell.source, re.MULTILINE)
-                part = next((one for one in reversed(headings) if one != 'Question'), part)
-                words[part] += len(re.sub(r'<[^>]+>', ' ', cell.source).split())
-            elif 'exercise' in tags(cell):
-                given |= new
-            elif 'solution' in tags(cell):
-                work[part] += sum(not line.startswith(('#', 'check_')) for line in new)
-            if part.startswith('Exercise ') and part not in work:
-                work[part] = MINUTES_A_RUN
-        return {
-            name: ceil(words[name] / WORDS_A_MINUTE) + work[name]
-            for name in words
-            if name in work or name in ('Recap', 'Quiz')
-        }
 
     def minutes_of(self, steps: tuple[int, int] | None) -> int:
         """Return the minutes of some steps, the first and the last one, or of the whole lesson."""
@@ -200,7 +140,7 @@ def first_heading(text: str) -> str:
 
 
 def read(text: str, file: str) -> Lesson:
-    """Return the lesson of a notebook's text. Raises ValueError where it is no notebook."""
+    """Return the lesson of a notebook's text. Raises ValueError if it is none."""
     try:
         return Lesson(file, nbformat.reads(text, as_version=4))
     except (nbformat.reader.NotJSONError, nbformat.ValidationError, AttributeError) as error:
@@ -220,7 +160,7 @@ def lessons(folder: Path = FOLDER) -> list[Lesson]:
 def chosen(numbers: str, folder: Path = FOLDER) -> list[Path]:
     """Return the notebooks with these numbers, such as '02 03'; all of them for an empty text.
 
-    Raises ValueError where a number is not that of exactly one notebook.
+    Raises ValueError if a number is not that of exactly one notebook.
     """
     known = paths(folder)
     if not known:

@@ -9,7 +9,7 @@ would make smaller diffs, but it would also hide a change in `helpers`, and it c
 the text beside it. To keep a diff small, run only the lessons that you changed.
 
 Before that, the tables and links of tools/lessons/tables.py are written, and all notebooks cleaned.
-Notebook 00, which shows the table of exercises, is run as well where that has changed.
+Notebook 00, which shows the table of exercises, is run as well if that has changed.
 """
 
 import logging
@@ -34,11 +34,8 @@ from helpers.progress import FILE_VARIABLE
 from tools.lessons import tables
 from tools.lessons.clean import clean, text_of, write
 from tools.lessons.lesson import ROOT, START, chosen
-from tools.lessons.slides import png_of
 
 CELL_TIMEOUT_S = 100
-# README.md shows these: the id of a cell, and the file for its picture.
-PICTURES = {'lost-before-none-after': 'images/lost_before_none_after.png'}
 
 
 class _ThisInterpreter(KernelSpecManager):
@@ -51,7 +48,7 @@ class _ThisInterpreter(KernelSpecManager):
 def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     """Return a copy of a notebook, executed in `folder` by a fresh kernel, and cleaned.
 
-    Raises RuntimeError with one sentence where a cell fails, takes longer than CELL_TIMEOUT_S,
+    Raises RuntimeError with one sentence if a cell fails, takes longer than CELL_TIMEOUT_S,
     ends the kernel, or writes to stderr at C level: a reader sees that, and no output holds it.
     """
     notebook = deepcopy(notebook)
@@ -116,30 +113,16 @@ def _client(notebook: NotebookNode, folder: Path, **hooks: Callable) -> Notebook
     return client
 
 
-def pictures(notebook: NotebookNode) -> dict[str, bytes]:
-    """Return the PNG files of `PICTURES` that come from this notebook, by their name."""
-    return {
-        PICTURES[cell.id]: png
-        for cell in notebook.cells
-        if cell.get('id') in PICTURES
-        for output in cell.outputs
-        if (png := png_of(output))
-    }
-
-
 def update(path: Path) -> bool:
-    """Execute and clean a notebook's file in place; return True where that changed the file.
+    """Execute and clean a notebook's file in place; return whether that changed it.
 
-    Raises RuntimeError as `execute` does, and the file is as it was before; ValueError where it was
+    Raises RuntimeError as `execute` does, and the file is as it was before; ValueError if it was
     saved meanwhile, and the file is as it was saved.
     """
     before = path.read_text(encoding='utf-8')
     notebook = execute(nbformat.reads(before, as_version=4), path.parent)
     if path.read_text(encoding='utf-8') != before:
         raise ValueError(f'{path.name} was changed while it ran: save it, then run it again.')
-    for name, picture in pictures(notebook).items():
-        (path.parent / name).parent.mkdir(exist_ok=True)
-        (path.parent / name).write_bytes(picture)
     return write(path, text_of(notebook), before)
 
 
@@ -166,8 +149,6 @@ def main(arguments: list[str], root: Path = ROOT) -> int:
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1
-    for sentence in tables.missing_translations(lessons):
-        print(sentence)
     return 0
 
 

@@ -2,15 +2,14 @@
 
 A title and a step (`#`, `##`) start a slide. What follows is revealed on it, cell by cell, as long
 as it fits: `fragment`. A part (`###`), a solution, and what no longer fits start a slide below it:
-`subslide`. A cell stays together with the text that leads to it, where a slide has room for both,
+`subslide`. A cell stays together with the text that leads to it, if a slide has room for both,
 and `### Explain` with what it explains.
 
-Where the rule is wrong for a cell, a tag of the cell (JupyterLab, Property Inspector) changes it:
+If the rule is wrong for a cell, a tag of the cell (JupyterLab, Property Inspector) changes it:
 
     deck-break      starts a slide below, although it would fit
     deck-skip       is left out of the deck
-    notes           is for the instructor: a raw cell, folded in JupyterLab, left out of the live
-                    deck, and speaker notes in the exported one
+    notes           is for the instructor: a raw cell, folded in JupyterLab, left out of the deck
 
 jupyterlab-slideshow has traps: it hides a cell of the type `-`, and from one of the type `notes`,
 where Shift+Enter can lead, no key leads on. So no cell gets these types.
@@ -41,7 +40,7 @@ MARKUP = re.compile(r'<[^>]+>|\]\([^)]*\)|[*`\[]')
 CODE = {8: 62.0, 18: 38.0, 999: 28.0}  # lines of code at most: the height of a figure
 LETTER = 2.78  # of code
 CODE_LINE, CODE_CHARACTER = 1.2, 0.61  # times the size of a letter
-REPLAY = 80.0  # about; the live deck scrolls to the end of a higher one
+REPLAY = 80.0  # about; the deck scrolls to the end of a higher one
 PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 
 
@@ -82,7 +81,7 @@ def _slide_type(cell: NotebookNode, first: bool, fits: bool) -> str:
 
 
 def heading(cell: NotebookNode, form: str) -> bool:
-    """Say whether a cell of text begins with a heading of this form, a regular expression."""
+    """Return whether a cell of text begins with a heading of this form, a regular expression."""
     return cell.cell_type == 'markdown' and bool(re.match(form, cell.source))
 
 
@@ -105,10 +104,10 @@ def height(cell: NotebookNode) -> float:
 
 
 def folded(cell: NotebookNode) -> bool:
-    """Return whether a slide shows only the outputs of a cell: a check, imports, what is folded."""
+    """Return whether a slide shows of a cell only the first line and the outputs."""
     if cell.cell_type != 'code':
         return False
-    if 'check' in tags(cell) or cell.metadata.get('jupyter', {}).get('source_hidden'):
+    if tags(cell) & {'check', 'harness'} or cell.metadata.get('jupyter', {}).get('source_hidden'):
         return True
     try:
         statements = ast.parse(cell.source).body
@@ -133,7 +132,7 @@ def _height_of_prose(block: str) -> float:
 
 
 def png_of(output: NotebookNode) -> bytes | None:
-    """Return the PNG file of an output that is a figure, as `helpers.alt_text` shows one."""
+    """Return the PNG file of an output that is a figure of `helpers._plumbing.alt_text`."""
     found = PICTURE.search(output.get('data', {}).get('text/html', ''))
     return b64decode(found[1]) if found else None
 

@@ -5,10 +5,10 @@ README.md and teaching.md and the notebook 00 hold tables between two marks:
     <!-- made by `make notebooks`: map of nodes -->
     <!-- end -->
 
-Each lesson ends with a link to the next one. In a timetable, the rows of the lessons are made; what
-else stands there (a break, questions) is kept after the lesson after which it stood, with its own
-minutes. The functions take and return texts by their path in the checkout, so that nothing is
-written before all of it is right.
+Each lesson ends with a link to the next one. Of a timetable, whoever writes it gives the rows: what
+happens, and the minutes if it is no lesson. The times, and the minutes and titles of lessons, are
+made. The functions take and return texts by their path in the checkout, so that nothing is written
+before all of it is right.
 """
 
 import re
@@ -17,12 +17,14 @@ from pathlib import Path
 
 from helpers import progress
 from tools.lessons.clean import clean, text_of
-from tools.lessons.lesson import GLOSSARY, LANGUAGES, PARTS, ROOT, START, Lesson, paths, read
+from tools.lessons.lesson import GLOSSARY, PARTS, ROOT, START, Lesson, paths, read
 
 Texts = dict[str, str]  # by the path in the checkout, such as notebooks/02_lose_messages.ipynb
 DOCUMENTS = ('README.md', 'teaching.md')
 COMMAND = f'make notebooks LESSON={START}'
 BLOCK = re.compile(r'(<!-- made by `make notebooks`: (.+?) -->\n\n)((?:\|.*\n)*)\n?<!-- end -->')
+ROW = re.compile(r'^\|[^|]*\| *(\d*) *\| (.+) \|$(?<!End \|)', re.MULTILINE)
+LINK = re.compile(r'\[([^]]*)\]\((\S+)\)(?:, steps? (\d+)(?: to (\d+))?)?$')
 NEXT = re.compile(r'\n*^Next: \[.*\]\(\S+\.ipynb\)$', re.MULTILINE)
 
 
@@ -44,10 +46,9 @@ def lessons_of(texts: Texts) -> list[Lesson]:
 def made(texts: Texts) -> Texts:
     """Return the texts that differ from what the notebooks say, as they should be.
 
-    Raises ValueError with one sentence where a notebook does not say what a table needs.
+    Raises ValueError with one sentence if a notebook does not say what a table needs.
     """
     lessons = lessons_of(texts)
-    _check_timetables(lessons, texts)
     should = {name: _with_tables(texts[name], lessons) for name in DOCUMENTS if name in texts}
     for lesson, following in zip(lessons, [*lessons[1:], None], strict=True):
         for cell in lesson.notebook.cells:
@@ -59,21 +60,9 @@ def made(texts: Texts) -> Texts:
     return {path: text for path, text in should.items() if text != texts[path]}
 
 
-def _check_timetables(lessons: list[Lesson], texts: Texts) -> None:
-    documents = '\n'.join(texts.get(name, '') for name in DOCUMENTS)
-    blocks = [what.partition(' of ') for _, what, _ in BLOCK.findall(documents)]
-    known = [name for kind, _, name in blocks if kind == 'timetable']
-    for lesson in lessons if known else []:
-        if unknown := [name for name in lesson.timetables if name not in known]:
-            raise ValueError(
-                f'{lesson.file}: there is no timetable {unknown[0]!r}. '
-                f'Give some of {", ".join(known)}.'
-            )
-
-
 def needs_run(lessons: list[Lesson]) -> bool:
-    """Say whether the saved table of exercises in notebook 00 is not that of these lessons."""
-    table = progress.table(with_exercises(lessons))
+    """Return whether the saved table of tasks in notebook 00 is not that of these lessons."""
+    table = progress.table(with_tasks(lessons))
     start = [lesson for lesson in lessons if lesson.number == START]
     return any(
         'progress.show()' in cell.source
@@ -84,21 +73,12 @@ def needs_run(lessons: list[Lesson]) -> bool:
     )
 
 
-def with_exercises(lessons: list[Lesson]) -> list[progress.Lesson]:
-    """Return the notebooks that have exercises, as `helpers.progress` knows them."""
+def with_tasks(lessons: list[Lesson]) -> list[progress.Tasks]:
+    """Return the notebooks that have tasks, as `helpers.progress` knows them."""
     return [
-        progress.Lesson(one.number, one.name, one.title, len(one.exercises))
+        progress.Tasks(one.number, one.name, one.title, len(one.tasks))
         for one in lessons
-        if one.exercises
-    ]
-
-
-def missing_translations(lessons: list[Lesson]) -> list[str]:
-    """Return a sentence for each lesson whose summary lacks a language."""
-    return [
-        f'{lesson.file}: its summary is not yet in {", ".join(missing)}.'
-        for lesson in lessons
-        if (missing := [name for key, name in LANGUAGES.items() if key not in lesson.summaries])
+        if one.tasks
     ]
 
 
@@ -157,44 +137,29 @@ def _leave_out(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
     return [['lesson', ''], *rows]
 
 
-def _alone(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
-    parts = sorted({part for one in lessons if one.is_lesson for part in one.minutes_alone})
-    rows = [
-        [one.number, *(str(one.minutes_alone.get(part, '')) for part in parts)]
-        for one in lessons
-        if one.is_lesson
-    ]
-    return [['lesson', *(part.lower() for part in parts)], *rows]
-
-
-def _timetable(name: str, old: str, lessons: list[Lesson]) -> list[list[str]]:
-    others: dict[str, list[tuple[str, int]]] = {}  # by the number of the lesson before, or ''
-    before = ''
-    for minutes, what in re.findall(r'^\| \d+:\d\d \| (\d+) \| (.+) \|$', old, re.MULTILINE):
-        if lesson := re.match(r'Lesson (\d\d)', what):
-            before = lesson[1]
-        else:
-            others.setdefault(before, []).append((what, int(minutes)))
-    rows = {one.number: _row(one, name) for one in lessons if name in one.timetables}
+def _timetable(_name: str, old: str, lessons: list[Lesson]) -> list[list[str]]:
+    by_path = {f'notebooks/{one.file}': one for one in lessons}
     at, table = 0, [['from', 'minutes', '']]
-    for number in sorted(rows.keys() | others.keys()):
-        for what, minutes in [rows.get(number, ('', 0)), *others.get(number, [])]:
-            if what:
-                table.append([f'{at // 60}:{at % 60:02d}', str(minutes), what])
-                at += minutes
-    return [*table, [f'{at // 60}:{at % 60:02d}', '', 'End']]
+    for minutes, what in ROW.findall(old):
+        if link := LINK.match(what):
+            _, path, first, last = link.groups()
+            if path not in by_path:
+                raise ValueError(f'A timetable names {path}, which is not there.')
+            steps = (int(first), int(last or first)) if first else None
+            minutes = by_path[path].minutes_of(steps)
+            what = f'[{by_path[path].number} {by_path[path].title}]{what[what.index("](") + 1 :]}'
+        table.append([_time(at), str(minutes), what])
+        at += int(minutes or 0)
+    return [*table, [_time(at), '', 'End']]
 
 
-def _row(lesson: Lesson, timetable: str) -> tuple[str, int]:
-    steps = lesson.timetables[timetable]
-    which = f', steps {steps[0]} to {steps[1]}' if steps else ''
-    return f'Lesson {lesson.number}{which}', lesson.minutes_of(steps)
+def _time(minutes: int) -> str:
+    return f'{minutes // 60}:{minutes % 60:02d}'
 
 
 TABLES: dict[str, Callable[[str, str, list[Lesson]], list[list[str]]]] = {
     'lessons': _readme,
     'map': _map,
     'what to leave out': _leave_out,
-    'minutes': _alone,
     'timetable': _timetable,
 }

@@ -1,1 +1,1 @@
-"""The lessons as a web site and as a book."""
+"""The lessons and documents as a web site."""

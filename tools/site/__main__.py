@@ -1,7 +1,6 @@
-"""Write the lessons and the documents as a web site, or as a book on paper.
+"""Write the lessons and the documents as a web site: site/index.html, which needs no network.
 
-    python -m tools.site           site/index.html, which needs no network when it is read
-    python -m tools.site book      book.pdf
+    python -m tools.site
 
 Sphinx and myst-nb make the pages from the saved outputs: nothing runs. What they read is prepared
 in .site/pages: the documents, and the notebooks with their notes and solutions folded, their
@@ -19,14 +18,12 @@ from copy import deepcopy
 from pathlib import Path
 
 import nbformat
-from fontTools import subset
 from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell
 from PIL import Image
 from sphinx.cmd.build import build_main
 
 from helpers.replay.levels import level
-from tools.lessons.export import fetch_packages, is_widget
 from tools.lessons.lesson import (
     FOLDER,
     GLOSSARY,
@@ -34,16 +31,14 @@ from tools.lessons.lesson import (
     ROOT,
     START,
     Lesson,
-    first_heading,
     lessons,
     tags,
 )
-from tools.site.book import write as write_book
 
 HERE = Path(__file__).parent
 WORK = ROOT / '.site'
-DOCUMENTS = ('README', 'environment', 'teaching', 'CONTRIBUTING', 'licences')
-URDU = '@fontsource/noto-nastaliq-urdu/files/noto-nastaliq-urdu-arabic-400-normal.woff2'
+CLASSROOM = ('tools/classroom/README', 'tools/classroom/HOSTING')
+DOCUMENTS = ('README', 'environment', 'teaching', *CLASSROOM, 'CONTRIBUTING', 'licences')
 FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
 CONTENTS = """
@@ -78,6 +73,12 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
     return notebook
 
 
+def is_widget(output: NotebookNode) -> bool:
+    """Return whether an output is the text of a widget, such as `VBox(children=(...))`."""
+    data = output.get('data', {})
+    return set(data) == {'text/plain'} and bool(re.match(r'\w+\(children=', data['text/plain']))
+
+
 def _folded_note(source: str) -> NotebookNode:
     summary, _, text = source.partition('\n')
     return new_markdown_cell(
@@ -109,12 +110,8 @@ def _with_files(text: str, figures: Path) -> str:
     return FIGURE.sub(write, text)
 
 
-def prepare(pages: Path, book: bool) -> None:
-    """Write what Sphinx reads into a folder.
-
-    Raises ValueError where npm is missing or fails, and for a lesson that has not been run.
-    """
-    packages = fetch_packages()
+def prepare(pages: Path) -> None:
+    """Write what Sphinx reads into a folder. Raises ValueError for a lesson that was not run."""
     known = lessons()
     for lesson in known:
         if any(c.cell_type == 'code' and not c.execution_count for c in lesson.notebook.cells):
@@ -132,25 +129,16 @@ def prepare(pages: Path, book: bool) -> None:
         nbformat.write(page, notebooks / lesson.file)
     shutil.copytree(FOLDER / 'images', notebooks / 'images')
     for name in DOCUMENTS:
-        shutil.copy(ROOT / f'{name}.md', pages)
+        (pages / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / f'{name}.md', pages / f'{name}.md')
     for file in _linked(pages):
-        (pages / file).parent.mkdir(exist_ok=True)
+        (pages / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, pages / file)
     shutil.copy(HERE / 'conf.py', pages)
-    for file in HERE.glob('*.css'):
-        shutil.copy(file, static)
-    _write_urdu_font(packages / URDU, notebooks, static)
+    shutil.copy(HERE / 'site.css', static)
     parts = _parts(known)
-    first = _printed_contents(parts, known) if book else _first_page()
     toctrees = (CONTENTS.format(part=part, pages='\n'.join(parts[part])) for part in parts)
-    (pages / 'index.md').write_text(first + ''.join(toctrees), encoding='utf-8')
-
-
-def _write_urdu_font(whole: Path, notebooks: Path, folder: Path) -> None:
-    """Write the letters of the font that the pages use: a page that opens loads the file."""
-    text = ''.join(path.read_text(encoding='utf-8') for path in notebooks.glob('*.ipynb'))
-    options = ('--flavor=woff2', '--layout-features=*', f'--output-file={folder / whole.name}')
-    subset.main([str(whole), f'--text={text}', *options])
+    (pages / 'index.md').write_text(_first_page() + ''.join(toctrees), encoding='utf-8')
 
 
 def _linked(pages: Path) -> set[str]:
@@ -176,39 +164,23 @@ def _first_page() -> str:
     return (HERE / 'index.md').read_text('utf-8').replace('{level}', raw)
 
 
-def _printed_contents(parts: dict[str, list[str]], known: list[Lesson]) -> str:
-    titles = {f'notebooks/{Path(one.file).stem}': f'{one.number} {one.title}' for one in known}
-    for name in DOCUMENTS:
-        titles[name] = first_heading((ROOT / f'{name}.md').read_text('utf-8'))
-    files = [
-        page + ('.ipynb' if '/' in page else '.md') for pages in parts.values() for page in pages
-    ]
-    rows = [f'- [{titles[file.rpartition(".")[0]]}]({file})' for file in files]
-    return '\n'.join(['# ROS 2 in notebooks', '', '```{container} contents', *rows, '```', ''])
-
-
-def main(arguments: list[str]) -> int:
-    """Write the site or the book; return the exit status."""
-    book = arguments == ['book']
-    pages, made = WORK / 'pages', WORK / 'made'
-    kind = ['singlehtml', '-D', 'html_theme=basic'] if book else ['html']
+def main() -> int:
+    """Write the site; return the exit status."""
+    pages, made, site = WORK / 'pages', WORK / 'made', ROOT / 'site'
     try:
-        prepare(pages, book)
-        shutil.rmtree(made, ignore_errors=True)
-        options = ['-q', '-W', '--keep-going', '-E', '-d', f'{WORK}/trees', '-b', *kind]
-        if status := build_main([*options, str(pages), str(made)]):
-            return status
-        if book:
-            output = write_book(made / 'index.html', ROOT / 'book.pdf')
-        else:
-            shutil.rmtree(ROOT / 'site', ignore_errors=True)
-            output = made.rename(ROOT / 'site') / 'index.html'
+        prepare(pages)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1
-    print(f'{output.relative_to(ROOT)} is written. It needs no network.')
+    shutil.rmtree(made, ignore_errors=True)
+    options = ['-q', '-W', '--keep-going', '-E', '-d', f'{WORK}/trees', '-b', 'html']
+    if status := build_main([*options, str(pages), str(made)]):
+        return status
+    shutil.rmtree(site, ignore_errors=True)
+    made.rename(site)
+    print('site/index.html is written. It needs no network.')
     return 0
 
 
 if __name__ == '__main__':
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

@@ -1,11 +1,9 @@
 """What a run of a notebook leaves behind: threads, processes, shared memory.
 
-`look` looks at a kernel from inside, and lets it note where a cell hangs. When all kernels have
-ended, this module as a program looks at the run: it has a /dev/shm and a table of processes of its
-own, so that whatever is there was left.
+`look` looks at a kernel from inside. When all kernels have ended, this module as a program looks at
+the run: it has a /dev/shm and a table of processes of its own, so that whatever is there was left.
 """
 
-import faulthandler
 import os
 import re
 import threading
@@ -21,11 +19,6 @@ OF_PROCESS = ('dds.shm.wdog', 'dds.log')
 OF_ZMQ = 'GarbageCollectorThread'  # frees what Jupyter has sent, from its first picture on
 # Of Python: it comes with the first pool of processes, and lives until the kernel ends.
 TRACKER = 'from multiprocessing.resource_tracker import main'
-# Fast DDS's watchdog lets go of the memory of another process up to a second after the participant
-# has ended. Where /dev/shm cannot be written, LTTng, which rclpy is linked with, forks a child of a
-# kernel every 5 s, which tries to write once more, and ends. LTTng waits for any child: where that
-# was another one, its own is a zombie until the next round.
-ENDS_LATER = re.compile(rf'{SHARED_MEMORY.pattern}|zombie \d+')
 MOMENT_S = 1.0
 END_TIMEOUT_S = 10.0
 
@@ -39,25 +32,12 @@ def look() -> None:
     now = state_of_process()
     if _before is None:
         _before = now
-        _note_where_cells_hang(float(os.environ['SOAK_SLOW_S']), os.environ['SOAK_STACKS'])
     left = now.keys() - _before.keys()
-    while left and all(map(ENDS_LATER.fullmatch, left)) and time.monotonic() < deadline:
+    # Fast DDS's watchdog lets go of another process's memory up to a second after a participant.
+    while left and all(map(SHARED_MEMORY.fullmatch, left)) and time.monotonic() < deadline:
         time.sleep(0.01)
         left &= state_of_process().keys()
     assert not left, ' '.join(now[key] for key in sorted(left))
-
-
-def _note_where_cells_hang(slow_s: float, file: str) -> None:
-    """Write the stack of each thread to a file when a cell takes longer than some seconds."""
-    from IPython import get_ipython
-
-    stacks = open(file, 'a')  # noqa: SIM115, it is for the kernel's life
-    events = get_ipython().events
-    # C does it: also where the cell holds the GIL, or waits for it.
-    events.register(
-        'pre_run_cell', lambda info: faulthandler.dump_traceback_later(slow_s, file=stacks)
-    )
-    events.register('post_run_cell', lambda result: faulthandler.cancel_dump_traceback_later())
 
 
 def state_of_process() -> dict[str, str]:
@@ -96,7 +76,7 @@ def _of_pool(process: psutil.Process) -> bool:
 def processes_that_stay(processes: list[psutil.Process], timeout_s: float) -> dict[str, str]:
     """Return a sentence for each of the processes that does not end within a time."""
     deadline = time.monotonic() + timeout_s
-    # Not `psutil.wait_procs`: the end of a child belongs to who has started it.
+    # Not `psutil.wait_procs`: the end of a child belongs to the process that started it.
     while processes and time.monotonic() < deadline:
         time.sleep(0.01)
         processes = [process for process in processes if process.is_running()]
@@ -118,6 +98,4 @@ if __name__ == '__main__':
     for sentence in processes_that_stay(others, END_TIMEOUT_S).values():
         print(sentence)
     for file in sorted(Path('/dev/shm').glob('fastrtps_*')):
-        # Where there is no room for a segment, Fast DDS leaves its empty file.
-        if file.stat().st_size:
-            print(f'Shared memory is left: {file}.')
+        print(f'Shared memory is left: {file}.')

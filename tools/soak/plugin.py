@@ -53,9 +53,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Report what the cells do; pytest-xdist's workers report to this process."""
-    if not hasattr(config, 'workerinput'):
-        config.pluginmanager.register(_Report(config.option.soak_report))
+    """Report what the cells do."""
+    config.pluginmanager.register(_Report(config.option.soak_report))
 
 
 class _Report:
@@ -148,7 +147,7 @@ class Interrupted(IPyNbCell):
         else:  # ipykernel does so by itself (CONTRIBUTING.md), a lesson that is wrong does it twice
             self.raise_cell_error(f'Run for {after_s:.3f} s. The kernel is lost: {why}')
         traceback = COLOURS.sub('', '\n'.join(error.get('traceback', [])))
-        self.user_properties.append(('traceback', traceback))  # for who asks why a later cell fails
+        self.user_properties.append(('traceback', traceback))  # says why a later cell fails
         sent = 'interrupted_after_s' in dict(self.user_properties)
         unsaid = sent and not traceback and IMPORTS.search(self.cell.source)
         if unsaid or IN_IMPORT.search(traceback):
@@ -200,7 +199,7 @@ def random_time_s() -> float:
 def listen(kernel: RunningKernel, message: str, until: str, timeout_s: float) -> dict:
     """Read what a kernel says of a message until it says `until`, and return the error in it.
 
-    Raises Empty where this takes longer, RuntimeError where the kernel has ended.
+    Raises Empty if this takes longer, RuntimeError if the kernel has ended.
     """
     deadline, error = time.monotonic() + timeout_s, {}
     while kernel.is_alive():

@@ -1,0 +1,67 @@
+"""Open JupyterLab on this course: `make lab`.
+
+python -m tools.lab --port 8890 --no-browser -- --LabApp.expose_app_in_browser=True
+"""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import NoReturn
+
+from jupyter_core.paths import jupyter_config_dir
+
+ROOT = Path(__file__).resolve().parents[1]
+PLAIN = 'jupyter_server.services.contents.largefilemanager.AsyncLargeFileManager'
+NOTES = '/* The notes for the instructor. */'  # from here on, for students only
+FIRST = 'lab/tree/notebooks/00_start_here.ipynb'
+
+
+def parser(description: str) -> argparse.ArgumentParser:
+    """Return a parser of the options that `open_lab` takes."""
+    made = argparse.ArgumentParser(description=description)
+    made.add_argument('--root', type=Path, default=ROOT, help='the folder that JupyterLab shows')
+    made.add_argument('--port', help='this port or none; otherwise the first free one from 8888 on')
+    made.add_argument('--no-browser', dest='browser', action='store_false')
+    made.add_argument(
+        '--outputs', action='store_true', help='show lessons with the outputs of the repository'
+    )
+    made.add_argument('more', nargs='*', help="JupyterLab's own options, after --")
+    return made
+
+
+def open_lab(
+    options: argparse.Namespace, address: str, more: tuple[str, ...] = (), slides: bool = False
+) -> NoReturn:
+    """Become the server of JupyterLab, which opens `address`.
+
+    A server of `make lab` and one of `make present` may run side by side: each has its settings.
+    `slides` says whether a notebook opens as slides, `more` are options of JupyterLab.
+    """
+    config = Path(jupyter_config_dir())
+    settings = config / 'lab' / f'{"presenter" if slides else "user"}-settings'
+    slideshow = settings / 'jupyterlab-slideshow' / 'plugin.jupyterlab-settings'
+    custom = config / 'custom' / 'custom.css'
+    for file in (slideshow, custom):
+        file.parent.mkdir(parents=True, exist_ok=True)
+    slideshow.write_text(f'{{"active": {str(slides).lower()}}}')
+    css = Path(__file__).with_name('lab.css').read_text()
+    custom.write_text(css.partition(NOTES)[0] if options.outputs else css)
+    os.environ['JUPYTERLAB_SETTINGS_DIR'] = str(settings)
+    # A terminal finds `ros2`, `colcon` and this Python.
+    os.environ['PATH'] = f'{sys.prefix}/bin{os.pathsep}{os.environ["PATH"]}'
+    command = [sys.executable, '-m', 'jupyterlab', f'--ServerApp.root_dir={options.root}']
+    command += ['--LabApp.custom_css=True', f'--LabApp.default_url=/{address}', *more]
+    if options.port:
+        command += [f'--port={options.port}', '--ServerApp.port_retries=0']
+    if options.outputs:
+        command.append(f'--ServerApp.contents_manager_class={PLAIN}')
+    if not options.browser:
+        command.append('--no-browser')
+    if os.getuid() == 0:
+        command.append('--allow-root')
+    os.execv(sys.executable, [*command, *options.more])
+
+
+if __name__ == '__main__':
+    open_lab(parser('Open JupyterLab on this course.').parse_args(), FIRST)
