@@ -59,7 +59,7 @@ def with_tasks() -> list[Tasks]:
         title = re.search(r'^\s*"# \d\d (.*?)(?:\\n)?",?$', source, re.MULTILINE)
         words = path.stem[3:].replace('_', ' ').capitalize()
         words = json.loads(f'"{title[1]}"') if title else words
-        numbers = re.findall(r'^\s*"### (?:✎ )?(?:Task|Exercise) (\d+)', source, re.MULTILINE)
+        numbers = re.findall(r'^\s*"### ✎ Task (\d+)', source, re.MULTILINE)
         found.append(Tasks(path.name[:2], path.stem[3:], words, len(set(numbers))))
     return [lesson for lesson in found if lesson.tasks]
 

@@ -86,7 +86,7 @@ class Lesson:
     def tasks(self) -> list[str]:
         """The headings such as `Task 1: Two robots`, in their order."""
         text = '\n'.join(c.source for c in self.notebook.cells if c.cell_type == 'markdown')
-        return re.findall(r'^### (?:✎ )?((?:Task|Exercise) \d.*)', text, re.MULTILINE)
+        return re.findall(r'^### ✎ (Task \d.*)', text, re.MULTILINE)
 
     @cached_property
     def minutes_by_step(self) -> dict[str, int]:

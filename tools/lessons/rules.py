@@ -90,7 +90,7 @@ def tasks(lesson: Lesson) -> dict[str, list[NotebookNode]]:
     found: dict[str, list[NotebookNode]] = {}
     name, inside = '', False
     for cell in lesson.notebook.cells:
-        heading = re.search(r'^### (?:✎ )?((?:Task|Exercise) \d.*)', cell.source, re.MULTILINE)
+        heading = re.search(r'^### ✎ (Task \d.*)', cell.source, re.MULTILINE)
         if heading and cell.cell_type == 'markdown':
             name, inside = heading[1], True
             found[name] = []
