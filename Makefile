@@ -67,6 +67,9 @@ bench: set_up ## measure what things cost, on an idle machine, against what they
 	@$(PYTHON) -m benchmarks $(ONLY)
 	@$(PYTHON) -m benchmarks.start
 
+release: set_up ## make handout, site and image of a tagged commit, and say what to publish where
+	@tools/release.sh
+
 lint: set_up ## ruff: style and format of modules and notebooks
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
 
@@ -91,7 +94,7 @@ test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
 .PHONY: help lab present class test test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
-	lesson site soak bench lint lock licences clean set_up
+	lesson site soak bench release lint lock licences clean set_up
 
 PYTHON := .venv/bin/python
 
