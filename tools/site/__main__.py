@@ -38,7 +38,15 @@ from tools.lessons.lesson import (
 HERE = Path(__file__).parent
 WORK = ROOT / '.site'
 CLASSROOM = ('tools/classroom/README', 'tools/classroom/HOSTING')
-DOCUMENTS = ('README', 'environment', 'teaching', *CLASSROOM, 'CONTRIBUTING', 'licences')
+DOCUMENTS = (
+    'README',
+    'environment',
+    'teaching',
+    *CLASSROOM,
+    'CONTRIBUTING',
+    'tools/UPGRADING',
+    'licences',
+)
 FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
 CONTENTS = """
