@@ -8,16 +8,16 @@ import random
 import re
 import shlex
 import signal
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from domain_coordinator import domain_id
+from support.commands import process, python, ros2
 from support.waits import LIMIT_S, START_LIMIT_S
 
-from helpers.ros2 import _index, _sessions
-from helpers.ros2._values import _slots, filled, read_yaml, to_yaml
+from helpers.ros2 import _index
+from helpers.ros2._values import _slots, filled, to_yaml
 from helpers.ros2.main import main
 
 DATA = Path(__file__).parent / 'ros2'
@@ -25,35 +25,6 @@ OUTPUTS = {one['command']: one for one in json.loads((DATA / 'outputs.json').rea
 RACES = re.compile(r'(?m)^(waiting for service|Waiting for at least).*\n')  # in some runs only
 MOVING = re.compile(r'(?<=GID: ).*|(?<=ID: )[0-9a-f]{32}|(?<=_ros2cli_)\w+')
 TOOLS = re.compile('launch|osrf|ros2|rosidl_runtime_py')  # packages of the real command
-
-
-@contextlib.contextmanager
-def process(*command, **variables):
-    """Run a process beside the block, and end it as Ctrl+C does."""
-    started = subprocess.Popen(
-        command,
-        env={**os.environ, 'PYTHONUNBUFFERED': '1', **variables},
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        yield started
-    finally:
-        started.send_signal(signal.SIGINT)
-        try:
-            started.communicate(timeout=LIMIT_S)
-        except (subprocess.TimeoutExpired, ValueError):
-            started.kill()
-
-
-def ros2(*words, **variables):
-    return process(str(Path(sys.executable).with_name('ros2')), *words, **variables)
-
-
-def python(script, *arguments, **variables):
-    return process(sys.executable, '-c', script, *arguments, **variables)
 
 
 @pytest.fixture(scope='module')
@@ -165,7 +136,7 @@ def test_yaml_of_every_interface_becomes_the_message(flow_style):
         for _ in range(3):
             expected = drawn_message(type(message)(), draw)
             text = to_yaml(expected, flow_style)
-            assert filled(type(message)(), text, '{}')[0] == expected, text
+            assert filled(type(message)(), text, '{}') == expected, text
             number += 1
     assert number > 600
 
@@ -256,8 +227,8 @@ def test_a_closed_pipe_is_no_error(graph):
 @pytest.mark.parametrize(
     ('command', 'status', 'sentence'),
     [
-        ('tpic', 2, "ros2: error: there is no 'tpic', only action, "),
-        ('topic lst', 2, "ros2 topic: error: there is no 'lst', only bw, delay, "),
+        ('tpic', 2, "ros2: error: invalid choice: 'tpic' (choose from "),
+        ('topic lst', 2, "ros2 topic: error: invalid choice: 'lst' (choose from "),
         ('topic hz', 2, 'ros2 topic hz: error: the following arguments are required: topic_name'),
         ('topic echo /chatter no_msgs/msg/No', 1, 'The passed message type is invalid'),
         ('topic echo /battery --field nope --once', 1, "Invalid field 'nope': 'BatteryState' ob"),
@@ -268,6 +239,7 @@ def test_a_closed_pipe_is_no_error(graph):
         ('service call /motors std_srvs/srv/No', 1, 'The passed service type is invalid'),
         ('service call /motors std_srvs/srv/SetBool "{on: 1}"', 1, 'Failed to populate field: '),
         ('action send_goal /count test_msgs/action/No', 1, 'The passed action type is invalid'),
+        ('param set /robot frame "{a: 1}"', 1, "'{a: 1}' is no value of a parameter"),
         ('param load /robot nowhere.yaml', 1, 'Cannot load nowhere.yaml: '),
         ('lifecycle get /robot', 1, 'Node not found'),
         ('pkg executables nothing', 1, "Package 'nothing' not found"),
@@ -299,21 +271,11 @@ rclpy.spin(node)
         assert run('lifecycle set camera fly')[2].startswith('Unknown transition requested, ava')
 
 
-def test_parameters_go_to_a_file_and_back(graph, run, tmp_path):
-    run('param set /robot gains "[3.0, 4.0]"')
-    saved = tmp_path / 'robot.yaml'
-    saved.write_text(run('param dump /robot')[1].replace('    wheels: 2\n', ''))
-    run('param set /robot gains "[5.0]"')
-    assert 'Set parameter gains successful\n' in run(f'param load /robot {saved}')[1]
-    assert run('param get /robot gains')[1] == 'Double values are: [3.0, 4.0]\n'
-    assert read_yaml(saved.read_text())['/robot']['ros__parameters']['gains'] == [3.0, 4.0]
-
-
 # --- Where it is
 
 
 IN_SESSION = """
-import subprocess, sys
+import sys
 from pathlib import Path
 from helpers.ros2 import _sessions
 _sessions.FOLDER = Path(sys.argv[1])
@@ -338,13 +300,13 @@ def test_terminal_finds_the_only_open_session(monkeypatch, tmp_path):
     monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
 
     def terminal():
-        with python(TERMINAL, str(tmp_path)) as command:
+        with python(TERMINAL, tmp_path) as command:
             return *command.communicate(timeout=START_LIMIT_S), command.returncode
 
     with contextlib.ExitStack() as stack:
         for name in ('one', 'two'):
-            session = python(IN_SESSION, str(tmp_path), name, JPY_SESSION_NAME=f'{name}.ipynb')
-            last = stack.enter_context(session)
+            env = os.environ | {'JPY_SESSION_NAME': f'{name}.ipynb'}
+            last = stack.enter_context(python(IN_SESSION, tmp_path, name, env=env))
             assert last.stdout.readline() == 'open\n'
             if name == 'one':
                 assert terminal() == ('/one\n', '', 0)
@@ -358,49 +320,16 @@ def test_terminal_finds_the_only_open_session(monkeypatch, tmp_path):
         assert terminal() == ('/one\n', '', 0)
 
 
-def test_a_cell_meets_its_own_kernel(monkeypatch, tmp_path):
-    monkeypatch.delenv('ROS_DOMAIN_ID', raising=False)
-    script = IN_SESSION.replace(
-        'sys.stdin.read(1)', "subprocess.run([sys.prefix + '/bin/ros2', 'node', 'list'])"
-    )
-    other = python(IN_SESSION, str(_sessions.FOLDER), 'other')
-    with other as session, python(script, str(_sessions.FOLDER), 'mine') as cell:
-        assert session.stdout.readline() == 'open\n'
-        assert cell.communicate(timeout=START_LIMIT_S)[0] == 'open\n/mine\n'
-
-
 def test_leaves_to_a_sourced_ros(tmp_path):
     real = tmp_path / 'ros2'
     real.write_text('#!/bin/sh\necho the real one: "$@"\n')
     real.chmod(0o755)
     path = f'{Path(sys.executable).parent}:{tmp_path}:{os.environ["PATH"]}'
-    with ros2('topic', 'list', PATH=path, ROS_DISTRO='jazzy') as command:
+    env = os.environ | {'PATH': path}
+    with ros2('topic', 'list', env=env | {'ROS_DISTRO': 'jazzy'}) as command:
         assert command.communicate(timeout=START_LIMIT_S)[0] == 'the real one: topic list\n'
-    with ros2('--version', PATH=path) as command:
+    with ros2('--version', env=env) as command:
         assert 'follows ros2cli 0.32.2' in command.communicate(timeout=START_LIMIT_S)[0]
-
-
-def test_created_packages_can_be_built_and_run(run, monkeypatch, tmp_path):
-    (tmp_path / 'src').mkdir()
-    monkeypatch.chdir(tmp_path / 'src')
-    about = '--maintainer-name you --maintainer-email you@example.com --license Apache-2.0'
-    command = (
-        f'pkg create --build-type ament_python {about} --dependencies rclpy --node-name talker py'
-    )
-    status, out, err = run(command)
-    assert (status, err) == (0, '')
-    assert "dependencies: ['rclpy']\nnode_name: talker\ncreating folder ./py\n" in out
-    assert run(command)[0] == 1  # it is there already
-    monkeypatch.chdir(tmp_path)
-    subprocess.run(
-        [Path(sys.executable).with_name('colcon'), 'build'], check=True, capture_output=True
-    )
-    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path / 'install' / 'py'))
-    assert run('pkg executables py')[1] == 'py talker\n'
-    monkeypatch.setenv(
-        'PYTHONPATH', str(next(tmp_path.glob('install/py/lib/python*/site-packages')))
-    )
-    assert run('run py talker') == (0, 'Hi from py.\n', '')
 
 
 def test_tab_completes_names(graph, tmp_path):
@@ -411,7 +340,7 @@ def test_tab_completes_names(graph, tmp_path):
             'from helpers.ros2.main import main; main()'
         )
         variables = {'COMP_LINE': line, 'COMP_POINT': str(len(line)), '_ARGCOMPLETE': '1'}
-        with python(script, str(file), **variables) as command:
+        with python(script, file, env=os.environ | variables) as command:
             command.wait(START_LIMIT_S)
         return file.read_text().split('\v')
 

@@ -1,12 +1,9 @@
 """`ros2 bag`: what rclpy publishes is in the bag, byte for byte, and comes out of it again."""
 
-import contextlib
 import os
 import resource
 import select
 import signal
-import subprocess
-import sys
 
 import pytest
 import rclpy
@@ -18,30 +15,20 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import Imu
 from std_msgs.msg import String
+from support.commands import ros2
 from support.waits import LIMIT_S, START_LIMIT_S, wait_for
 
 from helpers.ros2.main import main
 from helpers.session import graph_environment, ros_session
 
-COMMAND = 'import sys; from helpers.ros2.main import main; sys.exit(main())'
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
 COUNT = 200
 
 
-@contextlib.contextmanager
 def bagging(*arguments, **options):
     """Run the command beside the block, in the domain of the open session."""
-    process = subprocess.Popen(
-        [sys.executable, '-c', COMMAND, 'bag', *map(str, arguments)],
-        env=os.environ | graph_environment(),
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options,
-    )  # fmt: skip
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.communicate()
+    return ros2('bag', *arguments, env=os.environ | graph_environment(), **options)
 
 
 def end(process, status=0):
@@ -128,26 +115,30 @@ def test_a_bag_says_what_was_offered(recorded):
     assert words['/map'] == ('RELIABLE', 'TRANSIENT_LOCAL')
 
 
+def spinning(session, node):
+    """Spin a node beside, until the session ends."""
+    executor = rclpy.executors.SingleThreadedExecutor()
+    executor.add_node(node)
+    session.spin(executor)
+
+
 def test_plays_the_same_bytes(recorded):
     folder, sent = recorded
     heard = {}
     with ros_session() as session:
         node = rclpy.create_node('listener')
         for topic, kind, qos in (
-            ('/count', String, 300), ('/map', String, LATCHED), ('/renamed', Imu, BEST_EFFORT)
+            ('/count', String, 300), ('/map', String, LATCHED), ('/imu', Imu, BEST_EFFORT)
         ):  # fmt: skip
             heard[topic] = []
             node.create_subscription(kind, topic, heard[topic].append, qos, raw=True)
-        executor = rclpy.executors.SingleThreadedExecutor()
-        executor.add_node(node)
-        session.spin(executor)
-        options = '--rate', '10', '--remap', 'imu:=renamed'
-        with bagging('play', folder, *options) as process:
+        spinning(session, node)
+        with bagging('play', folder, '--rate', '10') as process:
             session.wait_until(lambda: len(heard['/count']) >= COUNT)
             process.communicate(timeout=LIMIT_S)
             assert process.returncode == 0
         assert (heard['/count'], heard['/map']) == (sent['/count'], sent['/map'])
-        assert heard['/renamed'] == [data for data in sent['/imu'] if data in heard['/renamed']]
+        assert heard['/imu'] == [data for data in sent['/imu'] if data in heard['/imu']]
         # Interrupted in a loop. A subscriber that comes late gets what is latched.
         with bagging('play', folder, '--topics', '/map', '/count', '--loop') as process:
             session.wait_until(lambda: len(heard['/count']) > 3 * COUNT)
@@ -168,9 +159,7 @@ def test_clock_of_a_bag(recorded):
         node.create_subscription(
             String, 'count', lambda _: seen.append(node.get_clock().now().nanoseconds), 300
         )
-        executor = rclpy.executors.SingleThreadedExecutor()
-        executor.add_node(node)
-        session.spin(executor)
+        spinning(session, node)
         with bagging('play', folder, '--clock', '1000', '--rate', '0.5') as process:
             process.communicate(timeout=START_LIMIT_S)
         session.wait_until(lambda: len(seen) == COUNT)
@@ -194,10 +183,9 @@ def cut_off(recorded, tmp_path):
     return tmp_path / 'b'
 
 
-@pytest.mark.parametrize('part', [0.5, 0.95])
-def test_a_bag_that_is_cut_off(part, cut_off, recorded, capsys):
+def test_a_bag_that_is_cut_off(cut_off, recorded, capsys):
     file = cut_off / 'b.mcap'
-    os.truncate(file, int(file.stat().st_size * part))
+    os.truncate(file, file.stat().st_size // 2)
     assert main(['bag', 'info', str(cut_off)]) == 0
     out, err = capsys.readouterr()
     count = int(out.partition('Messages:')[2].split()[0])
@@ -207,9 +195,7 @@ def test_a_bag_that_is_cut_off(part, cut_off, recorded, capsys):
     with ros_session() as session:
         node = rclpy.create_node('listener')
         node.create_subscription(String, 'count', heard.append, 300, raw=True)
-        executor = rclpy.executors.SingleThreadedExecutor()
-        executor.add_node(node)
-        session.spin(executor)
+        spinning(session, node)
         with bagging('play', cut_off) as process:
             process.communicate(timeout=LIMIT_S)
         session.wait_until(lambda: len(heard) == count)

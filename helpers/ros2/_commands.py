@@ -1,85 +1,106 @@
-"""Commands below a command, their options in a line each, and errors of one sentence."""
+"""A command is a function with its arguments: its name is the word, its docstring the help."""
 
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from types import ModuleType
+from typing import Any, NamedTuple
 
-from helpers.ros2._errors import CommandError
+
+class CommandError(Exception):
+    """A user's mistake: one sentence for stderr, and the exit status of the real command."""
+
+    def __init__(self, sentence: object, status: int = 1) -> None:
+        super().__init__(str(sentence))
+        self.status = status
+
+
+class Argument(NamedTuple):
+    """An option, for example `-r --rate`, or an argument, and what Tab completes for it."""
+
+    names: str
+    settings: dict[str, Any]
+    complete: Callable[..., list[str]] | None = None
+
+
+def flag(names: str, help_: str, **settings: Any) -> Argument:
+    """Return an option without a value."""
+    return Argument(names, {'action': 'store_true', 'help': help_, **settings})
+
+
+def option(names: str, help_: str, complete: Any = None, **settings: Any) -> Argument:
+    """Return an option with a value, or an argument without a dash."""
+    return Argument(names, {'help': help_, **settings}, complete)
+
+
+VALUES = option('values', "Values in YAML (e.g. '{data: 1}')", nargs='?', default='{}')
+
+
+def command(*arguments: Argument) -> Callable[[Callable], Callable]:
+    """Make a function a command: `_list` becomes `list`, with these arguments."""
+
+    def mark(function: Callable) -> Callable:
+        function.arguments = arguments
+        return function
+
+    return mark
+
+
+def positive(text: str) -> float:
+    """Return a number above 0, as the type of an argument."""
+    if (value := float(text)) > 0:
+        return value
+    raise ValueError
+
+
+def natural(text: str) -> int:
+    """Return an integer of at least 0, as the type of an argument."""
+    if (value := int(text)) >= 0:
+        return value
+    raise ValueError
 
 
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one sentence each."""
 
     def __init__(self, **settings: Any) -> None:
-        settings.setdefault('formatter_class', argparse.RawDescriptionHelpFormatter)
-        super().__init__(**settings)
+        super().__init__(formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
         self.set_defaults(run=lambda args: self.print_help())
 
-    def flag(self, names: str, help_: str, **settings: Any) -> None:
-        """Add an option without a value, for example `-t --show-types`."""
-        self.add_argument(*names.split(), action='store_true', help=help_, **settings)
+    def add(self, arguments: Iterable[Argument]) -> None:
+        """Add arguments."""
+        for names, settings, complete in arguments:
+            self.add_argument(*names.split(), **settings).completer = complete
 
-    def option(self, names: str, help_: str, complete: Any = None, **settings: Any) -> None:
-        """Add an option with a value, or an argument, and what Tab completes for it."""
-        self.add_argument(*names.split(), help=help_, **settings).completer = complete
-
-    def values(self, name: str, help_: str) -> None:
-        """Add an argument for YAML, which can also come from standard input."""
-        group = self.add_mutually_exclusive_group()
-        group.add_argument(name, nargs='?', default='{}', help=help_)
-        stdin = {'action': 'store_const', 'const': sys.stdin, 'help': 'Read it from standard input'}
-        group.add_argument('--stdin', dest=name, **stdin)
-
-    def graph_options(self) -> None:
-        """Add the options with which the real command chooses how it looks at the graph."""
-        self.option('--spin-time', 'Seconds to wait for discovery', type=float)
-        self.flag('-s --use-sim-time', 'Enable ROS simulation time')
-        self.flag('--no-daemon', 'There is none: for scripts that say so')
-
-    def commands(self, helps: Mapping[str, str]) -> dict[str, Parser]:
-        """Add a command for each name, with its help, and return their parsers."""
+    def add_parsers(self, helps: Mapping[str, str]) -> dict[str, Parser]:
+        """Add a parser for each word, with its help, and return them."""
         width = max(map(len, helps))
-        commands = self.add_subparsers(
+        parsers = self.add_subparsers(
             title='Commands',
             description='\n'.join(f'{name:{width}}  {line}' for name, line in helps.items()),
             metavar=f'Call `{self.prog} <command> -h` for more detailed usage.',
             parser_class=Parser,
         )
-        return {name: commands.add_parser(name, description=line) for name, line in helps.items()}
+        return {name: parsers.add_parser(name, description=line) for name, line in helps.items()}
 
-    def functions(self, *functions: Callable) -> list[Parser]:
-        """Add a command for each function: `_list` is `list`, and its docstring the help."""
-        helps = {f.__name__[1:]: f.__doc__.partition('\n')[0].rstrip('.') for f in functions}
-        parsers = self.commands(dict(sorted(helps.items())))
-        for function in functions:
-            parsers[function.__name__[1:]].set_defaults(run=function)
-        return [parsers[name] for name in helps]
+    def add_commands(self, module: ModuleType) -> None:
+        """Add the commands of a verb's module, or the only one if it has the name of the verb."""
+        found = [function for function in vars(module).values() if hasattr(function, 'arguments')]
+        functions = {function.__name__.strip('_'): function for function in found}
+        parsers = {self.prog.split()[-1]: self}
+        if functions.keys() != parsers.keys():
+            self.add(getattr(module, 'ARGUMENTS', ()))
+            parsers = self.add_parsers({n: title(f.__doc__) for n, f in sorted(functions.items())})
+        for name, function in functions.items():
+            parsers[name].add(function.arguments)
+            parsers[name].set_defaults(run=function)
 
     def error(self, message: str) -> None:  # noqa: D102
-        raise CommandError(f'{self.prog}: error: {message} (see `{self.prog} -h`)', 2)
-
-    def _check_value(self, action: argparse.Action, value: str) -> None:
-        if isinstance(action, argparse._SubParsersAction) and value not in action.choices:
-            known = ', '.join(action.choices)
-            raise CommandError(f"{self.prog}: error: there is no '{value}', only {known}", 2)
-        super()._check_value(action, value)
+        sentence = message.rpartition('usage.: ')[2]  # without the long name of the commands
+        raise CommandError(f'{self.prog}: error: {sentence} (see `{self.prog} -h`)', 2)
 
 
-def number(kind: type, least: float, above: bool = False) -> Callable[[str], Any]:
-    """Return the type of an argument: a number that is not below a limit, or `above` it."""
-
-    def read(text: str) -> Any:
-        try:
-            value = kind(text)
-            if value > least or (value == least and not above):
-                return value
-        except ValueError:
-            pass
-        what = 'an integer' if kind is int else 'a number'
-        limit = f'above {least}' if above else f'of at least {least}'
-        raise argparse.ArgumentTypeError(f'value must be {what} {limit}')
-
-    return read
+def title(docstring: str) -> str:
+    """Return the first line of a docstring, without its period."""
+    return docstring.partition('\n')[0].rstrip('.')

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import math
 import os
+import re
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from helpers._plumbing.domain import one_process_at_a_time
 from helpers._plumbing.interrupts import uninterrupted
 from helpers.ros2 import _sessions
-from helpers.ros2._errors import CommandError
+from helpers.ros2._commands import CommandError
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -24,6 +24,7 @@ QUIET_S = 0.08
 ANSWERS_S = 0.15, 0.3, 0.6, 4.0  # for all participants: each repeats what it is every 3 s
 OTHERS_S = 0.5  # for other machines, as the real command waits
 LONGEST_S = 1.0
+SERVICE_S = 5.0  # for a service of a node that is there
 INTERRUPT_S = 0.1  # after which Ctrl+C is noticed
 PARTICIPANTS = 32  # of one domain and machine find each other
 UNNAMED = '_NODE_NAME_UNKNOWN_'
@@ -65,7 +66,7 @@ def _variables_of_a_kernel() -> dict[str, str]:
 class Graph:
     """The node of a command, and what it does with it."""
 
-    def __init__(self, name: str | None, use_sim_time: bool) -> None:
+    def __init__(self, name: str | None) -> None:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
         from rclpy.parameter import Parameter
@@ -84,10 +85,8 @@ class Graph:
                 name or f'_ros2cli_{os.getpid()}',
                 context=self._context,
                 start_parameter_services=False,
-                parameter_overrides=[
-                    Parameter('use_sim_time', value=use_sim_time),
-                    Parameter('start_type_description_service', value=False),  # 0.1 s
-                ],
+                # It takes 0.1 s.
+                parameter_overrides=[Parameter('start_type_description_service', value=False)],
             )
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
@@ -106,14 +105,15 @@ class Graph:
             raise CommandError(f'Exception while {what}: {future.exception()!r}')
         return future.result()
 
-    def call(self, service: type, name: str, timeout_s: float = 5.0, **fields: Any) -> Any:
-        """Call a service of another node and return its response.
+    def call(self, node: str, service: type, **fields: Any) -> Any:
+        """Call the service of a node that is named as its type, and return the response.
 
         Raises CommandError if the service is not there in time, or if it fails.
         """
+        name = f'{node}/{re.sub("(?<!^)(?=[A-Z])", "_", service.__name__).lower()}'
         client = self.node.create_client(service, name)
-        if not wait_for(client.service_is_ready, timeout_s):
-            raise CommandError(f"Waited {timeout_s:g} s in vain for the service '{name}'")
+        if not wait_for(client.service_is_ready, SERVICE_S):
+            raise CommandError(f"Waited {SERVICE_S:g} s in vain for the service '{name}'")
         return self.result(client.call_async(service.Request(**fields)), f"calling '{name}'")
 
     def close(self) -> None:
@@ -169,18 +169,14 @@ class Graph:
 
 @contextlib.contextmanager
 def graph(
-    args: argparse.Namespace,
-    until: Callable[[Node], Any] = lambda node: True,
-    name: str | None = None,
+    until: Callable[[Node], Any] = lambda node: True, name: str | None = None
 ) -> Iterator[Graph]:
     """Open a node for a command that has discovered the graph, and close it however that ends.
 
     On this machine it is known how many participants there are: all of them have been found, and
-    nothing new comes. The wait goes on until `until` holds, but not longer than a second. The
-    option --spin-time replaces all of this.
+    nothing new comes. The wait goes on until `until` holds, but not longer than a second.
     """
     join_domain()
-    spin_time = getattr(args, 'spin_time', None)
     opened = None
     try:
         started = time.monotonic()
@@ -188,17 +184,14 @@ def graph(
             with uninterrupted():
                 if opened is not None:
                     opened.close()
-                opened = Graph(name, getattr(args, 'use_sim_time', False))
+                opened = Graph(name)
             # Fast DDS loses the answers that come before a new participant listens.
-            if spin_time is not None or opened.knows_all(answer_s):
+            if opened.knows_all(answer_s):
                 break
-        if spin_time is not None:
-            time.sleep(spin_time)
-        else:
-            if os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] != 'LOCALHOST':
-                time.sleep(max(0.0, started + OTHERS_S - time.monotonic()))
-            opened.wait_until_quiet()
-            wait_for(lambda: until(opened.node), started + LONGEST_S - time.monotonic())
+        if os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] != 'LOCALHOST':
+            time.sleep(max(0.0, started + OTHERS_S - time.monotonic()))
+        opened.wait_until_quiet()
+        wait_for(lambda: until(opened.node), started + LONGEST_S - time.monotonic())
         yield opened
     finally:
         with uninterrupted():  # by a second Ctrl+C
@@ -208,16 +201,11 @@ def graph(
 
 def full_name(node: Node, name: str) -> str:
     """Return a name as the graph has it, with its namespace. Raises CommandError."""
-    from rclpy.exceptions import InvalidTopicNameException
-    from rclpy.expand_topic_name import expand_topic_name
-    from rclpy.validate_full_topic_name import validate_full_topic_name
-
     try:
-        full = expand_topic_name(name, node.get_name(), node.get_namespace())
-        validate_full_topic_name(full)
-    except (ValueError, InvalidTopicNameException) as error:
-        raise CommandError(str(error).partition('\n')[0].rstrip(':')) from None
-    return full
+        return node.resolve_topic_name(name)
+    except RuntimeError as error:  # 'failed to resolve name: REASON, at FILE'
+        reason = str(error).partition(': ')[2].partition(', at ')[0]
+        raise CommandError(f'Invalid topic name: {reason}') from None
 
 
 def wait_for(predicate: Callable[[], Any], timeout_s: float) -> bool:

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from helpers.ros2._errors import CommandError
+from helpers.ros2._commands import CommandError
 
 INDEX = 'share/ament_index/resource_index'
 KINDS = 'msg', 'srv', 'action'

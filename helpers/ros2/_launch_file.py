@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import ast
 import os
 import re
 import shlex
@@ -15,54 +15,39 @@ from typing import Any, NoReturn
 
 import yaml
 
-from helpers.ros2 import _substitutions as subs
-from helpers.ros2._errors import CommandError
+from helpers.ros2 import _index
+from helpers.ros2._commands import CommandError
+from helpers.ros2.run import command_of
 
-PROCESS = (
-    'output cwd respawn respawn_delay respawn_max_retries sigterm_timeout sigkill_timeout '
-    'on_exit launch-prefix'
-)
+PROCESS = 'output respawn respawn_delay respawn_max_retries on_exit'
+# What a mark stands for that splits no words, and that nobody types.
+MARK = '\ue000'
 # The attributes of each tag (`!`: it must be there), then the children that are no actions.
 # `*`: its children are actions, and each of those may have `if` or `unless`.
 TAGS = {
-    'arg': 'name! default description | choice',
+    'arg': 'name! default description',
     'let': 'name! value!',
-    'node': f'exec! pkg name namespace args ros_args exec_name {PROCESS} | param remap env',
-    'executable': f'cmd! name shell {PROCESS} | env',
-    'group': 'scoped forwarding | * keep',
+    'node': f'exec! pkg name namespace args {PROCESS} | param remap env',
+    'executable': f'cmd! name {PROCESS} | env',
+    'group': '| *',
     'include': 'file! | arg let',
     'push_ros_namespace': 'namespace!',
     'push-ros-namespace': 'namespace!',
     'set_env': 'name! value!',
-    'unset_env': 'name!',
-    'set_parameter': 'name! value!',
-    'set_remap': 'from! to!',
-    'log': 'message!',
-    'timer': 'period! | *',
 }
 INNER = {
-    'param': 'name value type from allow_substs | param',
+    'param': 'name value from',
     'remap': 'from! to!',
-    'choice': 'value!',
-    **dict.fromkeys(('env', 'keep', 'arg', 'let'), 'name! value!'),
+    **dict.fromkeys(('env', 'arg', 'let'), 'name! value!'),
 }
-# What is no text in YAML. All else is: the real command refuses `default: 2`, too.
-TYPES = {
-    **dict.fromkeys(('respawn_delay', 'sigterm_timeout', 'sigkill_timeout'), float),
-    **dict.fromkeys(('scoped', 'forwarding', 'shell', 'allow_substs'), bool),
-    'respawn_max_retries': int,
-    'version': int,
-}
-LISTS = {f'list_of_{kind.__name__}': kind for kind in (str, int, float, bool)}
+NUMBERS = 'respawn_delay', 'respawn_max_retries', 'version'
 PYTHON = {
     'Node': 'node',
     'ExecuteProcess': 'executable',
     'DeclareLaunchArgument': 'arg',
     'IncludeLaunchDescription': 'include',
     'GroupAction': 'group',
-    'TimerAction': 'timer',
     'PushROSNamespace': 'push_ros_namespace',
-    'PushRosNamespace': 'push_ros_namespace',
     'SetEnvironmentVariable': 'set_env',
     'SetLaunchConfiguration': 'let',
 }
@@ -89,28 +74,18 @@ class Element:
 
 @dataclass
 class Process:
-    """What a `node` or an `executable` starts. Times are in seconds."""
+    """What a `node` or an `executable` starts."""
 
     name: str
     command: list[str]
     environment: dict[str, str]
-    cwd: str | None
-    shell: bool
     output: str
     respawn: bool
-    respawn_delay: float
+    respawn_delay: float  # in seconds
     respawn_max_retries: int
-    sigterm_timeout: str
-    sigkill_timeout: str
     required: bool  # all ends with it
-
-
-@dataclass
-class Timer:
-    """What is started after a time, in seconds."""
-
-    period: float
-    then: Callable[[], Iterator]
+    sigterm_timeout: str  # in seconds
+    sigkill_timeout: str
 
 
 # --- reading ---
@@ -172,9 +147,7 @@ def _read_yaml(text: str, file: str) -> Element:
             new.fail(f"'{tag}' needs its attributes below it.")
         for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
             name, is_list = str(key.value), isinstance(value, yaml.SequenceNode)
-            if is_list and name == 'children':
-                new.children += [action(item) for item in value.value]
-            elif is_list and name in INNER:
+            if is_list and name in INNER:
                 items = [element(name, item, item.start_mark.line) for item in value.value]
                 new.children += items
             elif name in INNER and isinstance(value, yaml.MappingNode):
@@ -206,14 +179,9 @@ def _check(element: Element, rule: str, is_xml: bool) -> None:
     names = {name.rstrip('!'): name.endswith('!') for name in own.split()}
     for name, value in element.attributes.items():
         if name not in names:
-            element.fail(f"{tag} has no attribute '{name}'; it has {', '.join(names)}.")
-        kind = TYPES.get(name, str)
-        if is_xml and kind in (int, float):
-            with contextlib.suppress(ValueError):
-                value = element.attributes[name] = kind(value)
-        kinds = (kind, str) if kind is bool else (kind,)
-        if type(value) not in kinds and (element.tag, name) != ('param', 'value'):
-            wanted = f'"{value}", a text in quotes' if kind is str else f'a {kind.__name__}'
+            element.fail(f"{tag} has no attribute '{name}' here; it has {', '.join(names)}.")
+        if not isinstance(value, str) and name not in NUMBERS and element.tag != 'param':
+            wanted = f'"{value}", a text in quotes'
             element.fail(f"'{name}' of {tag} must be {wanted}, also for the real command.")
     for name in names:
         if names[name] and name not in element.attributes:
@@ -223,7 +191,7 @@ def _check(element: Element, rule: str, is_xml: bool) -> None:
     for child in element.children:
         if child.tag not in inner | actions:
             known = ', '.join(actions | inner)
-            child.fail(f"{tag} has no '{child.tag}'; it has {known or 'only attributes'}.")
+            child.fail(f"{tag} has no '{child.tag}' here; it has {known or 'only attributes'}.")
         _check(child, (inner | actions)[child.tag], is_xml)
 
 
@@ -239,25 +207,18 @@ class Scope:
     environment: dict[str, str]
     written: list[str]  # files of parameters, of all scopes
     namespace: str | None = None
-    parameters: tuple[tuple[str, Any], ...] = ()
-    remaps: tuple[tuple[str, str], ...] = ()
-
-    def copy(self) -> Scope:
-        """A scope that knows the same, and what changes there does not change here."""
-        variables, environment = self.variables.copy(), self.environment.copy()
-        return replace(self, variables=variables, environment=environment)
 
     def text(self, text: str) -> str:
         """A text with its substitutions performed. Raises ValueError if one fails."""
-        return subs.perform(subs.parse(text), self)
+        return expand(text, self)
 
     def texts(self, elements: Iterable[Element], *names: str) -> list[tuple[str, ...]]:
         """These attributes of elements."""
         return [tuple(self.text(e.attributes[name]) for name in names) for e in elements]
 
 
-def work_out(elements: Iterable[Element], scope: Scope) -> Iterator[Process | Timer | str]:
-    """Yield what elements start, or the message of a `log`. They may change the scope.
+def work_out(elements: Iterable[Element], scope: Scope) -> Iterator[Process]:
+    """Yield what elements start. They may change the scope.
 
     Raises CommandError, with the line, if something cannot be worked out.
     """
@@ -268,51 +229,30 @@ def work_out(elements: Iterable[Element], scope: Scope) -> Iterator[Process | Ti
             element.fail(f'{error}.')
 
 
-def _one(element: Element, scope: Scope) -> Iterator[Process | Timer | str]:
+def _one(element: Element, scope: Scope) -> Iterator[Process]:
     def text(name: str, default: str | None = None) -> str | None:
         value = element.attributes.get(name)
         return default if value is None else scope.text(str(value))
 
     if {'if', 'unless'} <= element.attributes.keys():
         raise ValueError("an action has 'if' or 'unless', not both")
-    if not subs.is_true(text('if', '1')) or subs.is_true(text('unless', '0')):
+    if not is_true(text('if', '1')) or is_true(text('unless', '0')):
         return
     match element.tag:
         case 'arg':
             name, default = text('name'), text('default')
             if default is None and name not in scope.variables:
                 raise ValueError(f"the argument '{name}' is missing: give it as {name}:=VALUE")
-            value = scope.variables.setdefault(name, default)
-            choices = [child.attributes['value'] for child in element.children]
-            if choices and value not in choices:
-                raise ValueError(
-                    f'Argument "{name}" provided value "{value}" is not valid. '
-                    f'Valid options are: {choices}'
-                )
+            scope.variables.setdefault(name, default)
         case 'let':
             scope.variables[text('name')] = text('value')
         case 'set_env':
             scope.environment[text('name')] = text('value')
-        case 'unset_env':
-            scope.environment.pop(text('name'), None)
         case 'push_ros_namespace' | 'push-ros-namespace':
             scope.namespace = _namespace(scope.namespace, text('namespace'))
-        case 'set_parameter':
-            scope.parameters += ((text('name'), _typed(text('value'))),)
-        case 'set_remap':
-            scope.remaps += ((text('from'), text('to')),)
-        case 'log':
-            yield text('message')
-        case 'timer':
-            later = scope.copy()
-            yield Timer(float(text('period')), lambda: work_out(element.children, later))
         case 'group':
-            inside = scope.copy() if subs.is_true(text('scoped', '1')) else scope
-            kept = dict(scope.texts(element.inner('keep'), 'name', 'value'))
-            if inside is not scope and not subs.is_true(text('forwarding', '1')):
-                inside = Scope(scope.file, {}, dict(os.environ), scope.written)
-            inside.variables.update(kept)
-            yield from work_out((c for c in element.children if c.tag != 'keep'), inside)
+            copies = {name: getattr(scope, name).copy() for name in ('variables', 'environment')}
+            yield from work_out(element.children, replace(scope, **copies))
         case 'include':
             # As in the real command: what an included file sets is known after it.
             scope.variables.update(scope.texts(element.children, 'name', 'value'))
@@ -327,56 +267,51 @@ def _one(element: Element, scope: Scope) -> Iterator[Process | Timer | str]:
 
 
 def _namespace(base: str | None, name: str | None) -> str | None:
-    """A namespace below another one. Raises ValueError if it is no valid one."""
+    """A namespace below another one."""
     if name is None:
         return base
     whole = name if name.startswith('/') else f'{(base or "").rstrip("/")}/{name}'
-    whole = whole.rstrip('/') or '/'
-    if not re.fullmatch(r'/|(/[A-Za-z_]\w*)+', whole):
-        raise ValueError(f"'{whole}' is no namespace: it needs names of letters, digits and _")
-    return whole
+    return whole.rstrip('/') or '/'
 
 
 def _process(element: Element, scope: Scope, text: Callable[..., Any]) -> Process:
-    def command(name: str) -> list[str]:
-        words = subs.words(subs.parse(element.attributes.get(name, '')))
-        return [subs.perform(word, scope) for word in words]
-
     if element.tag == 'node':
-        program = text('exec')
-        start = subs.executable(program, text('pkg')) if text('pkg') else [program]
-        name = text('exec_name', os.path.basename(start[-1]))
-        start += command('args') + ['--ros-args'] * ('ros_args' in element.attributes)
-        start += [*command('ros_args'), '--ros-args', *_ros_arguments(element, scope, text)]
+        command = _executable(text('exec'), text('pkg'))
+        name = os.path.basename(command[-1])
+        command += words(element.attributes.get('args', ''), scope)
+        command += ['--ros-args', *_ros_arguments(element, scope, text)]
     else:
-        start = command('cmd')
-        name = text('name', os.path.basename([*start, ''][0]))
-    output = os.environ.get('OVERRIDE_LAUNCH_PROCESS_OUTPUT', text('output', 'log'))
-    if not start or output not in ('screen', 'log', 'both'):
-        raise ValueError('there is no command' if not start else f"no output is called '{output}'")
-    timeouts = {
-        name: text(name, scope.variables.get(name, '5'))
-        for name in ('sigterm_timeout', 'sigkill_timeout')
-    }
-    delay = float(text('respawn_delay', '0'))
-    if min(delay, *map(float, timeouts.values())) < 0:
-        raise ValueError('a time is negative')
+        command = words(element.attributes['cmd'], scope)
+        name = text('name', os.path.basename([*command, ''][0]))
+    output = text('output', 'log')
+    if not command or output not in ('screen', 'log', 'both'):
+        raise ValueError(f"no output is called '{output}'" if command else 'there is no command')
     if text('on_exit') not in (None, 'shutdown'):
         raise ValueError(f"'on_exit' can be shutdown, not '{text('on_exit')}'")
-    prefix = shlex.split(text('launch-prefix', scope.variables.get('launch-prefix', '')))
     return Process(
         name=name,
-        command=prefix + start,
+        command=command,
         environment=scope.environment | dict(scope.texts(element.inner('env'), 'name', 'value')),
-        cwd=text('cwd'),
-        shell=subs.is_true(text('shell', '0')),
         output=output,
-        respawn=subs.is_true(text('respawn', '0')),
-        respawn_delay=delay,
+        respawn=is_true(text('respawn', '0')),
+        respawn_delay=float(text('respawn_delay', '0')),
         respawn_max_retries=int(text('respawn_max_retries', '-1')),
         required=text('on_exit') is not None,
-        **timeouts,
+        sigterm_timeout=scope.variables.get('sigterm_timeout', '5'),
+        sigkill_timeout=scope.variables.get('sigkill_timeout', '5'),
     )
+
+
+def _executable(name: str, package: str | None) -> list[str]:
+    """The command of an executable. Raises ValueError if the package has none."""
+    if package is None:
+        return [name]
+    folder = share_of(package).parents[1] / 'lib' / package
+    try:
+        return command_of(package, name)
+    except CommandError:
+        missing = f"executable '{name}' not found on the libexec directory '{folder}'"
+        raise ValueError(missing) from None
 
 
 def _ros_arguments(element: Element, scope: Scope, text: Callable[..., Any]) -> Iterator[str]:
@@ -387,78 +322,155 @@ def _ros_arguments(element: Element, scope: Scope, text: Callable[..., Any]) -> 
         yield from ('-r', f'__node:={name}')
     if namespace is not None:
         yield from ('-r', f'__ns:={namespace}')
-    for key, value in scope.parameters:
-        yield from ('-p', f'{key}:={value}')
     node = '/**' if None in (name, namespace) else f'{namespace.rstrip("/")}/{name}'
     for param in element.inner('param'):
         try:
             yield from ('--params-file', _parameter_file(param, scope, node))
         except (ValueError, OSError) as error:
             param.fail(f'{error}.')
-    for before, after in (*scope.remaps, *scope.texts(element.inner('remap'), 'from', 'to')):
+    for before, after in scope.texts(element.inner('remap'), 'from', 'to'):
         yield from ('-r', f'{before}:={after}')
 
 
-def _parameter_file(element: Element, scope: Scope, node: str) -> str:
+def _parameter_file(param: Element, scope: Scope, node: str) -> str:
     """The path of a file with parameters: the one that `from` names, or one that is written."""
-    if source := element.attributes.get('from'):
-        path = Path(scope.text(source))
-        content = path.read_text(encoding='utf-8')
-        if not subs.is_true(scope.text(str(element.attributes.get('allow_substs', '0')))):
-            return str(path)
-        content = scope.text(content)
-    else:
-        content = yaml.dump({node: {'ros__parameters': _parameters(element, scope)}})
+    given = param.attributes
+    if 'from' in given:
+        path = Path(scope.text(given['from']))
+        path.open().close()  # it can be read
+        return str(path)
+    if not {'name', 'value'} <= given.keys():
+        param.fail("'param' needs 'from', or 'name' and 'value'.")
+    parameters = {scope.text(given['name']): _value(given['value'], param, scope)}
     with tempfile.NamedTemporaryFile('w', prefix='launch_params_', delete=False) as file:
-        file.write(content)
+        yaml.dump({node: {'ros__parameters': parameters}}, file)
     scope.written.append(file.name)
     return file.name
 
 
-def _parameters(element: Element, scope: Scope, before: str = '') -> dict[str, Any]:
-    """The parameters of a `param` and of those nested in it, with dots in their names."""
-    given, parameters = element.attributes, {}
-    if 'name' not in given or ('value' in given) == bool(element.children):
-        element.fail("'param' needs 'from', or 'name' and then 'value' or parameters in it.")
-    name, value, kind = before + scope.text(given['name']), given.get('value'), given.get('type')
-    for child in element.children:
-        parameters |= _parameters(child, scope, f'{name}.')
-    if element.children:
-        return parameters
-    whole = isinstance(value, str) and '$(' in value and not value.lstrip().startswith('[')
-    if (
-        isinstance(value, str)
-        and not whole
-        and (kind or not element.file.endswith(('yaml', 'yml')))
-    ):
-        value = _typed(value, kind)
-    items = [
-        item
-        if not isinstance(item, str)
-        else _typed(scope.text(item), kind if whole else None)
-        if '$(' in item
-        else scope.text(item)
-        for item in (value if isinstance(value, list) else [value])
-    ]
-    if len({type(item) for item in items}) != 1:
-        raise ValueError(f"the parameter '{name}' is a list of several types, or an empty one")
-    return {name: items if isinstance(value, list) else items[0]}
-
-
-def _typed(text: str, kind: str | None = None) -> Any:
-    """The value of a text, by the rules of YAML if it has no type. Raises ValueError."""
-    if kind == 'str' or not text:
-        return text
-    if kind == 'bool':
-        return subs.is_true(text)
+def _value(value: Any, param: Element, scope: Scope) -> Any:
+    """The value of a parameter. A text in XML, or with a substitution, is read as YAML."""
+    if isinstance(value, list):
+        return [_value(item, param, scope) for item in value]
+    if not isinstance(value, str) or ('$(' not in value and param.file.endswith(('yaml', 'yml'))):
+        return value
+    text = scope.text(value)
     try:
-        if kind in ('int', 'float'):
-            return {'int': int, 'float': float}[kind](text)
-        value = yaml.safe_load(text)
-    except (ValueError, yaml.YAMLError):
-        raise ValueError(f"'{text}' is no {kind or 'value'}: a text can have type='str'") from None
-    items = value if isinstance(value, list) else [value]
-    kinds = {LISTS[kind]} if kind in LISTS else {bool, int, float, str}
-    if {type(item) for item in items} - kinds or (kind in LISTS and items is not value):
-        raise ValueError(f"'{text}' is no {kind or 'bool, int, float, text or list of them'}")
-    return value
+        found = yaml.safe_load(text)
+    except yaml.YAMLError:
+        return text
+    return found if isinstance(found, bool | int | float | str | list) else text
+
+
+# --- substitutions ---
+
+
+def expand(text: str, scope: Any, keep: Callable[[str], str] = str) -> str:
+    """A text with its substitutions performed, and what `keep` makes of each value.
+
+    Raises ValueError if it is malformed, or if a substitution fails.
+    """
+    return _expand(text, 0, '', scope, keep)[0]
+
+
+def words(text: str, scope: Any) -> list[str]:
+    """Split a command at its spaces, but not in quotes, nor where a substitution has some."""
+    values: list[str] = []
+    marked = expand(text, scope, lambda value: values.append(value) or MARK)
+    return [re.sub(MARK, lambda _: values.pop(0), word) for word in shlex.split(marked)]
+
+
+def _expand(
+    text: str, at: int, stop: str, scope: Any, keep: Callable[[str], str] = str
+) -> tuple[str, int]:
+    """The text from a position to one of the characters `stop`, and where that is."""
+    found = ''
+    while at < len(text) and text[at] not in stop:
+        if text.startswith('$(', at):
+            value, at = _substitute(text, at + 2, scope)
+            found += keep(value)
+        else:
+            at += text[at] == '\\' and at + 1 < len(text)
+            found, at = found + text[at], at + 1
+    return found, at
+
+
+def _substitute(text: str, at: int, scope: Any) -> tuple[str, int]:
+    """The value of the substitution whose name begins at a position, and where the text goes on."""
+    name = re.compile(r'[\w-]*').match(text, at)[0]
+    if name not in SUBSTITUTIONS:
+        raise ValueError(f'there is no $({name}) here; there is {", ".join(SUBSTITUTIONS)}')
+    at += len(name)
+    arguments = []
+    while text.startswith(' ', at):
+        quote = text[at + 1 : at + 2]
+        if quote in ('"', "'"):
+            argument, at = _expand(text, at + 2, quote, scope)
+            at += 1
+        else:
+            argument, at = _expand(text, at + 1, ' ()"\'', scope)
+        arguments.append(argument)
+    if not text.startswith(')', at):
+        raise ValueError(f'$({name} is not closed: quote an argument with spaces or brackets')
+    try:
+        return SUBSTITUTIONS[name](scope, *arguments), at + 1
+    except TypeError:
+        few_or_many = f'$({name}) does not take {len(arguments)} arguments'
+        raise ValueError(f'{few_or_many}: quote one that has spaces') from None
+
+
+def is_true(text: str) -> bool:
+    """Whether a text is true. Raises ValueError if it is neither true nor false."""
+    word = text.strip().lower()
+    if word not in ('true', 'false', '1', '0'):
+        raise ValueError(f"'{text}' is neither true nor false")
+    return word in ('true', '1')
+
+
+def share_of(package: str) -> Path:
+    """The share folder of a package. Raises ValueError if it is not installed."""
+    found = _index.packages()
+    if package not in found:
+        searched = [str(prefix) for prefix in _index.prefixes()]
+        raise ValueError(f"package '{package}' not found, searching: {searched}")
+    return found[package] / 'share' / package
+
+
+def _look_up(kind: str, known: dict[str, str], name: str, *default: str) -> str:
+    if name not in known and not default:
+        raise ValueError(f"{kind} '{name}' does not exist")
+    return known.get(name, *default)
+
+
+# What an expression may be made of, so that a launch file runs no Python.
+OPERATIONS = (
+    *(ast.Expression, ast.Constant, ast.List, ast.Tuple, ast.Load, ast.Compare, ast.cmpop),
+    *(ast.BoolOp, ast.boolop, ast.UnaryOp, ast.unaryop, ast.BinOp, ast.operator),
+)
+
+
+def evaluate(expression: str) -> str:
+    """The value of an expression of constants, comparisons, logic and arithmetic, as a text.
+
+    Raises ValueError for anything else.
+    """
+    try:
+        tree = ast.parse(expression.strip(), mode='eval')
+        for node in ast.walk(tree):
+            if not isinstance(node, OPERATIONS):
+                raise ValueError(
+                    f"'{ast.unparse(node)}' in $(eval) is no comparison, logic or arithmetic of "
+                    'values: a text needs quotes'
+                )
+        return str(eval(compile(tree, '$(eval)', 'eval'), {'__builtins__': {}}))
+    except (SyntaxError, TypeError, ArithmeticError) as error:
+        raise ValueError(f"$(eval '{expression}') has no value: {error}") from None
+
+
+SUBSTITUTIONS: dict[str, Callable[..., str]] = {
+    'var': lambda scope, *a: _look_up('launch configuration', scope.variables, *a),
+    'env': lambda scope, *a: _look_up('environment variable', scope.environment, *a),
+    'find-pkg-share': lambda scope, package: str(share_of(package)),
+    'dirname': lambda scope: str(Path(scope.file).absolute().parent),
+    'eval': lambda scope, expression: evaluate(expression),
+}

@@ -1,4 +1,4 @@
-"""The commands that topics, services and actions have in common: list, type, find and info."""
+"""The names in the graph: of nodes, and of topics, services and actions, each with its types."""
 
 from __future__ import annotations
 
@@ -8,71 +8,62 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from helpers.ros2 import _index
-from helpers.ros2._commands import Parser
-from helpers.ros2._errors import CommandError
+from helpers.ros2._commands import CommandError, flag, option
 from helpers.ros2._graph import Graph, graph, wait_for
 
 UNNAMED_S = 5.0  # for the nodes of a participant that was found
-Types = dict[str, list[str]]
 
 
 class Names:
-    """The names of one kind, such as `topic`, each with its types, as `get(node)` gives them."""
+    """The names of one kind, such as `topic`, as `get(node)` gives them, and their commands."""
 
     def __init__(self, word: str, kind: str, get: Callable[[Any], list]) -> None:
         self.word, self.kind, self._get = word, kind, get
-        self.hidden_flag = f'--include-hidden-{word}s', f'Consider hidden {word}s as well'
+        hidden = f'--include-hidden-{word}s', f'Consider hidden {word}s as well'
+        self.hidden = flag(*hidden)
+        # The default would replace what was said before the command.
+        self.hidden_below = flag(*hidden, default=argparse.SUPPRESS)
+        self.show_types = flag('-t --show-types', f'Additionally show the {word} type')
+        self.count = flag(f'-c --count-{word}s', f'Only display the number of {word}s')
+        self.name = option(f'{word}_name', f'Name of the {word}', self.complete)
+        self.type = option(f'{word}_type', f'Type of the {word}', self.complete_types)
 
-    def types(self, node: Any, hidden: bool = True) -> Types:
+    def types(self, node: Any, hidden: bool = True) -> dict[str, list[str]]:
         """Return the types of each name."""
         return {n: t for n, t in self._get(node) if hidden or not is_hidden(n)}
 
     def complete(self, **kwargs: Any) -> list[str]:
         """Return the names, for Tab."""
-        with graph(argparse.Namespace()) as opened:
+        with graph() as opened:
             return list(self.types(opened.node))
 
     def complete_types(self, **kwargs: Any) -> list[str]:
         """Return the types that are installed, for Tab."""
         return [name for name in _index.interfaces() if name.split('/')[1] == self.kind]
 
-    def add_listing(self, parser: Parser, hidden: bool = True) -> None:
-        """Add the options of `list` and `find`."""
-        if hidden:  # the default would replace what was said before the command
-            parser.flag(*self.hidden_flag, default=argparse.SUPPRESS)
-        parser.flag(f'-c --count-{self.word}s', f'Only display the number of {self.word}s')
+    def print_names(self, args: argparse.Namespace, type_: str | None = None) -> None:
+        """Print the names, or those of a type, with --show-types their types."""
+        with graph() as opened:
+            found = self.types(opened.node, self._is_hidden_shown(args))
+        lines = [
+            f'{name} [{", ".join(types)}]' if getattr(args, 'show_types', False) else name
+            for name, types in found.items()
+            if type_ is None or type_ in types
+        ]
+        for line in [len(lines)] if getattr(args, f'count_{self.word}s') else lines:
+            print(line)
 
-    def list(self, args: argparse.Namespace) -> None:
-        """Print the names, with --show-types their types."""
-        with graph(args) as opened:
-            found = self.types(opened.node, self._hidden(args))
-        self._print(
-            args, [f'{n} [{", ".join(t)}]' if args.show_types else n for n, t in found.items()]
-        )
-
-    def find(self, args: argparse.Namespace, type_: str) -> None:
-        """Print the names that have a type."""
-        with graph(args) as opened:
-            found = self.types(opened.node, self._hidden(args))
-        self._print(args, [name for name, types in found.items() if type_ in types])
-
-    def type(self, args: argparse.Namespace, name: str) -> int:
+    def print_types(self, args: argparse.Namespace, name: str) -> int:
         """Print the types of a name, and return the status: 1 if there is none."""
-        hidden = self._hidden(args)
-        with graph(args, lambda node: name in self.types(node, hidden)) as opened:
+        hidden = self._is_hidden_shown(args)
+        with graph(lambda node: name in self.types(node, hidden)) as opened:
             types = self.types(opened.node, hidden).get(name, [])
         for type_ in types:
             print(type_)
         return 0 if types else 1
 
-    def _hidden(self, args: argparse.Namespace) -> bool:
+    def _is_hidden_shown(self, args: argparse.Namespace) -> bool:
         return getattr(args, f'include_hidden_{self.word}s', True)
-
-    def _print(self, args: argparse.Namespace, lines: list[str]) -> None:
-        if getattr(args, f'count_{self.word}s'):
-            lines = [str(len(lines))]
-        for line in lines:
-            print(line)
 
 
 def is_hidden(name: str) -> bool:
@@ -94,26 +85,26 @@ def split_node_name(name: str) -> tuple[str, str]:
 
 @contextlib.contextmanager
 def graph_with_node(
-    args: argparse.Namespace, names: Callable[[Any, bool], list[str]] = node_names
+    name: str, names: Callable[[Any], list[str]] = node_names
 ) -> Iterator[tuple[Graph, str]]:
-    """Open a graph that has the node of the arguments, which is yielded as well by its full name.
+    """Open a graph that has a node, which is yielded as well by its full name.
 
     `names` returns the nodes that count. Raises CommandError if it is not one of them in time.
     """
-    name = f'/{args.node_name.removeprefix("/")}'
-
-    def found(node: Any) -> bool:
-        return name in names(node, args.include_hidden_nodes)
-
-    with graph(args, found) as opened:
+    full = f'/{name.removeprefix("/")}'
+    with graph(lambda node: full in names(node)) as opened:
         # On a busy machine, a participant may be known long before its nodes are.
-        wait_for(lambda: found(opened.node) or opened.is_whole(), UNNAMED_S)
-        if not wait_for(lambda: found(opened.node), getattr(args, 'timeout', 1) - 1):
+        wait_for(lambda: full in names(opened.node) or opened.is_whole(), UNNAMED_S)
+        if full not in names(opened.node):
             raise CommandError('Node not found')
-        yield opened, name
+        yield opened, full
 
 
 def complete_nodes(**kwargs: Any) -> list[str]:
     """Return the names of the nodes, for Tab."""
-    with graph(argparse.Namespace()) as opened:
+    with graph() as opened:
         return node_names(opened.node)
+
+
+NODE = option('node_name', 'Name of the ROS node', complete_nodes)
+NODE_OR_ALL = option('node_name', 'Name of the ROS node', complete_nodes, nargs='?')

@@ -5,52 +5,29 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from rclpy import action
+from rclpy.action import ActionClient, get_action_names_and_types
+
 from helpers._plumbing.interrupts import uninterrupted
-from helpers.ros2._commands import Parser
+from helpers.ros2._commands import VALUES, command, flag
 from helpers.ros2._graph import full_name, graph
 from helpers.ros2._names import Names
+from helpers.ros2._values import filled, find_type, to_yaml
 
-
-def _actions(node: Any) -> list:
-    from rclpy.action import get_action_names_and_types
-
-    return get_action_names_and_types(node)
-
-
-ACTIONS = Names('action', 'action', _actions)
-
+ACTIONS = Names('action', 'action', get_action_names_and_types)
 LATE_S = 0.1
 
 
-def add_arguments(parser: Parser) -> None:
-    """Add the commands below `ros2 action`."""
-    listing, info, type_, send = parser.functions(_list, _info, _type, _send_goal)
-    ACTIONS.add_listing(listing, hidden=False)
-    for command in (info, type_, send):
-        command.option('action_name', "Name of the action (e.g. '/fibonacci')", ACTIONS.complete)
-    for command in (listing, info):
-        command.flag('-t --show-types', 'Additionally show the action type')
-    info.flag('-c --count', 'Only display the number of action clients and action servers')
-    send.option('action_type', 'Type of the action', ACTIONS.complete_types)
-    send.values('goal', "Goal request values in YAML (e.g. '{order: 10}')")
-    send.flag('-f --feedback', 'Echo feedback messages for the goal')
-
-
+@command(ACTIONS.show_types, ACTIONS.count)
 def _list(args: argparse.Namespace) -> None:
     """Output a list of action names."""
-    ACTIONS.list(args)
+    ACTIONS.print_names(args)
 
 
-def _type(args: argparse.Namespace) -> int:
-    """Print a action's type."""
-    return ACTIONS.type(args, args.action_name)
-
-
+@command(ACTIONS.name, ACTIONS.show_types)
 def _info(args: argparse.Namespace) -> None:
     """Print information about an action."""
-    from rclpy import action
-
-    with graph(args, lambda node: args.action_name in ACTIONS.types(node)) as opened:
+    with graph(lambda node: args.action_name in ACTIONS.types(node)) as opened:
         node = opened.node
         wanted = full_name(node, args.action_name)
         nodes = node.get_node_names_and_namespaces()
@@ -66,26 +43,21 @@ def _info(args: argparse.Namespace) -> None:
                 if action_name == wanted
             ]
             print(f'Action {word}: {len(found)}')
-            for name, types in [] if args.count else found:
+            for name, types in found:
                 print(f'    {name} [{", ".join(types)}]' if args.show_types else f'    {name}')
 
 
+@command(ACTIONS.name, ACTIONS.type, VALUES, flag('-f --feedback', 'Echo the feedback of the goal'))
 def _send_goal(args: argparse.Namespace) -> None:
     """Send an action goal."""
-    from action_msgs.msg import GoalStatus
-    from rclpy.action import ActionClient
-
-    from helpers.ros2._values import filled, find_type, to_yaml
-
     class_ = find_type(args.action_type, 'action', 'The passed action type is invalid')
-    goal, _ = filled(class_.Goal(), args.goal, 'Failed to populate message fields: {!r}')
-    words = 'ACCEPTED', 'EXECUTING', 'CANCELING', 'SUCCEEDED', 'CANCELED', 'ABORTED'
-    names = {getattr(GoalStatus, f'STATUS_{word}'): word for word in words}
+    goal = filled(class_.Goal(), args.values, 'Failed to populate message fields: {!r}')
+    words = ['UNKNOWN', 'ACCEPTED', 'EXECUTING', 'CANCELING', 'SUCCEEDED', 'CANCELED', 'ABORTED']
 
     def show(message: Any) -> None:
         print(f'Feedback:\n    {to_yaml(message.feedback)}')
 
-    with graph(args) as opened:
+    with graph() as opened:
         client = ActionClient(opened.node, class_, args.action_name)
         print('Waiting for an action server to become available...')
         client.wait_for_server()
@@ -107,4 +79,4 @@ def _send_goal(args: argparse.Namespace) -> None:
         if args.feedback:  # what came before the result, and waits to be shown
             opened.spin_until(lambda: False, LATE_S)
         print(f'Result:\n    {to_yaml(answer.result)}')
-        print(f'Goal finished with status: {names.get(answer.status, "UNKNOWN")}')
+        print(f'Goal finished with status: {words[answer.status]}')

@@ -5,93 +5,69 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
-import sys
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from helpers.ros2 import _index
-from helpers.ros2._commands import Parser
-from helpers.ros2._errors import CommandError
+from helpers.ros2._commands import CommandError, command, flag, option
+from helpers.ros2._index import interfaces
+from helpers.ros2._values import find_type, to_yaml
 
 HEADINGS = {'msg': 'Messages', 'srv': 'Services', 'action': 'Actions'}
-PLURALS = {'msg': 'msgs', 'srv': 'srvs', 'action': 'actions'}
 SEPARATOR = '---'
+ONLY = tuple(
+    flag(f'-{kind[0]} --only-{kind}s', f'Print out only the {heading.lower()}')
+    for kind, heading in HEADINGS.items()
+)
+PACKAGE = option('package_name', 'Name of the ROS package', _index.complete_packages)
+TYPE = option('type', "Its name (e.g. 'std_msgs/msg/String')", lambda **kwargs: interfaces())
 
 
-def add_arguments(parser: Parser) -> None:
-    """Add the commands below `ros2 interface`."""
-    listing, show, package, packages, proto = parser.functions(
-        _list, _show, _package, _packages, _proto
-    )
-    for command in (listing, package, packages):
-        for kind, plural in PLURALS.items():
-            help_ = f'Print out only the {HEADINGS[kind].lower()}'
-            command.flag(f'-{kind[0]} --only-{plural}', help_)
-    package.option('package_name', 'Name of the ROS package', _index.complete_packages)
-    for command in (show, proto):
-        help_ = "Name of an interface (e.g. 'std_msgs/msg/String')"
-        command.option('type', help_, lambda **kwargs: _index.interfaces())
-    show.flag('--all-comments', 'Show all comments, including for nested interface definitions')
-    show.flag('--no-comments', 'Show no comments or whitespace')
-    proto.flag('--no-quotes', 'Output without outer quotes')
-
-
-def _kinds(args: argparse.Namespace) -> list[str]:
-    chosen = [kind for kind, plural in PLURALS.items() if getattr(args, f'only_{plural}')]
-    return chosen or list(PLURALS)
-
-
+@command(*ONLY)
 def _list(args: argparse.Namespace) -> None:
     """List all interface types available."""
-    names = _index.interfaces()
-    for kind in _kinds(args):
+    chosen = [kind for kind in HEADINGS if getattr(args, f'only_{kind}s')]
+    for kind in chosen or HEADINGS:
         print(f'{HEADINGS[kind]}:')
-        for name in names:
+        for name in interfaces():
             if name.split('/')[1] == kind:
                 print(f'    {name}')
 
 
+@command(PACKAGE)
 def _package(args: argparse.Namespace) -> None:
     """Output a list of available interface types within one package."""
     _index.prefix_of(args.package_name, "Unknown package '{}'")
-    for name in _index.interfaces(args.package_name):
-        if name.split('/')[1] in _kinds(args):
-            print(name)
+    for name in interfaces(args.package_name):
+        print(name)
 
 
+@command()
 def _packages(args: argparse.Namespace) -> None:
     """Output a list of packages that provide interfaces."""
-    kinds = _kinds(args)
-    names = (name.split('/') for name in _index.interfaces())
-    for package in sorted({package for package, kind, _ in names if kind in kinds}):
+    for package in sorted({name.split('/')[0] for name in interfaces()}):
         print(package)
 
 
+@command(TYPE)
 def _proto(args: argparse.Namespace) -> None:
     """Output an interface prototype."""
-    from helpers.ros2._values import find_type, to_yaml
-
-    kind = args.type.split('/')[1] if args.type.count('/') == 2 else 'msg'
-    unknown = f"Unknown interface '{args.type}'"
-    class_ = find_type(args.type, kind if kind in PLURALS else 'msg', unknown)
-    part = {'msg': class_, 'srv': 'Request', 'action': 'Goal'}.get(kind, class_)
-    text = to_yaml(getattr(class_, part)() if isinstance(part, str) else part())
-    print(text if args.no_quotes else f'"{text}"')
+    kind = find(args.type).suffix[1:]
+    class_ = find_type(args.type, kind, f"Unknown interface '{args.type}'")
+    part = {'srv': 'Request', 'action': 'Goal'}.get(kind)
+    print(f'"{to_yaml(getattr(class_, part)() if part else class_())}"')
 
 
+@command(
+    TYPE,
+    flag('--all-comments', 'Show all comments, including for nested interface definitions'),
+    flag('--no-comments', 'Show no comments or whitespace'),
+)
 def _show(args: argparse.Namespace) -> None:
     """Output the interface definition."""
-    name = args.type
-    if name == '-':
-        name = '' if sys.stdin.isatty() else sys.stdin.readline().strip()
-    if not name:
-        raise CommandError('ros2 interface show: error: the passed value is empty', 2)
-    if args.all_comments and args.no_comments:
-        message = 'argument --no-comments: not allowed with argument --all-comments'
-        raise CommandError(f'ros2 interface show: error: {message}', 2)
-    for line in listing(name, not args.no_comments, args.all_comments):
+    for line in listing(args.type, not args.no_comments, args.all_comments):
         print(line)
 
 

@@ -7,18 +7,18 @@ import os
 import signal
 import sys
 
-IS_PROGRAM = os.path.basename(sys.argv[0]) == 'ros2'
-if IS_PROGRAM:  # Ctrl+C while Python still imports
+if os.path.basename(sys.argv[0]) == 'ros2':  # Ctrl+C while Python still imports
     signal.signal(signal.SIGINT, lambda number, frame: os._exit(number))
 
-import ast  # noqa: E402
 import importlib  # noqa: E402
 from pathlib import Path  # noqa: E402
 
-from helpers.ros2._commands import Parser  # noqa: E402
-from helpers.ros2._errors import CommandError  # noqa: E402
+from helpers.ros2._commands import CommandError, Parser, title  # noqa: E402
 
-FOLLOWS = 'ros2cli 0.32.2 of ROS 2 Jazzy'
+VERSION = (
+    'ros2 of the ROS 2 notebooks, for an environment of wheels; it follows ros2cli 0.32.2 of '
+    'ROS 2 Jazzy'
+)
 GUARD = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'
 
 
@@ -28,6 +28,7 @@ def main(argv: list[str] | None = None) -> int:
         _leave_to_a_real_one()
         signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(number))
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.stdout.reconfigure(line_buffering=True)
     try:
         status = _run(sys.argv[1:] if argv is None else argv)
         sys.stdout.flush()
@@ -46,40 +47,25 @@ def main(argv: list[str] | None = None) -> int:
 
 def verbs() -> dict[str, str]:
     """Return the name of each verb and its help, the first line of its file."""
-    files = sorted(Path(__file__).parent.glob('[!_]*.py'))
-    return {
-        file.stem: ast.get_docstring(ast.parse(file.read_bytes())).partition('\n')[0].rstrip('.')
-        for file in files
-        if file.stem != 'main'
-    }
+    files = sorted(set(Path(__file__).parent.glob('[!_]*.py')) - {Path(__file__)})
+    return {file.stem: title(file.read_text(encoding='utf-8').split('"""')[1]) for file in files}
 
 
 def _run(argv: list[str]) -> int:
     completing = '_ARGCOMPLETE' in os.environ
     words = os.environ.get('COMP_LINE', '').split()[1:] if completing else argv
     parser = Parser(prog='ros2', description='ros2 is an extensible command-line tool for ROS 2.')
-    parser.add_argument(
-        '--use-python-default-buffering',
-        action='store_true',
-        help='Do not force line buffering in stdout',
-    )
-    parser.add_argument('--version', action='version', version=_version())
+    parser.add_argument('--version', action='version', version=VERSION)
     typed = next((word for word in words if not word.startswith('-')), None)
-    for name, verb in parser.commands(verbs()).items():
-        if name == typed:
-            importlib.import_module(f'helpers.ros2.{name}').add_arguments(verb)
+    parsers = parser.add_parsers(verbs())
+    if typed in parsers:  # only this one is imported
+        parsers[typed].add_commands(importlib.import_module(f'helpers.ros2.{typed}'))
     if completing:
         import argcomplete
 
         argcomplete.autocomplete(parser, exclude=['-h', '--help'])
     args = parser.parse_args(argv)
-    if not args.use_python_default_buffering and hasattr(sys.stdout, 'reconfigure'):
-        sys.stdout.reconfigure(line_buffering=True)
     return args.run(args) or 0
-
-
-def _version() -> str:
-    return f'ros2 of the ROS 2 notebooks, for an environment of wheels; it follows {FOLLOWS}'
 
 
 def _leave_to_a_real_one() -> None:

@@ -5,56 +5,39 @@ from __future__ import annotations
 import argparse
 import sys
 
-from helpers.ros2._commands import Parser
-from helpers.ros2._errors import CommandError
+from rclpy import action
+
+from helpers.ros2._commands import CommandError, command, flag
 from helpers.ros2._graph import graph
-from helpers.ros2._names import complete_nodes, is_hidden, node_names, split_node_name
+from helpers.ros2._names import NODE, is_hidden, node_names, split_node_name
 
 
-def add_arguments(parser: Parser) -> None:
-    """Add the commands below `ros2 node`."""
-    listing, info = parser.functions(_list, _info)
-    listing.flag('-a --all', 'Display all nodes even hidden ones')
-    listing.flag('-c --count-nodes', 'Only display the number of nodes discovered')
-    info.option('node_name', 'Node name to request information', complete_nodes)
-    info.flag('--include-hidden', 'Display hidden topics, services, and actions as well')
-    for command in (listing, info):
-        command.graph_options()
-
-
+@command(
+    flag('-a --all', 'Display all nodes even hidden ones'),
+    flag('-c --count-nodes', 'Only display the number of nodes discovered'),
+)
 def _list(args: argparse.Namespace) -> None:
     """Output a list of available nodes."""
-    with graph(args) as opened:
+    with graph() as opened:
         names = sorted(node_names(opened.node, args.all))
-    if args.count_nodes:
-        print(len(names))
-        return
-    if len(set(names)) < len(names):
-        warning = (
+    if len(set(names)) < len(names) and not args.count_nodes:
+        print(
             'WARNING: Be aware that there are nodes in the graph that share an exact name, which '
-            'can have unintended side effects.'
+            'can have unintended side effects.',
+            file=sys.stderr,
         )
-        print(warning, file=sys.stderr)
-    for name in names:
-        print(name)
+    for line in [len(names)] if args.count_nodes else names:
+        print(line)
 
 
+@command(NODE)
 def _info(args: argparse.Namespace) -> None:
     """Output information about a node."""
-    from rclpy import action
-
-    name, hidden = args.node_name, args.include_hidden
-    with graph(args, lambda node: name in node_names(node, hidden)) as opened:
+    name = args.node_name
+    with graph(lambda node: name in node_names(node)) as opened:
         node = opened.node
-        number = node_names(node, hidden).count(name)
-        if not number:
+        if name not in node_names(node):
             raise CommandError(f"Unable to find node '{name}'")
-        if number > 1:
-            warning = (
-                f'There are {number} nodes in the graph with the exact name "{name}". You are '
-                'seeing information about only one of them.'
-            )
-            print(warning, file=sys.stderr)
         print(name)
         where = split_node_name(name)
         for title, found in (
@@ -65,6 +48,6 @@ def _info(args: argparse.Namespace) -> None:
             ('Action Servers', action.get_action_server_names_and_types_by_node(node, *where)),
             ('Action Clients', action.get_action_client_names_and_types_by_node(node, *where)),
         ):
-            shown = [(n, types) for n, types in found if hidden or not is_hidden(n)]
+            shown = [(n, types) for n, types in found if not is_hidden(n)]
             print(f'  {title}:')
             print(*(f'    {n}: {", ".join(types)}' for n, types in shown), sep='\n')

@@ -3,70 +3,68 @@
 from __future__ import annotations
 
 import argparse
+import getpass
+import shutil
+import subprocess
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
+from xml.sax.saxutils import escape
 
 from helpers.ros2 import _index
-from helpers.ros2._commands import Parser
-from helpers.ros2._errors import CommandError
+from helpers.ros2._commands import CommandError, command, flag, option
+
+TEMPLATES = Path(__file__).with_name('templates')
+LICENSES = {'Apache-2.0': Path(__file__).resolve().parents[2] / 'LICENSE'}
+# What a package is made of, by its build type. A file without a template is empty.
+FILES = {
+    'ament_python': (
+        *('{name}/', 'setup.py', 'setup.cfg', 'resource/', 'resource/{name}'),
+        *('{name}/__init__.py', 'test/', 'test/test_copyright.py', 'test/test_flake8.py'),
+        *('test/test_pep257.py', '{name}/{node}.py'),
+    ),
+    'ament_cmake': ('src/', 'include/{name}/', 'CMakeLists.txt', 'src/{node}.cpp'),
+}
+TOOLS = {'ament_python': [], 'ament_cmake': ['ament_cmake']}
+TESTS = {
+    'ament_python': ['ament_copyright', 'ament_flake8', 'ament_pep257', 'python3-pytest'],
+    'ament_cmake': ['ament_lint_auto', 'ament_lint_common'],
+}
+NO_DEPENDENCIES = """\
+# uncomment the following section in order to fill in
+# further dependencies manually.
+# find_package(<dependency> REQUIRED)"""
+PACKAGE = 'package_name', 'The package name', _index.complete_packages
 
 
-def add_arguments(parser: Parser) -> None:
-    """Add the commands below `ros2 pkg`."""
-    _, prefix, executables, xml, create = parser.functions(
-        _list, _prefix, _executables, _xml, _create
-    )
-    for command in (prefix, executables, xml):
-        nargs = '?' if command is executables else None
-        complete = _index.complete_packages
-        command.option('package_name', 'The package name', complete, nargs=nargs)
-    prefix.flag('--share', 'Show share directory for the package')
-    executables.flag('--full-path', 'Show full path of each executable')
-    xml.option('-t --tag', "The XML tag to output (e.g. 'version')")
-    _add_create_arguments(create)
-
-
-def _add_create_arguments(create: Parser) -> None:
-    create.option('package_name', 'The package name')
-    versions = {'type': int, 'default': 3, 'choices': [2, 3]}
-    create.option('--package-format --package_format', 'The package.xml format', **versions)
-    todo = 'TODO: Package description'
-    create.option('--description', 'The description given in the package.xml', default=todo)
-    todo = 'TODO: License declaration'
-    create.option('--license', "The license of this package ('?' lists the known)", default=todo)
-    create.option('--destination-directory', 'Where to create the package', default='.')
-    types = {'default': 'ament_cmake', 'choices': ['cmake', 'ament_cmake', 'ament_python']}
-    create.option('--build-type', 'The build type to process the package with', **types)
-    create.option('--dependencies', 'list of dependencies', nargs='+', default=[])
-    create.option('--maintainer-email', 'email address of the maintainer of this package')
-    create.option('--maintainer-name', 'name of the maintainer of this package')
-    create.option('--node-name', 'name of the empty executable')
-    create.option('--library-name', 'name of the empty library')
-
-
+@command()
 def _list(args: argparse.Namespace) -> None:
     """Output a list of available packages."""
     for name in sorted(_index.packages()):
         print(name)
 
 
+@command(option(*PACKAGE), flag('--share', 'Show share directory for the package'))
 def _prefix(args: argparse.Namespace) -> None:
     """Output the prefix path of a package."""
     prefix = _index.prefix_of(args.package_name, 'Package not found')
     print(prefix / 'share' / args.package_name if args.share else prefix)
 
 
+@command(option(*PACKAGE, nargs='?'))
 def _executables(args: argparse.Namespace) -> None:
     """Output a list of package specific executables."""
     for package in [args.package_name] if args.package_name else sorted(_index.packages()):
         for file in sorted(_index.executables(package)):
-            print(file if args.full_path else f'{package} {file.name}')
+            print(f'{package} {file.name}')
 
 
+@command(option(*PACKAGE), option('-t --tag', "The XML tag to output (e.g. 'version')"))
 def _xml(args: argparse.Namespace) -> None:
     """Output the XML of the package manifest or a specific tag."""
     name = args.package_name
-    file = Path(_index.prefix_of(name, 'Package not found'), 'share', name, 'package.xml')
+    file = _index.prefix_of(name, 'Package not found') / 'share' / name / 'package.xml'
     if not file.is_file():
         raise CommandError('Package XML manifest not found')
     tree = ElementTree.parse(file)
@@ -80,8 +78,107 @@ def _xml(args: argparse.Namespace) -> None:
         print(element.text)
 
 
+@command(
+    option('package_name', 'The package name'),
+    option('--description', 'Of the package', default='TODO: Package description'),
+    option('--license', 'Of the package', default='TODO: License declaration'),
+    option('--destination-directory', 'Where to create the package', default='.'),
+    option('--build-type', 'ament_cmake if not given', choices=FILES, default='ament_cmake'),
+    option('--dependencies', 'list of dependencies', nargs='+', default=[]),
+    option('--maintainer-email', 'email address of the maintainer of this package'),
+    option('--maintainer-name', 'name of the maintainer of this package'),
+    option('--node-name', 'name of the empty executable'),
+)
 def _create(args: argparse.Namespace) -> None:
     """Create a new ROS 2 package."""
-    from helpers.ros2._create import create
+    name, kind, node = args.package_name, args.build_type, args.node_name
+    package = f'{args.destination_directory}/{name}'
+    if Path(package).exists():
+        raise CommandError(
+            f'\nAborted!\nThe directory already exists: {package}\nEither remove the directory or '
+            'choose a different destination directory or package name'
+        )
+    maintainer = args.maintainer_name or getpass.getuser()
+    email = args.maintainer_email or _git_email() or f'{maintainer}@todo.todo'
+    print('going to create a new package')
+    for what, value in {
+        'package name': name,
+        'destination directory': Path(args.destination_directory).resolve(),
+        'package format': 3,
+        'version': '0.0.0',
+        'description': args.description,
+        'maintainer': [f'{maintainer} <{email}>'],
+        'licenses': [args.license],
+        'build type': kind,
+        'dependencies': args.dependencies,
+        **({'node_name': node} if node else {}),
+    }.items():
+        print(f'{what}: {value}')
+    values = {'description': args.description, 'license': args.license}
+    values |= {'name': name, 'maintainer': maintainer, 'email': email, 'kind': kind}
+    depends = {
+        'buildtool_depend': TOOLS[kind],
+        'depend': args.dependencies,
+        'test_depend': TESTS[kind],
+    }
+    try:
+        escaped = {what: escape(value) for what, value in values.items()}
+        _write(package, ('', 'package.xml'), escaped | {'depends': _tags(depends)})
+        print('creating source' + ' and include' * (kind == 'ament_cmake') + ' folder')
+        values |= {'node': node, **_parts(name, node, args.dependencies)}
+        _write(package, [file for file in FILES[kind] if node or 'node' not in file], values)
+        if args.license in LICENSES:
+            shutil.copyfile(LICENSES[args.license], f'{package}/LICENSE')
+    except OSError as error:
+        raise CommandError(f'unable to create {package}: {error.strerror}') from None
+    if args.license not in LICENSES:
+        known = '\n'.join(LICENSES)
+        print(
+            f"\n[WARNING]: Unknown license '{args.license}'.  This has been set in the package.xml,"
+            ' but no LICENSE file has been created.\nIt is recommended to use one of the ament '
+            f'license identifiers:\n{known}'
+        )
 
-    create(args)
+
+def _git_email() -> str:
+    if not (git := shutil.which('git')):
+        return ''
+    answer = subprocess.run([git, 'config', 'user.email'], capture_output=True, text=True)
+    return answer.stdout.strip()
+
+
+def _write(package: str, paths: Iterable[str], values: dict[str, Any]) -> None:
+    """Write files below a package, and make the folders, whose names end with a slash."""
+    for path in paths:
+        made = f'{package}/{path.format(**values)}'.rstrip('/')
+        if path.endswith('/') or not path:
+            print('creating folder', made)
+            Path(made).mkdir(parents=True)
+        else:
+            print('creating', made)
+            text = _filled(path.rpartition('/')[2].translate({ord('{'): '', ord('}'): ''}), values)
+            Path(made).write_text(text, encoding='utf-8')
+
+
+def _filled(template: str, values: dict[str, Any]) -> str:
+    """Return a template with its values filled in, or nothing if there is none."""
+    file = TEMPLATES / f'{template}.txt'
+    return file.read_text(encoding='utf-8').format(**values) if file.exists() else ''
+
+
+def _tags(depends: dict[str, list[str]]) -> str:
+    """Return the lines of package.xml for the packages of each tag."""
+    groups = [[f'  <{tag}>{name}</{tag}>\n' for name in names] for tag, names in depends.items()]
+    return ''.join(''.join(group) + '\n' for group in groups if group)
+
+
+def _parts(name: str, node: str | None, dependencies: list[str]) -> dict[str, str]:
+    """Return what differs in setup.py and CMakeLists.txt."""
+    find = [f'find_package({one} REQUIRED)' for one in ('ament_cmake', *dependencies)]
+    parts = {'find': '\n'.join([*find, *([] if dependencies else [NO_DEPENDENCIES])])}
+    if not node:
+        return parts | {'scripts': '', 'executable': ''}
+    listed = '\n'.join(f'  "{one}"' for one in dependencies)
+    needs = f'ament_target_dependencies(\n  {node}\n{listed}\n)\n' if dependencies else ''
+    parts['executable'] = _filled('executable', {'node': node, 'needs': needs})
+    return parts | {'scripts': f"            '{node} = {name}.{node}:main'\n"}

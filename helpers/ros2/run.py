@@ -8,25 +8,10 @@ import shlex
 import signal
 import subprocess
 import sys
-from typing import Any
 
 from helpers.ros2 import _index
-from helpers.ros2._commands import Parser
-from helpers.ros2._errors import CommandError
+from helpers.ros2._commands import CommandError, command, option
 from helpers.ros2._graph import join_domain
-
-
-def add_arguments(parser: Parser) -> None:
-    """Add the arguments of `ros2 run`."""
-    parser.option('--prefix', "Command before the executable, as in --prefix 'gdb -ex run --args'")
-    parser.option('package_name', 'Name of the ROS package', _index.complete_packages)
-    parser.option('executable_name', 'Name of the executable', _complete)
-    parser.option('argv', 'Arguments of the executable', nargs=argparse.REMAINDER)
-    parser.set_defaults(run=_run)
-
-
-def _complete(parsed_args: argparse.Namespace, **kwargs: Any) -> list[str]:
-    return [file.name for file in _index.executables(parsed_args.package_name)]
 
 
 def command_of(package: str, executable: str) -> list[str]:
@@ -43,11 +28,18 @@ def command_of(package: str, executable: str) -> list[str]:
     return [sys.executable, str(found[0])] if named and ' ' in sys.executable else [str(found[0])]
 
 
+@command(
+    option('--prefix', "Command before the executable, as in --prefix 'gdb -ex run --args'"),
+    option('package_name', 'Name of the ROS package', _index.complete_packages),
+    option('executable_name', 'Name of the executable'),
+    option('argv', 'Arguments of the executable', nargs=argparse.REMAINDER),
+)
 def _run(args: argparse.Namespace) -> int:
-    command = command_of(args.package_name, args.executable_name)
+    """Run a package specific executable."""
+    words = command_of(args.package_name, args.executable_name)
     join_domain()
     try:
-        process = subprocess.Popen([*shlex.split(args.prefix or ''), *command, *args.argv])
+        process = subprocess.Popen([*shlex.split(args.prefix or ''), *words, *args.argv])
     except OSError as error:
         raise CommandError(f'{args.executable_name} cannot be started: {error}') from None
     while process.returncode is None:

@@ -7,87 +7,75 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from helpers.ros2 import _qos
-from helpers.ros2._commands import Parser, number
-from helpers.ros2._errors import CommandError
+from rclpy import qos
+from rclpy.node import Node
+
+from helpers.ros2._commands import (
+    VALUES,
+    Argument,
+    CommandError,
+    command,
+    flag,
+    natural,
+    option,
+    positive,
+)
 from helpers.ros2._graph import Graph, full_name, graph, wait_for
 from helpers.ros2._names import Names
-
-if TYPE_CHECKING:
-    from rclpy.node import Node
+from helpers.ros2._values import filled, find_type, to_csv, to_yaml
 
 TOPICS = Names('topic', 'msg', lambda node: node.get_topic_names_and_types())
-FILTER = 'Only messages `m` for which this Python expression holds'
+ARGUMENTS = (TOPICS.hidden,)
+TYPE = 'message_type', 'Type of the ROS message', TOPICS.complete_types
+KEEP_ALIVE_S = 0.1  # after the last message, so that it is sent
+POLICIES = {
+    'history': qos.HistoryPolicy,
+    'reliability': qos.ReliabilityPolicy,
+    'durability': qos.DurabilityPolicy,
+    'liveliness': qos.LivelinessPolicy,
+}
 
 
-def add_arguments(parser: Parser) -> None:
-    """Add the commands below `ros2 topic`."""
-    parser.flag(*TOPICS.hidden_flag)
-    functions = _list, _info, _type, _find, _echo, _hz, _bw, _delay, _pub
-    commands = listing, info, type_, find, echo, hz, bw, delay, pub = parser.functions(*functions)
-    for command in commands:
-        command.graph_options()
-    for command in (listing, find):
-        TOPICS.add_listing(command)
-    for command in (info, type_, echo, hz, bw, delay, pub):
-        command.option('topic_name', "Name of the ROS topic (e.g. '/chatter')", TOPICS.complete)
-    listing.flag('-t --show-types', 'Additionally show the topic type')
-    listing.flag('-v --verbose', 'List full details about each topic')
-    info.flag('-v --verbose', 'Print the node, type, GID and QoS of each endpoint')
-    find.option('topic_type', 'Name of the ROS topic type to filter for', TOPICS.complete_types)
-    for command, window in (hz, 10000), (bw, 100), (delay, 10000):
-        help_ = f'Window size, in number of messages (default: {window})'
-        command.option('-w --window', help_, type=number(int, 1), default=window)
-    hz.option('--filter', FILTER, metavar='EXPR')
-    hz.flag('--wall-time', 'Calculate the rate using wall time')
-    _add_echo_arguments(echo)
-    _add_pub_arguments(pub)
+def _qos_options(default: str) -> list[Argument]:
+    """Return the options, with the name of the profile that is meant without them."""
+    profiles = {'choices': qos.QoSPresetProfiles.short_keys(), 'default': default}
+    return [
+        option('--qos-profile', f'Preset profile (default: {default})', **profiles),
+        option('--qos-depth', 'Queue size', metavar='N', type=natural),
+        *(
+            option(f'--qos-{name}', f'The {name}', choices=kind.short_keys())
+            for name, kind in POLICIES.items()
+        ),
+    ]
 
 
-def _add_echo_arguments(echo: Parser) -> None:
-    echo.option('message_type', 'Type of the ROS message', TOPICS.complete_types, nargs='?')
-    _qos.add_qos_arguments(echo, 'sensor_data')
-    echo.flag('--csv', 'Output all recursive fields separated by commas')
-    echo.option('--field', "Echo a field of a message, as in 'pose.pose.position'")
-    echo.flag('-f --full-length', 'Do not truncate arrays, bytes, and strings')
-    help_ = 'The length to truncate arrays, bytes, and strings to (default: 128)'
-    echo.option('-l --truncate-length', help_, type=number(int, 0), default=128)
-    echo.flag('--no-arr', "Don't print array fields of messages")
-    echo.flag('--no-str', "Don't print string fields of messages")
-    echo.flag('--flow-style', 'Print collections in the flow style')
-    echo.flag('--no-lost-messages', "Don't report when a message is lost")
-    echo.flag('--raw', 'Echo the raw binary representation')
-    echo.option('--filter', FILTER, metavar='EXPR')
-    echo.flag('--once', 'Print the first message received and then exit')
-    echo.option('--timeout', 'Seconds to wait', metavar='N', type=number(float, 0, above=True))
-    echo.flag('-i --include-message-info', 'Shows the associated message info')
+def _profile(args: argparse.Namespace) -> qos.QoSProfile:
+    """Return the quality of service that the options give."""
+    chosen = qos.QoSPresetProfiles.get_from_short_key(args.qos_profile)
+    for name, kind in POLICIES.items():
+        if word := getattr(args, f'qos_{name}'):
+            setattr(chosen, name, kind.get_from_short_key(word))
+    if args.qos_depth:
+        chosen.depth = args.qos_depth
+    elif chosen.durability == qos.DurabilityPolicy.TRANSIENT_LOCAL and chosen.depth == 0:
+        chosen.depth = 1
+    return chosen
 
 
-def _add_pub_arguments(pub: Parser) -> None:
-    positive = number(float, 0, above=True)
-    pub.option('message_type', 'Type of the ROS message', TOPICS.complete_types)
-    pub.values('values', "Values of the message in YAML (e.g. 'data: Hello World')")
-    pub.option('-r --rate', 'Rate in Hz (default: 1)', metavar='N', type=positive, default=1.0)
-    pub.option('-p --print', 'Only print every N-th message', metavar='N', type=int, default=1)
-    pub.flag('-1 --once', 'Publish one message and exit')
-    pub.option('-t --times', 'Publish this often, then exit', type=number(int, 0), default=0)
-    help_ = 'Wait for N subscriptions (default: 1 with --once or --times, otherwise 0)'
-    pub.option('-w --wait-matching-subscriptions', help_, metavar='N', type=number(int, 0))
-    pub.option('--max-wait-time-secs', 'The longest wait for them', metavar='N', type=positive)
-    help_ = 'Seconds to live after the last message (default: 0.1)'
-    pub.option('--keep-alive', help_, metavar='N', type=positive, default=0.1)
-    pub.option('-n --node-name', 'Name of the created publishing node')
-    _qos.add_qos_arguments(pub, 'default')
-
-
+@command(
+    TOPICS.show_types,
+    TOPICS.count,
+    TOPICS.hidden_below,
+    flag('-v --verbose', 'List full details about each topic'),
+)
 def _list(args: argparse.Namespace) -> None:
     """Output a list of available topics."""
     if not args.verbose or args.count_topics:
-        TOPICS.list(args)
+        TOPICS.print_names(args)
         return
-    with graph(args) as opened:
+    with graph() as opened:
         node = opened.node
         topics = TOPICS.types(node, args.include_hidden_topics)
         for title, word, count in (
@@ -101,10 +89,11 @@ def _list(args: argparse.Namespace) -> None:
             print()
 
 
+@command(TOPICS.name, flag('-v --verbose', 'Print the node, type, GID and QoS of each endpoint'))
 def _info(args: argparse.Namespace) -> None:
     """Print information about a topic."""
     name = args.topic_name
-    with graph(args, lambda node: name in TOPICS.types(node)) as opened:
+    with graph(lambda node: name in TOPICS.types(node)) as opened:
         node = opened.node
         types = TOPICS.types(node).get(name)
         if types is None:
@@ -120,29 +109,43 @@ def _info(args: argparse.Namespace) -> None:
                 print(info, end=end)
 
 
+@command(TOPICS.name)
 def _type(args: argparse.Namespace) -> int:
     """Print a topic's type."""
-    return TOPICS.type(args, args.topic_name)
+    return TOPICS.print_types(args, args.topic_name)
 
 
+@command(TOPICS.type, TOPICS.count, TOPICS.hidden_below)
 def _find(args: argparse.Namespace) -> None:
     """Output a list of available topics of a given type."""
-    TOPICS.find(args, args.topic_type)
+    TOPICS.print_names(args, args.topic_type)
 
 
 # --- Listening
 
 
+@command(
+    TOPICS.name,
+    option(*TYPE, nargs='?'),
+    *_qos_options('sensor_data'),
+    flag('--once', 'Print the first message received and then exit'),
+    option('--field', "Echo a field of a message, as in 'pose.pose.position'"),
+    flag('--csv', 'Output all recursive fields separated by commas'),
+    flag('--no-arr', "Don't print array fields of messages"),
+    flag('--flow-style', 'Print collections in the flow style'),
+    flag('-f --full-length', 'Do not truncate arrays, bytes, and strings'),
+    option('-l --truncate-length', 'Cut arrays and texts (at 128)', type=natural, default=128),
+)
 def _echo(args: argparse.Namespace) -> None:
     """Output messages from a topic."""
-    from helpers.ros2._values import find_type
-
     fields = [part for part in (args.field or '').split('.') if part]
     if args.field is not None and not fields:
         raise CommandError(f"Invalid field value '{args.field}'")
-    keep, shown = _filter(args.filter), []
+    given, shown = args.message_type, []
+    if given is not None:
+        given = find_type(given, 'msg', 'The passed message type is invalid')
 
-    def show(message: Any, info: dict) -> None:
+    def show(message: Any) -> None:
         if args.once and shown:
             return
         try:
@@ -150,65 +153,49 @@ def _echo(args: argparse.Namespace) -> None:
                 message = getattr(message, field)
         except AttributeError as error:
             raise CommandError(f"Invalid field '{'.'.join(fields)}': {error}") from None
-        if keep(message):
-            shown[:] = [True]
-            _print_message(message, info, args)
+        _print_message(message, args)
+        shown[:] = [True]
 
-    given = args.message_type
-    if given is not None:
-        given = find_type(given, 'msg', 'The passed message type is invalid')
-    with graph(args, lambda node: given or _count(node, args)) as opened:
-        node = opened.node
-        topic = full_name(node, args.topic_name)
-        qos = _qos.profile(args) if _qos.is_set(args) else _matching(node, topic, args)
+    with graph(lambda node: given or _has_publisher(node, args.topic_name)) as opened:
+        topic = full_name(opened.node, args.topic_name)
+        profile = _profile(args)
+        if all(getattr(args, f'qos_{name}') is None for name in ('depth', *POLICIES)):
+            match(profile, opened.node.get_publishers_info_by_topic(topic))
         class_ = given or _class_of(opened, args.topic_name)
-        _subscribe(node, class_, topic, show, qos, args.raw, say_lost=not args.no_lost_messages)
-        opened.spin_until(lambda: args.once and shown, args.timeout or math.inf)
+        # If no publisher matches, rclpy says it.
+        opened.node.create_subscription(class_, topic, show, profile)
+        opened.spin_until(lambda: args.once and shown)
 
 
-def _print_message(message: Any, info: dict, args: argparse.Namespace) -> None:
-    import yaml
-
-    from helpers.ros2._values import to_csv, to_yaml
-
-    limits = {'no_arr': args.no_arr, 'no_str': args.no_str}
-    limits['truncate_length'] = None if args.full_length else args.truncate_length
-    with_info = args.include_message_info
-    if not hasattr(message, '__slots__'):  # a plain value, or raw
-        head = f'---Got new message, message info:---\n{info}\n---Message data:---\n'
-        print(f'{head if with_info else ""}{message}\n---')
+def _print_message(message: Any, args: argparse.Namespace) -> None:
+    limits = {'truncate_length': None if args.full_length else args.truncate_length}
+    limits['no_arr'] = args.no_arr
+    if not hasattr(message, 'SLOT_TYPES'):  # a plain value
+        print(f'{message}\n---')
     elif args.csv:
-        print(*(info.values() if with_info else []), to_csv(message, **limits), sep=',')
+        print(to_csv(message, **limits))
     else:
-        head = f'{yaml.dump(info)}---\n' if with_info else ''
-        print(f'{head}{to_yaml(message, args.flow_style, **limits)}---')
+        print(f'{to_yaml(message, args.flow_style, **limits)}---')
 
 
-def _matching(node: Node, topic: str, args: argparse.Namespace) -> Any:
-    """Return the profile of the options, as strict as all publishers of the topic allow."""
-    from rclpy import qos
-
-    chosen = _qos.profile(args)
-    offered = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
+def match(profile: Any, publishers: list) -> None:
+    """Make a profile as strict as all publishers of a topic allow, and say what it is less."""
     for policy, kind, strict, loose in (
         ('reliability', qos.QoSReliabilityPolicy, 'RELIABLE', 'BEST_EFFORT'),
         ('durability', qos.QoSDurabilityPolicy, 'TRANSIENT_LOCAL', 'VOLATILE'),
     ):
-        are_strict = [getattr(one, policy) == kind[strict] for one in offered]
-        if offered:
-            setattr(chosen, policy, kind[strict if all(are_strict) else loose])
+        are_strict = [getattr(one.qos_profile, policy) == kind[strict] for one in publishers]
+        if publishers:
+            setattr(profile, policy, kind[strict if all(are_strict) else loose])
         if any(are_strict) and not all(are_strict):
             print(
                 f'Some, but not all, publishers are offering {kind.__name__}.{strict}. Falling '
                 f'back to {kind.__name__}.{loose} as it will connect to all publishers'
             )
-    return chosen
 
 
 def _class_of(opened: Graph, topic: str, wait: bool = False) -> type:
     """Return the class of a topic's messages. Raises CommandError if it has not exactly one."""
-    from helpers.ros2._values import find_type
-
     full = full_name(opened.node, topic)
 
     def types() -> list[str]:
@@ -227,37 +214,8 @@ def _class_of(opened: Graph, topic: str, wait: bool = False) -> type:
     return find_type(found[0], 'msg', f"The message type '{found[0]}' is invalid")
 
 
-def _count(node: Node, args: argparse.Namespace) -> int:
-    return node.count_publishers(full_name(node, args.topic_name))
-
-
-def _filter(expression: str | None) -> Callable[[Any], Any]:
-    """Return a function of the message. Raises CommandError if it is no expression."""
-    try:
-        code = compile(expression or 'True', '--filter', 'eval')
-    except SyntaxError as error:
-        raise CommandError(f'The filter is not an expression of Python: {error.msg}') from None
-    return lambda m: eval(code, {'m': m})
-
-
-def _subscribe(
-    node: Node,
-    class_: type,
-    topic: str,
-    callback: Callable,
-    qos: Any,
-    raw: bool,
-    say_lost: bool = False,
-) -> None:
-    from rclpy.event_handler import SubscriptionEventCallbacks
-
-    def lost(status: Any) -> None:
-        print(f'A message was lost!!!\n\ttotal count change:{status.total_count_change}')
-        print(f'\ttotal count: {status.total_count}---')
-
-    # If no publisher matches, rclpy's own callback says it.
-    events = SubscriptionEventCallbacks(message_lost=lost if say_lost else None)
-    node.create_subscription(class_, topic, callback, qos, event_callbacks=events, raw=raw)
+def _has_publisher(node: Node, topic: str) -> bool:
+    return node.count_publishers(full_name(node, topic)) > 0
 
 
 # --- Measuring
@@ -265,36 +223,31 @@ def _subscribe(
 
 def _measure(
     args: argparse.Namespace,
+    window: int,
     value: Callable[[Any, int], Any],
     show: Callable[[list, int], str | None],
     raw: bool = False,
-    quiet: str | None = None,
 ) -> None:
     """Collect a value of each message and the time in ns, and show the last ones each second.
 
-    A value that is None does not count. If nothing new has come, `quiet` is printed.
+    A value that is None does not count.
     """
-    from rclpy.qos import qos_profile_sensor_data
-
-    window, fresh = deque(maxlen=args.window), []
+    values, fresh = deque(maxlen=window), []
 
     def hear(message: Any) -> None:
         if (new := value(message, clock.now().nanoseconds)) is not None:
-            window.append(new)
+            values.append(new)
             fresh[:] = [True]
 
     def tick() -> None:
-        if window and (fresh or raw):
-            text = show(list(window), clock.now().nanoseconds)
-            print(text) if text else None
-        elif window and quiet:
-            print(quiet)
+        text = show(list(values), clock.now().nanoseconds) if fresh else None
+        print(text) if text else None
         fresh.clear()
 
-    with graph(args, lambda node: _count(node, args)) as opened:
+    with graph(lambda node: _has_publisher(node, args.topic_name)) as opened:
         class_, clock = _class_of(opened, args.topic_name, wait=True), opened.node.get_clock()
         topic = full_name(opened.node, args.topic_name)
-        _subscribe(opened.node, class_, topic, hear, qos_profile_sensor_data, raw)
+        opened.node.create_subscription(class_, topic, hear, qos.qos_profile_sensor_data, raw=raw)
         if raw:
             print(f'Subscribed to [{args.topic_name}]')
         opened.node.create_timer(1.0, tick)
@@ -311,14 +264,12 @@ def _statistics(values: list[int], title: str, mean: float) -> str:
     )
 
 
+@command(TOPICS.name)
 def _hz(args: argparse.Namespace) -> None:
     """Print the average publishing rate to screen."""
-    keep, last = _filter(args.filter), []
+    last = []
 
     def since_last(message: Any, now: int) -> int | None:
-        now = time.time_ns() if args.wall_time else now
-        if not keep(message):
-            return None
         before = last[0] if last else now
         last[:] = [now]
         return now - before if now > before else None
@@ -326,9 +277,10 @@ def _hz(args: argparse.Namespace) -> None:
     def show(values: list[int], now: int) -> str:
         return _statistics(values, 'average rate', len(values) / sum(values) * 1e9)
 
-    _measure(args, since_last, show)
+    _measure(args, 10000, since_last, show)
 
 
+@command(TOPICS.name)
 def _delay(args: argparse.Namespace) -> None:
     """Display delay of topic from timestamp in header."""
 
@@ -340,9 +292,10 @@ def _delay(args: argparse.Namespace) -> None:
     def show(values: list[int], now: int) -> str:
         return _statistics(values, 'average delay', sum(values) / len(values) * 1e-9)
 
-    _measure(args, age, show, quiet='no new messages')
+    _measure(args, 10000, age, show)
 
 
+@command(TOPICS.name)
 def _bw(args: argparse.Namespace) -> None:
     """Display bandwidth used by topic."""
 
@@ -358,58 +311,51 @@ def _bw(args: argparse.Namespace) -> None:
         size = f'\tMessage size mean: {mean} min: {least} max: {most}'
         return f'{rate}/s from {len(sizes)} messages\n{size}'
 
-    _measure(args, lambda message, now: (len(message), now), show, raw=True)
+    _measure(args, 100, lambda message, now: (len(message), now), show, raw=True)
 
 
 # --- Publishing
 
 
+@command(
+    TOPICS.name,
+    option(*TYPE),
+    VALUES,
+    flag('-1 --once', 'Publish one message and exit'),
+    option('-t --times', 'Publish this often, then exit', metavar='N', type=natural, default=0),
+    option('-r --rate', 'Rate in Hz (default: 1)', metavar='N', type=positive, default=1.0),
+    option('-w --wait-matching-subscriptions', 'How many to wait for', type=natural, metavar='N'),
+    *_qos_options('default'),
+)
 def _pub(args: argparse.Namespace) -> None:
     """Publish a message to a topic."""
-    from helpers.ros2._values import filled, find_type
-
     class_ = find_type(args.message_type, 'msg', 'The passed message type is invalid')
-    failed = 'Failed to populate field: {}'
-    message, stamps = filled(class_(), args.values, failed, stamps=True)
-    times = 1 if args.once else args.times
-    wanted = args.wait_matching_subscriptions
-    wanted = int(times != 0) if wanted is None else wanted
-    if wanted == 0 and args.max_wait_time_secs is not None:
-        only = '--wait-matching-subscriptions, --once or --times'
-        raise CommandError(f'--max-wait-time-secs option is only effective with {only}')
-    with graph(args, name=args.node_name) as opened:
-        node, count = opened.node, 0
-        topic = full_name(node, args.topic_name)
-        publisher = node.create_publisher(class_, topic, _qos.profile(args))
-        _wait_for_subscriptions(publisher, wanted, args.max_wait_time_secs or math.inf)
+    message = filled(class_(), args.values, 'Failed to populate field: {}')
+    times, wanted = 1 if args.once else args.times, args.wait_matching_subscriptions
+    with graph() as opened:
+        topic, count = full_name(opened.node, args.topic_name), 0
+        publisher = opened.node.create_publisher(class_, topic, _profile(args))
+        _wait_for_subscriptions(publisher, int(times != 0) if wanted is None else wanted)
         print('publisher: beginning loop')
 
         def publish() -> None:
             nonlocal count
-            for set_stamp in stamps:
-                set_stamp(node.get_clock().now().to_msg())
             count += 1
-            if args.print and count % args.print == 0:
-                print(f'publishing #{count}: {message!r}\n')
+            print(f'publishing #{count}: {message!r}\n')
             publisher.publish(message)
 
         publish()
         if times != 1:
-            node.create_timer(1.0 / args.rate, publish)
+            opened.node.create_timer(1.0 / args.rate, publish)
             opened.spin_until(lambda: times and count >= times)
-        time.sleep(args.keep_alive)
+        time.sleep(KEEP_ALIVE_S)
 
 
-def _wait_for_subscriptions(publisher: Any, wanted: int, longest_s: float) -> None:
+def _wait_for_subscriptions(publisher: Any, wanted: int) -> None:
     def matched() -> bool:
         return publisher.get_subscription_count() >= wanted
 
-    end = time.monotonic() + longest_s
-    wait_for(matched, min(0.1, longest_s))  # what is there matches at once
+    wait_for(matched, 0.1)  # what is there matches at once
     while not matched():
         print(f'Waiting for at least {wanted} matching subscription(s)...')
-        if not wait_for(matched, min(1.0, end - time.monotonic())) and time.monotonic() >= end:
-            raise CommandError(
-                f'Timed out waiting for subscribers: Expected {wanted} subcribers but only got '
-                f'{publisher.get_subscription_count()} subscribers'
-            )
+        wait_for(matched, 1.0)
