@@ -7,6 +7,7 @@ from support.javascript import Script
 
 from helpers.queue_model import predict
 
+GLUE = 'const played = values => stories(predicted(values), 41);'
 numbers = st.tuples(
     st.integers(1, 50),  # hundredths of a second, as the sliders have them
     st.integers(1, 100),
@@ -18,7 +19,7 @@ numbers = st.tuples(
 
 @pytest.fixture(scope='module')
 def script():
-    return Script('free.js', '')
+    return Script('walk.js', 'stories.js', 'free.js', glue=GLUE)
 
 
 @settings(max_examples=100)
@@ -29,13 +30,12 @@ def test_what_is_drawn_is_the_prediction(script, drawn):
     period, callback, depth, threads, exclusive = drawn
     given_ = {'period': period / 100, 'callback': callback / 100, 'depth': depth}
     given_ |= {'threads': threads}
-    messages = script.call('predicted', given_ | {'exclusive': exclusive})
+    messages = script.call('played', given_ | {'exclusive': exclusive})
     table = predict(period / 100, callback / 100, depth, 1 if exclusive else threads, 41)
-    started = [one.get('started') for one in messages]
+    started = [None if 'by' in one else one['left'] for one in messages]
     assert [at is None for at in started] == table['started_s'].isna().tolist()
     assert [at for at in started if at is not None] == pytest.approx(
         table['started_s'].dropna().tolist()
     )
-    assert [one.get('lost') is None for one in messages] == table['started_s'].notna().tolist()
     heard = table['started_s'].notna().sum()
     assert script.call('told', messages).startswith(f'{heard} of 41 messages are heard.')

@@ -15,7 +15,7 @@ from matplotlib.patches import Ellipse
 from matplotlib.text import Text
 
 from helpers import plots
-from helpers._plumbing.alt_text import alt_text, describe
+from helpers._plumbing.alt_text import alt_text
 
 HEARD = [0, 1, 2, 3, 7, 11, 15, 19, 23, 27, *range(31, 41)]  # the slow subscriber of lesson 02
 PERIOD_S, CALLBACK_S = 0.05, 0.2
@@ -114,25 +114,7 @@ def test_texts_are_readable_on_a_projector(slow, draw):
     assert len(plt.get_fignums()) == 1
 
 
-@each_plot
-def test_draws_a_run_without_callbacks(draw):
-    ax = draw(table_of([np.nan] * 12))
-    ax.figure.canvas.draw()
-    assert all(np.isfinite([*ax.get_xlim(), *ax.get_ylim()]))
-
-
 # --- What is said about a figure ---
-
-
-def test_title_description_and_axes_of_a_figure():
-    assert alt_text(plt.figure()) == 'A figure without a title.'
-    figure, ax = plt.subplots()
-    ax.set(title='A drive', xlabel='x (m)', ylabel='y (m)')
-    assert alt_text(figure) == 'A drive. Horizontal axis: x (m). Vertical axis: y (m).'
-    describe(ax, 'A circle, twice.')
-    assert alt_text(figure).startswith('A drive. A circle, twice. Horizontal')
-    describe(ax, 'One circle.', title='Moves')
-    assert alt_text(figure).startswith('Moves. One circle. Horizontal')
 
 
 @each_plot
@@ -182,16 +164,6 @@ def test_with_depth_crosses_move_to_the_loss():
     np.testing.assert_allclose(points_of(ax)['lost 4'][2:], [(5 * p, 5), (6 * p, 6)])
 
 
-def test_heard_numbers_and_gaps_can_be_read(slow):
-    ax = plots.sequence_gaps(slow)
-    assert words_of(ax) == [str(seq) for seq in HEARD] + 7 * ['3 lost']
-    first = next(text for text in ax.texts if text.get_text() == '3 lost')
-    assert first.xy == pytest.approx((5 * PERIOD_S, 5))
-    nan = np.nan
-    words = words_of(plots.sequence_gaps(table_of([nan, nan, 0.2, 0.4, nan, nan, nan])))
-    assert [word for word in words if 'lost' in word] == ['2 lost', '3 lost']
-
-
 @pytest.mark.parametrize('published', [None, np.arange(50) * 1e-5])
 def test_labels_neither_overlap_nor_leave_the_axes(published):
     started = np.full(50, np.nan)
@@ -202,13 +174,6 @@ def test_labels_neither_overlap_nor_leave_the_axes(published):
     assert len(ax.texts) > 1
     assert all(text.get_window_extent().x0 >= ax.bbox.x0 for text in ax.texts)
     assert not overlap(ax.texts)
-
-
-@pytest.mark.parametrize(('next_heard_s', 'said'), [(0.03, []), (0.3, ['3 lost'])])
-def test_labels_cover_no_heard_message(next_heard_s, said):
-    started = [0, np.nan, np.nan, np.nan, next_heard_s, *np.linspace(0.4, 1, 36)]
-    ax = plots.sequence_gaps(table_of(started, published=np.arange(41) * 1e-5))
-    assert words_of(ax) == said
 
 
 def test_two_runs_beside_each_other(slow, parallel):
@@ -239,40 +204,6 @@ def test_bars_of_a_timeline_are_the_callbacks(parallel):
     assert ax.get_legend() is None
 
 
-def test_lanes_are_in_natural_order_from_the_top():
-    ax = plots.timeline(table_of(np.arange(24) * PERIOD_S, threads=12))
-    names = [label.get_text() for label in ax.get_yticklabels()]
-    assert names == [f'thread {n}' for n in range(1, 13)]
-    bottom, top = ax.get_ylim()
-    bars = [bar for container in ax.containers for bar in container]
-    assert top < min(bar.get_y() for bar in bars)
-    assert bottom > max(bar.get_y() + bar.get_height() for bar in bars)
-
-
-def test_every_number_fits_its_bar(slow):
-    assert words_of(plots.timeline(slow)) == [str(seq) for seq in HEARD]
-    # In this picture a bar has room for one digit, not for two.
-    ax = plots.timeline(table_of(np.arange(60) * PERIOD_S, callback_s=0.045))
-    ax.figure.canvas.draw()
-    assert words_of(ax) == [str(seq) for seq in range(10)]
-    for text in ax.texts:
-        box, centre = text.get_window_extent(), text.get_position()[0]
-        ends = ax.transData.transform([(centre - 0.0225, 0), (centre + 0.0225, 0)])[:, 0]
-        assert ends[0] <= box.x0 < box.x1 <= ends[1]
-
-
-def test_groups_differ_and_share_lanes(slow):
-    groups = {f'group {n}': slow.assign(thread=f'thread {n // 2}') for n in range(5)}
-    ax = plots.timeline(groups, time_label='time since the first callback (s)')
-    assert ax.get_xlabel() == 'time since the first callback (s)'
-    assert legend_of(ax) == list(groups)
-    first_bars = [container[0] for container in ax.containers]
-    looks = [(bar.get_facecolor(), bar.get_hatch()) for bar in first_bars]
-    assert all(len(set(each)) == 5 for each in zip(*looks, strict=True))
-    assert looks == [(p.get_facecolor(), p.get_hatch()) for p in ax.get_legend().get_patches()]
-    assert [bars[0][2] for bars in bars_of(ax).values()] == [0, 0, 1, 1, 2]
-
-
 def test_with_depth_a_timeline_shows_waiting_messages(slow):
     ax = plots.timeline({'exclusive': slow}, depth=10)
     assert [label.get_text() for label in ax.get_yticklabels()] == ['thread 1', 'waiting']
@@ -289,27 +220,6 @@ def test_with_depth_a_timeline_shows_waiting_messages(slow):
     np.testing.assert_allclose(sorted(crosses[:, 0]), sorted(left_s[slow.started_s.isna()]))
     assert min(lanes.lane) > callbacks[0].get_y() + callbacks[0].get_height()
     assert ax.get_ylim()[0] > max(lanes.lane)
-
-
-def test_span_shows_a_part(slow):
-    ax = plots.timeline(slow, span_s=(0.3, 0.9))
-    assert ax.get_xlim() == (0.3, 0.9)
-    assert words_of(ax) == ['1', '2', '3', '7']
-
-
-def test_shared_axes_show_the_longest_run(slow, parallel):
-    _, panels = plt.subplots(2, sharex=True)
-    for ax, table in zip(panels, (slow, parallel), strict=True):
-        assert plots.timeline(table, title='Mine', ax=ax) is ax
-    assert panels[0].get_xlim() == panels[1].get_xlim() == (0, pytest.approx(1.02 * 20 * 0.2))
-    assert panels[0].get_title(loc='left') == 'Mine'
-
-
-def test_a_running_callback_reaches_the_end():
-    table = table_of([0.0, 0.3])
-    table.loc[0, 'finished_s'] = np.nan
-    (bars,) = bars_of(plots.timeline(table)).values()
-    assert bars[0][:2] == pytest.approx((0.0, 0.5))
 
 
 # --- How full the queue is ---
@@ -329,19 +239,6 @@ def test_steps_by_hand():
     waiting, limit = ax.lines
     assert set(limit.get_ydata()) == {2}
     assert waiting.get_linestyle() != limit.get_linestyle()
-
-
-@pytest.mark.parametrize('depth', [1, 3, 10])
-def test_the_length_stays_between_zero_and_the_depth(slow, depth):
-    # Also if the record is late: a newer message came between a take and its callback.
-    lengths = [*steps_of(slow.assign(started_s=slow.started_s + 0.07), depth).values()]
-    assert (min(lengths), max(lengths), lengths[-1]) == (0, depth, 0)
-
-
-def test_messages_that_nobody_takes_stay():
-    table = table_of(np.full(12, np.nan))
-    assert [*steps_of(table, 10).values()] == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 10, 10]
-    assert len(points_of(plots.queue_length(table, 10))['pushed out: 2']) == 2
 
 
 # --- Latency ---
@@ -459,33 +356,6 @@ def test_error_has_a_line_each_and_shaded_times():
     (span,) = ax.patches
     assert (span.get_x(), span.get_width()) == (4, 4)
     assert (ax.get_xlabel(), ax.get_ylabel()) == ('time (s)', 'distance from the truth (m)')
-    assert ax.get_yscale() == 'linear'
-    assert plots.error({'a': DRIVE}, log=True).get_yscale() == 'log'
-
-
-def test_paths_share_one_scale():
-    axes = plots.paths(DRIVE, {name: DRIVE + number for number, name in enumerate('abcd')})
-    assert [ax.get_title('left') for ax in axes] == list('abcd')
-    for number, ax in enumerate(axes):
-        truth, estimate = ax.lines
-        assert truth.get_xydata().tolist() == DRIVE[['x', 'y']].to_numpy().tolist()
-        assert estimate.get_xydata().tolist() == (DRIVE + number)[['x', 'y']].to_numpy().tolist()
-        assert ax.get_xlim() == axes[0].get_xlim()
-        assert ax.get_aspect() == 1
-    assert len([ax for ax in axes[0].figure.axes if ax.axison]) == 4
-
-
-def test_innovation_has_band_and_crosses():
-    rows = [(1, 0.1, 0.5, True), (2, 9, 0.5, False), (3, -0.2, 0.5, True)]
-    table = pd.DataFrame(rows, columns=['t', 'innovation', 'sigma', 'accepted'])
-    ax = plots.innovation(table)
-    assert legend_of(ax) == ['3 sigma', 'used 2', 'kept out 1']
-    assert points_of(ax)['kept out 1'].tolist() == [[2, 9]]
-    low, high, _, used = ax.lines
-    assert set(low.get_ydata()) == {-1.5}
-    assert set(high.get_ydata()) == {1.5}
-    assert used.get_xydata().tolist() == [[1, 0.1], [3, -0.2]]
-    assert legend_of(plots.innovation(table.assign(accepted=True))) == ['3 sigma', 'used 3']
 
 
 RUN = table_of([0.0])
@@ -499,7 +369,6 @@ CIRCLE = pd.DataFrame({'parent': ['a', 'b'], 'child': ['b', 'a'], 'publisher': '
         (lambda: plots.timeline({}), '1 to 5 callback groups, not 0'),
         (lambda: plots.timeline({'a': RUN, 'b': RUN.drop(columns='seq')}), 'lacks .* seq'),
         (lambda: plots.error(dict.fromkeys('abcde', DRIVE)), '1 to 4 errors, not 5'),
-        (lambda: plots.paths(DRIVE, dict.fromkeys('abcdefg', DRIVE)), '1 to 6 estimates, not 7'),
         (lambda: plots.frame_tree(FRAMES.iloc[[0, 0]]), 'make no tree'),
         (lambda: plots.frame_tree(FRAMES.iloc[1:]), 'make no tree'),
         (lambda: plots.frame_tree(pd.concat([FRAMES, CIRCLE])), 'make no tree'),

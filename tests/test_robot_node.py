@@ -21,10 +21,10 @@ from support.waits import wait_for
 
 from helpers.fusion.messages import yaw_of
 from helpers.robot import CORRIDOR, EMPTY, ROOMS, Pose, Robot, start_robot
-from helpers.robot.body import MAX_ACCELERATION, RADIUS_M, RATE_HZ, Body
+from helpers.robot.body import MAX_ACCELERATION, RADIUS_M, Body
 from helpers.robot.messages import DATUM, SKY
 from helpers.robot.robot import TOPICS
-from helpers.session import graph_environment, ros_session
+from helpers.session import ros_session
 
 
 class Wanderer(Node):
@@ -137,18 +137,6 @@ def test_the_robot_goes_on_while_a_callback_waits():
         gate.open()
 
 
-def test_a_robot_that_was_late_catches_up():
-    with ros_session():
-        robot = Robot(spin=False)
-        executor = SingleThreadedExecutor()
-        executor.add_node(robot)
-        robot.record.started_s -= 60
-        wait_for(lambda: executor.spin_once(timeout_sec=0.1) or robot.t_s >= 60)
-        assert robot.t_s <= time.monotonic() - robot.record.started_s + 0.5 / RATE_HZ
-        times = [step.t_s for step in robot.record.poses]
-        assert times == [number / RATE_HZ for number in range(len(times))]
-
-
 def test_ten_runs_in_sim_time_are_equal_idle_and_busy():
     runs = []
     with contextlib.ExitStack() as busy:
@@ -223,19 +211,6 @@ def test_an_interrupt_ends_the_robot():
         Robot().run(LIMIT_S, until=lambda: signal.raise_signal(signal.SIGINT))
 
 
-def test_only_what_nobody_of_the_lesson_hears_is_named():
-    with ros_session() as session:
-        Robot()
-        node = Node('mine')
-        node.create_subscription(LaserScan, 'scann', print, 10)
-        spin(session, node)
-        with pytest.raises(TimeoutError) as failure:
-            session.wait_until(lambda: False, 0.0)
-    assert str(failure.value).splitlines()[1:] == [
-        'The topic /scann has a subscription (mine) and no publisher. Nearly the same name: /scan.'
-    ]
-
-
 # --- Bad input
 
 
@@ -276,18 +251,3 @@ def test_what_cannot_be_gets_one_sentence():
         other.create_publisher(TwistStamped, '/three/cmd_vel', 10)
         with pytest.raises(ValueError, match='type geometry_msgs/msg/TwistStamped, and nothing'):
             Robot(namespace='three')
-
-
-def test_another_type_of_another_process_is_warned_of(capsys):
-    script = """
-import rclpy, time, geometry_msgs.msg as g
-rclpy.init()
-publisher = rclpy.create_node('stamped').create_publisher(g.TwistStamped, 'cmd_vel', 10)
-time.sleep(60)
-"""
-    with ros_session():
-        robot = Robot()
-        with running(script, **graph_environment()):
-            robot.run(LIMIT_S, until=lambda: robot.get_publishers_info_by_topic('cmd_vel'))
-            robot.run(1.1)
-    assert 'uses /cmd_vel with the type geometry_msgs/msg/TwistStamped' in capsys.readouterr().out

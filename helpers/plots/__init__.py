@@ -7,7 +7,7 @@ that cannot be drawn raises TypeError or ValueError, with one sentence.
 
 from helpers._plumbing.alt_text import describe
 from helpers.plots.comparisons import bars, sweep
-from helpers.plots.drives import error, frame_tree, gate, innovation, path, paths, scans
+from helpers.plots.drives import error, frame_tree, gate, path, scans
 from helpers.plots.runs import before_and_after, latency, queue_length, sequence_gaps, timeline
 
 __all__ = [
@@ -17,10 +17,8 @@ __all__ = [
     'error',
     'frame_tree',
     'gate',
-    'innovation',
     'latency',
     'path',
-    'paths',
     'queue_length',
     'scans',
     'sequence_gaps',

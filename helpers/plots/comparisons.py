@@ -48,11 +48,8 @@ def sweep(results: pd.DataFrame, limit: float, limit_label: str, title: str) -> 
     return figure
 
 
-def bars(values: pd.Series, xlabel: str, title: str = '', exact: bool = False) -> Axes:
-    """Draw one horizontal bar a row of `values`, from the top, each with its value.
-
-    `exact` values do not move from run to run: the description in words has them, too.
-    """
+def bars(values: pd.Series, xlabel: str, title: str = '') -> Axes:
+    """Draw one horizontal bar a row of `values`, from the top, each with its value."""
     ax = new_axes(height=1.3 + 0.6 * len(values))
     names = values.index.astype(str)
     drawn = ax.barh(names, values.to_numpy(float), color=HEARD, height=0.6)
@@ -61,7 +58,5 @@ def bars(values: pd.Series, xlabel: str, title: str = '', exact: bool = False) -
     ax.invert_yaxis()
     ax.margins(x=0.12)
     label_axes(ax, title, xlabel, '', grid='x')
-    if exact:
-        names = [f'{name}: {text}' for name, text in zip(names, texts, strict=True)]
     describe(ax, f'One horizontal bar, with its value, for each of: {in_words(names)}.')
     return ax

@@ -14,14 +14,12 @@ from matplotlib.patches import Ellipse
 
 from helpers._plumbing.alt_text import describe
 from helpers.plots.style import (
-    DPI,
-    GREY,
     HEARD,
     INK,
     LARGE,
     LINE_LOOKS,
     NORMAL,
-    SMALL,
+    PALE,
     WIDTH,
     check_looks,
     crosses,
@@ -30,7 +28,6 @@ from helpers.plots.style import (
     new_axes,
 )
 
-TRUTH = '#c3c9ce'
 NO_TREE = 'These transforms make no tree: it has one root, and each frame one parent.'
 
 
@@ -54,10 +51,10 @@ def path(
     ax = new_axes(height=5.6)
     handles, known = [], truth is not None
     if known:
-        look = {'color': TRUTH, 'lw': 6, 'label': 'truth', 'solid_capstyle': 'round'}
+        look = {'color': PALE, 'lw': 6, 'label': 'truth', 'solid_capstyle': 'round'}
         handles += ax.plot(truth.x, truth.y, **look)
     if fixes is not None:
-        look = {'marker': '+', 'color': GREY, 'ls': 'none', 'ms': 6}
+        look = {'marker': '+', 'color': INK, 'ls': 'none', 'ms': 6}
         handles += ax.plot(fixes.gps_x, fixes.gps_y, label='GPS', **look)
     for look, (name, table) in zip(LINE_LOOKS, estimates.items(), strict=False):
         handles += ax.plot(table.x, table.y, lw=1.8, label=name, **look)
@@ -78,42 +75,6 @@ def path(
     return ax
 
 
-def paths(
-    truth: pd.DataFrame,
-    estimates: Mapping[str, pd.DataFrame],
-    title: str = 'The paths, seen from above',
-) -> np.ndarray:
-    """Draw up to six estimates, each in axes of its own beside the truth. Return the axes (n).
-
-    The tables have the columns `x` and `y` in metres. All axes have the same scale.
-
-    Raises ValueError for no or too many estimates.
-    """
-    check_looks('estimates', estimates, 6)
-    columns = min(3, len(estimates))
-    rows = math.ceil(len(estimates) / columns)
-    figure = plt.figure(figsize=(3.6 * columns, 3.1 * rows + 0.7), dpi=DPI, layout='constrained')
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for ax, (name, table) in zip(grid, estimates.items(), strict=False):
-        ax.plot(truth.x, truth.y, color=TRUTH, lw=5, label='truth', solid_capstyle='round')
-        ax.plot(table.x, table.y, color=HEARD, lw=1.6, label='estimate')
-        ax.scatter(truth.x.iloc[0], truth.y.iloc[0], s=50, color=INK, zorder=5, label='start')
-        ax.set_title(name, fontsize=NORMAL, loc='left')
-        ax.set_aspect('equal')
-        ax.tick_params(labelsize=SMALL)
-        ax.grid(True, color='#e4e7ea', linewidth=0.8)
-        ax.spines[['top', 'right']].set_visible(False)
-    for ax in grid[len(estimates) :]:
-        ax.set_axis_off()
-    figure.suptitle(title, fontsize=LARGE, x=0.01, ha='left')
-    figure.supxlabel('x (m)', fontsize=NORMAL)
-    figure.supylabel('y (m)', fontsize=NORMAL)
-    handles = grid[0].get_legend_handles_labels()[0]
-    figure.legend(handles=handles, loc='upper right', ncols=3, fontsize=SMALL, frameon=False)
-    describe(grid[0], 'Seen from above: a wide line for the truth, and a line for the estimate.')
-    return grid[: len(estimates)]
-
-
 def _ellipse(row, look: dict, sigmas: float = 3.0) -> Ellipse:
     """Return the ellipse of so many sigmas, from the eigenvalues of the covariance."""
     covariance = np.array([[row.var_x, row.cov_x_y], [row.cov_x_y, row.var_y]])
@@ -126,14 +87,12 @@ def _ellipse(row, look: dict, sigmas: float = 3.0) -> Ellipse:
 def error(
     errors: Mapping[str, pd.DataFrame],
     spans_s: Mapping[str, tuple[float, float]] | None = None,
-    log: bool = False,
     title: str = 'How far off each estimate is',
 ) -> Axes:
     """Draw the error of up to four estimates over time.
 
     Each table has the columns `t` (s) and `distance` (m). `spans_s` shades times in which
-    something happened: `{'no GPS': (40, 80)}`, in seconds. `log` makes the vertical axis
-    logarithmic, from 1 cm up.
+    something happened: `{'no GPS': (40, 80)}`, in seconds.
 
     Raises ValueError for no or too many tables.
     """
@@ -144,44 +103,12 @@ def error(
     for look, (name, table) in zip(LINE_LOOKS, errors.items(), strict=False):
         handles += ax.plot(table.t, table.distance, lw=2, label=name, **look)
     for name, span in spans.items():
-        look = {'facecolor': '#f0f0f0', 'edgecolor': '#c9c9c9', 'hatch': '//', 'label': name}
+        look = {'facecolor': 'none', 'edgecolor': PALE, 'hatch': '//', 'label': name}
         handles.append(ax.axvspan(*span, zorder=0, lw=0, **look))
-    if log:
-        ax.set_yscale('log')
-    ax.set_ylim(bottom=0.01 if log else 0)
+    ax.set_ylim(bottom=0)
     label_axes(ax, title, 'time (s)', 'distance from the truth (m)', handles)
     shaded = (f' Shaded: {name}, {first:g} to {last:g} s.' for name, (first, last) in spans.items())
-    scale = ' The vertical axis is logarithmic.' if log else ''
-    describe(ax, f'One line for each of: {in_words(errors)}.{scale}{"".join(shaded)}')
-    return ax
-
-
-def innovation(innovations: pd.DataFrame, title: str = 'Measured minus expected') -> Axes:
-    """Draw the innovations of one variable over time, with the band of 3 sigma.
-
-    `innovations` has one row a measurement, in the order of time: `t` (s), `innovation` and `sigma`
-    (m), `accepted` (bool). A dot is a measurement that the filter used, a cross one that its gate
-    kept out.
-    """
-    used, kept_out = innovations[innovations.accepted], innovations[~innovations.accepted]
-    ax = new_axes()
-    three = 3 * innovations.sigma
-    look = {'facecolor': '#56B4E9', 'alpha': 0.3, 'lw': 0, 'label': '3 sigma'}
-    handles = [ax.fill_between(innovations.t, -three, three, **look)]
-    for edge in (-three, three):
-        ax.plot(innovations.t, edge, color=HEARD, lw=1.2)
-    ax.axhline(0, color=INK, lw=1)
-    look = {'color': INK, 'ms': 4.5, 'label': f'used {len(used)}'}
-    handles += ax.plot(used.t, used.innovation, 'o', **look)
-    if len(kept_out):
-        label = f'kept out {len(kept_out)}'
-        handles.append(crosses(ax, kept_out.t, kept_out.innovation, label))
-    label_axes(ax, title, 'time (s)', 'innovation (m)', handles)
-    describe(
-        ax,
-        'One dot for each measurement that was used, and a band of 3 sigma around zero. '
-        + ('Crosses were kept out.' if len(kept_out) else 'None was kept out.'),
-    )
+    describe(ax, f'One line for each of: {in_words(errors)}.{"".join(shaded)}')
     return ax
 
 
@@ -230,7 +157,7 @@ def scans(
     check_looks('points', points, len(LINE_LOOKS))
     ax = new_axes(height=5.0)
     for x0, y0, x1, y1, *_ in walls:
-        ax.add_patch(plt.Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor=TRUTH, lw=0))
+        ax.add_patch(plt.Rectangle((x0, y0), x1 - x0, y1 - y0, facecolor=PALE, lw=0))
     x, y, yaw = pose
     handles = [ax.scatter(x, y, s=70, color=INK, zorder=5, label='robot')]
     for line, marker, (name, ends) in zip(LINE_LOOKS, 'o+xs', points.items(), strict=False):
@@ -265,7 +192,7 @@ def frame_tree(transforms: pd.DataFrame, title: str = 'The tree of frames') -> A
     width = left.iloc[-1] + widest.iloc[-1]
 
     ax = new_axes(0.75 * (max(rows.values()) + 1) + 1.2, max(WIDTH, width + 0.4))
-    look = {'boxstyle': 'round,pad=0.5', 'facecolor': 'white', 'edgecolor': INK}
+    look = {'boxstyle': 'round,pad=0.5', 'facecolor': 'none', 'edgecolor': INK}
     text = {'fontsize': NORMAL, 'family': 'monospace', 'ha': 'center', 'va': 'center', 'bbox': look}
     for frame, depth in depths.items():
         ax.text(centre[depth], -rows[frame], frame, **text)

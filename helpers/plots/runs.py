@@ -24,17 +24,13 @@ from helpers._plumbing.alt_text import describe
 from helpers._plumbing.values import check_table, natural
 from helpers.plots.style import (
     DPI,
-    GREY,
-    GROUP_COLOURS,
     GROUP_HATCHES,
     HEARD,
     INK,
     LOST,
-    LOST_TEXT,
     NORMAL,
-    PALE,
-    PUBLISHED,
     SMALL,
+    WAITING,
     WIDE,
     check_looks,
     crosses,
@@ -101,16 +97,17 @@ def _draw_gaps(
     """Draw the marks and what surrounds them. `scale` is the area of a mark."""
     heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
     scale *= min(1.0, max(0.2, 60 / len(table)))  # many marks must be smaller to stay apart
-    ax.hlines(heard.seq, heard.published_s, heard.started_s, color=PALE, lw=1.2, zorder=1)
+    waits = {'color': WAITING, 'alpha': 0.5, 'lw': 1.2, 'zorder': 1}
+    ax.hlines(heard.seq, heard.published_s, heard.started_s, **waits)
     ax.margins(x=0.04, y=0.09)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     lost_at = lost.published_s
     if depth:
         lost_at = _pushed_out(table, depth)[lost.index].fillna(lost.published_s)
-        ax.hlines(lost.seq, lost.published_s, lost_at, color=PALE, lw=1.2, zorder=1)
+        ax.hlines(lost.seq, lost.published_s, lost_at, **waits)
         dotted = {'color': LOST, 'lw': 0.9, 'ls': ':', 'zorder': 1}
         ax.vlines(lost_at, lost.seq, table.seq.shift(-depth)[lost.index], **dotted)
-    small = {'s': 14 * scale, 'color': PUBLISHED, 'zorder': 2, 'label': f'published {len(table)}'}
+    small = {'s': 14 * scale, 'color': WAITING, 'zorder': 2, 'label': f'published {len(table)}'}
     large = {'s': 52 * scale, 'color': HEARD, 'zorder': 3, 'label': f'heard {len(heard)}'}
     handles = [
         ax.scatter(table.published_s, table.seq, **small),
@@ -135,13 +132,13 @@ def _label_gaps(ax: Axes, table: pd.DataFrame) -> None:
     if len(heard) <= MAX_SEQ_LABELS:
         # Below and to the right of a heard message nothing else can be: no message with a
         # smaller number comes later, unless several threads overlap.
-        look = {'xytext': (3, -4), 'ha': 'left', 'va': 'top', 'color': 'black'}
+        look = {'xytext': (3, -4), 'ha': 'left', 'va': 'top', 'color': INK}
         for message in heard.itertuples():
             texts.append(_label(ax, str(message.seq), message.started_s, message.seq, look))
     # Consecutive rows share a gap: within one, row number minus rank among the lost is constant.
     gaps = [gap for _, gap in lost.groupby(lost.index - np.arange(len(lost)))]
     if len(gaps) <= MAX_GAP_LABELS:
-        look = {'xytext': (-4, 1), 'ha': 'right', 'va': 'bottom', 'color': LOST_TEXT}
+        look = {'xytext': (-4, 1), 'ha': 'right', 'va': 'bottom', 'color': LOST}
         for gap in gaps:
             x, y = gap.published_s.mean(), gap.seq.mean()
             texts.append(_label(ax, f'{len(gap)} lost', x, y, look))
@@ -173,24 +170,21 @@ def _remove_overlaps(ax: Axes, texts: list[Text], marks: np.ndarray) -> None:
 
 def timeline(
     table: pd.DataFrame | Mapping[str, pd.DataFrame],
-    span_s: tuple[float, float] | None = None,
     title: str = 'One bar for each callback, with its sequence number',
     ax: Axes | None = None,
-    time_label: str = TIME_LABEL,
     depth: int | None = None,
 ) -> Axes:
     """Draw one lane a thread and one bar a callback, with its sequence number if it fits.
 
     `table` is one table, or one for each callback group: `{'group name': table, ...}`. Then each
-    group has a colour and a hatch of its own. `span_s` shows only the time from `span_s[0]` to
-    `span_s[1]`, in seconds. With `depth`, that of the subscription's KEEP_LAST queue, thin grey
+    group has a hatch of its own. With `depth`, that of the subscription's KEEP_LAST queue, thin
     bars below show the messages while they wait, and a cross ends those that were pushed out.
     Draws into `ax`, or into a new figure.
 
     Raises TypeError or ValueError for a bad table, and for no or too many groups.
     """
     groups = table if isinstance(table, Mapping) else {'callbacks': table}
-    check_looks('callback groups', groups, len(GROUP_COLOURS))
+    check_looks('callback groups', groups, len(GROUP_HATCHES))
     groups = {str(name): check_table(one) for name, one in groups.items()}
     bars = pd.concat([t[t.started_s.notna()].assign(group=name) for name, t in groups.items()])
     # A callback that had not finished when the recording ended runs to the end of the picture.
@@ -199,9 +193,10 @@ def timeline(
     bars['lane'] = bars.thread.map({thread: lane for lane, thread in enumerate(threads)})
 
     ax = ax or new_axes()
+    bar = {'facecolor': HEARD, 'edgecolor': '#ffffffa0', 'lw': 0.8}
     looks = {
-        name: {'facecolor': colour, 'hatch': hatch, 'edgecolor': GREY, 'lw': 0.8, 'label': name}
-        for name, colour, hatch in zip(groups, GROUP_COLOURS, GROUP_HATCHES, strict=False)
+        name: {**bar, 'hatch': hatch, 'label': name}
+        for name, hatch in zip(groups, GROUP_HATCHES, strict=False)
     }
     for name, look in looks.items():
         own = bars[bars.group == name]
@@ -214,10 +209,10 @@ def timeline(
     ax.set_ylim(bottom, -0.5)  # the first thread on top
     # Axes that share their time show the longest run of all.
     last_s = max(one.dataLim.x1 for one in ax.get_shared_x_axes().get_siblings(ax))
-    ax.set_xlim(span_s or (0, 1.02 * last_s if math.isfinite(last_s) else 1))
+    ax.set_xlim(0, 1.02 * last_s if math.isfinite(last_s) else 1)
     handles = [Patch(**look) for look in looks.values()] if isinstance(table, Mapping) else None
-    label_axes(ax, title, time_label, 'thread', handles, grid='x')
-    named = f' The colours stand for: {in_words(groups)}.' if handles else ''
+    label_axes(ax, title, TIME_LABEL, 'thread', handles, grid='x')
+    named = f' The hatches stand for: {in_words(groups)}.' if handles else ''
     describe(
         ax,
         'One lane for each thread that ran a callback, one bar for each callback, with its '
@@ -242,24 +237,24 @@ def _draw_waiting(ax: Axes, table: pd.DataFrame, depth: int, top: float) -> tupl
     for left in left_s:
         places.append(int(free_s.argmin()))
         free_s[places[-1]] = left
-    look = {'facecolor': PUBLISHED, 'edgecolor': 'white', 'height': 0.24}
+    look = {'facecolor': WAITING, 'edgecolor': 'none', 'height': 0.24}
     ax.barh(lanes[places], left_s - table.published_s, left=table.published_s, **look)
     if lost.any():
         crosses(ax, left_s[lost], lanes[places][lost], '', 0.4)
     names = [label.get_text() for label in ax.get_yticklabels()]
     ax.set_yticks([*ax.get_yticks(), lanes.mean()], [*names, 'waiting'])
     crossed = 'a cross ends those that were pushed out' if lost.any() else 'none is pushed out'
-    return lanes[-1] + 0.3, f' Thin grey bars below: messages while they wait; {crossed}.'
+    return lanes[-1] + 0.3, f' Thin bars below: messages while they wait; {crossed}.'
 
 
 def _label_bars(ax: Axes, bars: pd.DataFrame) -> None:
     """Write the sequence number on each bar that is wide enough for it."""
-    first, last = ax.get_xlim()
     ax.figure.draw_without_rendering()
-    glow = [withStroke(linewidth=3, foreground=(1, 1, 1, 0.7))]
-    look = {'fontsize': SMALL, 'ha': 'center', 'va': 'center', 'path_effects': glow}
-    for bar in bars[(bars.started_s < last) & (bars.finished_s > first)].itertuples():
-        left, right = max(bar.started_s, first), min(bar.finished_s, last)
+    glow = [withStroke(linewidth=3, foreground=HEARD)]
+    look = {'fontsize': SMALL, 'color': 'white', 'path_effects': glow}
+    look |= {'ha': 'center', 'va': 'center'}
+    for bar in bars.itertuples():
+        left, right = bar.started_s, bar.finished_s
         text = ax.text((left + right) / 2, bar.lane, str(bar.seq), **look)
         (left, _), (right, _) = ax.transData.transform([(left, 0), (right, 0)])
         if text.get_window_extent().width > 0.95 * (right - left):
@@ -288,8 +283,8 @@ def queue_length(table: pd.DataFrame, depth: int, ax: Axes | None = None) -> Axe
     waiting = np.cumsum(np.bincount(place, weights=change))
 
     ax = ax or new_axes()
-    (line,) = ax.step(times, waiting, where='post', color=HEARD, lw=2, label='messages waiting')
-    ax.fill_between(times, waiting, step='post', color=HEARD, alpha=0.18, lw=0)
+    (line,) = ax.step(times, waiting, where='post', color=WAITING, lw=2, label='messages waiting')
+    ax.fill_between(times, waiting, step='post', color=WAITING, alpha=0.18, lw=0)
     limit = ax.axhline(depth, color=INK, ls='--', lw=1.8, label=f'depth {depth}')
     handles = [line, limit]
     if len(lost_at):

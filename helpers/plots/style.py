@@ -1,8 +1,7 @@
 """What all pictures share: colours, sizes, axes, marks.
 
-The colours are those of Okabe and Ito ("Color Universal Design", 2008), which people with any kind
-of colour vision can tell apart. All sizes are set here and not through rcParams, because the axes
-may be the caller's own.
+A figure has no ground of its own, and its ink is clear on white and on black: so it is right in
+light and in dark. All sizes are set here, because the axes may be the caller's own.
 """
 
 from __future__ import annotations
@@ -13,18 +12,23 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 
-PUBLISHED, HEARD, LOST = '#9aa5ae', '#0072B2', '#D55E00'
-LOST_TEXT = '#9c4300'  # a darker vermillion: letters need more contrast than marks
-INK, GREY, PALE = '#222222', '#555555', '#cfd6db'
-# One colour and one hatch a callback group. Light enough for black numbers on top.
-GROUP_COLOURS = ('#56B4E9', '#E69F00', '#009E73', '#CC79A7', '#F0E442')
-GROUP_HATCHES = ('', '//', '..', '\\\\', 'xx')
+from helpers._plumbing.look import LOOK
+
+HEARD, LOST, WAITING, ROBOT, INK, PALE = (
+    LOOK[name] for name in ('heard', 'lost', 'waiting', 'robot', 'ink', 'line')
+)
+GROUP_HATCHES = ('', '//', '..', '\\\\', 'xx')  # one for each callback group
 # One look for each of several lines: all differ in colour, and in how they are dashed.
 LINE_LOOKS = (
-    {'color': HEARD, 'ls': '-'},
-    {'color': LOST, 'ls': (0, (5, 2))},
-    {'color': '#000000', 'ls': (0, (1, 1.2))},
-    {'color': '#009E73', 'ls': (0, (5, 2, 1, 2))},
+    {'color': ROBOT, 'ls': '-'},
+    {'color': '#8f63c9', 'ls': (0, (5, 2))},
+    {'color': INK, 'ls': (0, (1, 1.2))},
+    {'color': '#c2477f', 'ls': (0, (5, 2, 1, 2))},
+)
+plt.rcParams.update(
+    dict.fromkeys(('figure.facecolor', 'axes.facecolor', 'savefig.facecolor'), 'none')
+    | dict.fromkeys(('text.color', 'axes.labelcolor', 'axes.edgecolor'), INK)
+    | dict.fromkeys(('xtick.color', 'ytick.color'), INK)
 )
 
 SMALL, NORMAL, LARGE = 12, 13, 15  # font sizes in points, readable from the last row of a room
@@ -47,7 +51,7 @@ def label_axes(
     ax.set_ylabel(ylabel, fontsize=NORMAL)
     ax.tick_params(labelsize=SMALL)
     ax.spines[['top', 'right']].set_visible(False)
-    ax.grid(True, axis=grid, color='#e4e7ea', linewidth=0.8)
+    ax.grid(True, axis=grid, color=PALE, linewidth=0.6)
     ax.set_axisbelow(True)
     if handles:
         ax.legend(

@@ -11,34 +11,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from html import escape
 from itertools import chain
+from urllib.parse import quote
 
 import pandas as pd
 
 from helpers._plumbing.values import check_count, check_table, natural, shown
 from helpers.replay.events import ARRIVE, END, TAKE, events
-from helpers.replay.model import stories
-from helpers.replay.picture import (
-    LEFT,
-    LETTER,
-    MAX_ROWS,
-    NARROW,
-    WIDTH,
-    address,
-    picture,
-)
-from helpers.replay.script import attribute, script, source
+from helpers.replay.script import attribute, javascript, script, style
 
-SCRIPT = 'model.js', 'walk.js', 'element.js', 'view.js'
+SCRIPT = 'model.js', 'walk.js', 'element.js', 'board.js', 'view.js'
 SCRIPT_OF_CALLS = 'circle.js', *SCRIPT
 SCRIPT_OF_DRIVES = 'element.js', 'view.js'
 KINDS = ARRIVE, TAKE, END, 'go', 'resume'  # as walk.js numbers them
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
 MAX_MESSAGES = 10_000
+SAFE = "!$'()*+,-./:;=?@_~ "  # may stand in the address of an image, in double quotes
 ROWS_IN_WORDS = (
-    'One row for each message: a line while it waits, with a colour for the reason, and a bar '
+    ' One row for each message: a line while it waits, with dashes for the reason, and a bar '
     'while its callback runs.'
 )
 CROSSES_IN_WORDS = (
@@ -68,36 +59,14 @@ class Run:
         end = self.moves[-1][0] / 1e6
         return 0.0, end + (max(0.02 * end, self.after_s) or 1.0)
 
-    @cached_property
-    def messages(self) -> list[dict]:
-        """What became of the first messages, as stories.js returns it."""
-        return stories(self.record(), MAX_ROWS)['messages']
-
     @property
-    def names(self) -> list[str]:
-        """The name of each row of the picture."""
-        callbacks = self.setup['callbacks']
-        if len(callbacks) == 1:
-            return [f'{one["seq"]}' for one in self.messages]
-        return [f'{callbacks[one["callback"]]["name"]} {one["seq"]}' for one in self.messages]
-
-    def picture(
-        self, span_s: tuple[float, float], width: int, left: int
-    ) -> tuple[str, list[float]]:
-        """Return the run as an SVG, in a span of seconds, and its plot. Sizes are pixels."""
-        return picture(self.messages, self.names, span_s, width, left, self.time_label)
+    def words(self) -> str:
+        """What its picture shows, for everybody who does not see it."""
+        return self.summary + ROWS_IN_WORDS + (CROSSES_IN_WORDS if self.lost else '')
 
     def record(self) -> dict:
         """Return what the script needs."""
         return {name: getattr(self, name) for name in ('name', 'setup', 'moves')}
-
-    def figure(self, svg: str) -> str:
-        """Return its picture with words for it, below the name of one of several runs."""
-        caption = f'<figcaption>{escape(self.name)}</figcaption>' if self.name else ''
-        name = f'{self.name}: ' if self.name else ''
-        words = ROWS_IN_WORDS + (CROSSES_IN_WORDS if self.lost else '')
-        alternative = escape(f'{name}{self.summary} {words}')
-        return f'<figure>{caption}<img alt="{alternative}" src="{address(svg)}"></figure>'
 
 
 @dataclass(frozen=True)
@@ -114,31 +83,36 @@ class Replay:
         )
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
-        width = WIDTH if len(self.runs) == 1 else NARROW
-        left = max(LEFT, *(round(LETTER * len(name)) for run in self.runs for name in run.names))
         starts, ends = zip(*(run.span_s for run in self.runs), strict=True)
         span_s = min(starts), max(ends)  # pictures beside each other share their time
-        pictures = [run.picture(span_s, width, left) for run in self.runs]
+        of_queues = [run for run in self.runs if run.setup]  # the others are drives of a robot
+        asked = [{**run.record(), 'time': run.time_label} for run in of_queues]
+        drawn = iter(javascript('pictures', asked, span_s))
         figures = ''.join(
-            run.figure(svg) for run, (svg, _) in zip(self.runs, pictures, strict=True)
+            figure(run, next(drawn) if run.setup else run.picture()) for run in self.runs
         )
-        record = {
-            'span': span_s,
-            'plots': [plot for _, plot in pictures],
-            'runs': [run.record() for run in self.runs],
-        }
-        setups = [run.setup for run in self.runs]
-        names = SCRIPT_OF_CALLS if any(map(has_calls, filter(None, setups))) else SCRIPT
-        style = source('style.css')
-        if None in setups:  # the drive of a robot: see helpers.robot.view
-            names = ('drive.js', *(names if any(setups) else SCRIPT_OF_DRIVES))
-            style += source('drive.css')
+        drives = len(of_queues) < len(self.runs)
+        names = ('drive.js',) if drives else ()
+        if not of_queues:
+            names += SCRIPT_OF_DRIVES
+        else:
+            names += SCRIPT_OF_CALLS if any(has_calls(run.setup) for run in of_queues) else SCRIPT
+        record = {'span': span_s, 'runs': [run.record() for run in self.runs]}
         html = (
             f'<div class="replay" data-record={attribute(record)}>'
-            f'<style>{style}</style><p>{escape(str(self))}</p>{figures}'
+            f'{style("drive.css") if drives else style()}<p>{escape(str(self))}</p>{figures}'
             f'<script>{script(*names)}</script></div>'
         )
         return {'text/plain': str(self), 'text/html': html}
+
+
+def figure(run: Run, svg: str) -> str:
+    """Return the picture of a run with words for it, below the name of one of several runs."""
+    caption = f'<figcaption>{escape(run.name)}</figcaption>' if run.name else ''
+    words = escape(f'{run.name}: {run.words}' if run.name else run.words)
+    # As an address, percent signs are shorter than base64.
+    address = f'data:image/svg+xml,{quote(svg.replace(chr(34), chr(39)), safe=SAFE)}'
+    return f'<figure>{caption}<img alt="{words}" src="{address}"></figure>'
 
 
 def replay(

@@ -11,9 +11,8 @@ from helpers._plumbing.values import check_count
 from helpers.recording import CallbackRecording
 from helpers.replay import Replay, fill_up
 from helpers.replay.events import ARRIVE, END, TAKE
-from helpers.replay.model import stories
-from helpers.replay.picture import MAX_ROWS
 from helpers.replay.recorded import GO, RESUME, Callback, Move, count_of, run_of
+from helpers.replay.script import javascript
 
 WORDS = {'Timer': 'tick', 'Service': 'request', 'Client': 'answer'}
 TIME_LABEL = 'time since the first callback (s)'
@@ -49,7 +48,7 @@ def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
     ]
     moves = _moves(tables, calls, list(groups.index), thread_names)
     run = run_of(thread_names, callbacks, moves, TIME_LABEL)
-    stuck = stories(run.record(), MAX_ROWS)['stuck']
+    stuck = javascript('stuck', run.record())
     summary = ' '.join([count_of(threads), *(stuck or ['Nobody waits for ever.'])])
     return Replay((replace(run, summary=summary, after_s=HANGS_S if stuck else 0.0),))
 

@@ -10,8 +10,9 @@ function drive(record) {
   const turn = w => (w ? ` and ${(w / 1000).toFixed(2)} rad/s` : '');
   const speed = ([, v, w]) => `${(v / 1000).toFixed(2)} m/s${turn(w)}`;
   const told = one => (one[1] || one[2] ? `The robot is told to drive ${speed(one)}.` : 'The robot is told to stop.');
+  const seconds = age => Math.max(age / 1000, 0).toFixed(2);
   const because = ([, , , seq, age]) => (seq < 0
-    ? '' : ` The callback of message ${seq} says so, which is ${(age / 1000).toFixed(2)} s old.`);
+    ? '' : ` The callback of message ${seq} says so, which is ${seconds(age)} s old.`);
   const isNew = (one, i) => !i || one[1] !== commands[i - 1][1] || one[2] !== commands[i - 1][2];
   const steps = [
     ...Array.from({ length: poses.length / 5 }, (_, i) => [1000 * i * step, '']),
@@ -56,7 +57,7 @@ function drive(record) {
     const till = Math.min(Math.floor(ms / (1000 * step)), poses.length / 5 - 1);
     return {
       ...pose(ms), command, till, fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]),
-      told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}, ${(command[4] / 1000).toFixed(2)} s old`) : 'nothing yet',
+      told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}, ${seconds(command[4])} s old`) : 'nothing yet',
     };
   }
 
@@ -65,7 +66,7 @@ function drive(record) {
     told: steps.map(([, said]) => said !== ''),
     points: Array.from({ length: poses.length / 5 }, (_, i) => `${(poses[5 * i] * unit).toFixed(2)} ${(poses[5 * i + 1] * unit).toFixed(2)}`),
     says: to => says[to - 1] ?? '',
-    scan: () => ({ about: steps.map(() => []), losses: [] }),
+    scan: () => record.bumps.map(at => steps.findLastIndex(([ms]) => ms <= at) + 1),
     look,
   };
 }
@@ -83,34 +84,27 @@ function inTime(steps, position, rate, go) {
   };
 }
 
-function floor(run, record, picture) {
-  const svg = new DOMParser().parseFromString(
-    decodeURIComponent(picture.src.slice(picture.src.indexOf(',') + 1)), 'image/svg+xml').documentElement;
+function floor(run, record, svg) {
   const find = name => svg.querySelector(`.${name}`);
-  find('paper').remove();
-  svg.setAttribute('color', 'currentColor');
-  svg.setAttribute('role', 'img');
-  svg.setAttribute('aria-label', picture.alt);
   find('all').setAttribute('stroke-opacity', '.3');
   const marks = ['seconds', 'bumps'].map(name => [find(name), find(name).getAttribute('d').split(/(?=M)/)]);
   const [time, robot, told] = Array.from({ length: 3 }, () => element('span', { class: 'replay-time' }));
-  const row = (name, content) => element('div', { class: 'replay-row' }, element('b', {}, name), element('div', {}, content));
 
   function draw(position, us) {
     const ms = us / 1000;
-    const seen = run.look(ms);
-    const { x, y, yaw, v, w } = seen;
+    const now = run.look(ms);
+    const { x, y, yaw, v, w } = now;
     find('robot').setAttribute('transform', `translate(${x.toFixed(3)} ${y.toFixed(3)})`);
     find('robot').firstChild.setAttribute('transform', `rotate(${(yaw * 180 / Math.PI).toFixed(1)})`);
-    find('driven').setAttribute('d', `M${run.points.slice(0, seen.till + 1).join('L')}L${x.toFixed(3)} ${y.toFixed(3)}`);
-    find('fan').setAttribute('d', seen.fan);
-    const { r } = seen.old ? { r: find('robot').querySelector('circle').getAttribute('r') } : {};
-    find('old').setAttribute('d', seen.old && `${seen.old}M${seen.was.x - r} ${seen.was.y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`);
+    find('driven').setAttribute('d', `M${run.points.slice(0, now.till + 1).join('L')}L${x.toFixed(3)} ${y.toFixed(3)}`);
+    find('fan').setAttribute('d', now.fan);
+    const { r } = now.old ? { r: find('robot').querySelector('circle').getAttribute('r') } : {};
+    find('old').setAttribute('d', now.old && `${now.old}M${now.was.x - r} ${now.was.y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`);
     const counts = [Math.floor(ms / 1000), record.bumps.filter(at => at <= ms).length];
     marks.forEach(([path, parts], i) => path.setAttribute('d', parts.slice(0, counts[i]).join('')));
     time.textContent = `${(ms / 1000).toFixed(2)} s`;
     robot.textContent = `${v.toFixed(2)} m/s, ${w.toFixed(2)} rad/s`;
-    told.textContent = seen.told;
+    told.textContent = now.told;
     return run.says(position);
   }
 

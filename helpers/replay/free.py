@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from helpers.replay.script import attribute, script, source
+from helpers.replay.script import DRAWN, attribute, script, style
 
-SCRIPT = 'model.js', 'free.js', 'element.js', 'sliders.js'
+SCRIPT = *DRAWN, 'free.js', 'element.js', 'sliders.js'
 SAYS = (
     'Free play: the period, the callback, the depth, the threads and the group on sliders. The '
     'prediction for 41 messages is drawn again at each change.'
@@ -28,7 +28,7 @@ class FreePlay:
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         html = (
             f'<div class="replay free" data-free={attribute(vars(self))}>'
-            f'<style>{source("style.css")}{source("free.css")}</style><p>{SAYS}</p>'
+            f'{style("free.css")}<p>{SAYS}</p>'
             '<p class="free-static">To play, run the cell, or trust the notebook.</p>'
             f'<script>{script(*SCRIPT)}</script></div>'
         )

@@ -1,7 +1,7 @@
 // The learner is the executor. What is allowed is decided in model.js; here is what may be tried,
 // when a game is over, and how well it went. No page here.
 
-const model = queueModel();
+const model = refereed(queueModel());
 
 // A game of one setup. `goal` is 'keep' (lose no message), 'lose' (let the number count be too
 // small), 'answer' (let all callbacks end) or 'stop' (keep the number places small). A state is one

@@ -1,5 +1,5 @@
 // A level as a page shows it: lists that can be read, buttons, keys. What may be tried is decided in
-// game.js. Nothing is global: a page may have many levels.
+// game.js, and a state is drawn by board.js. Nothing is global: a page may have many levels.
 
 // A level is {goal, options: [{name, values}], variants: [{setup, begun, code, lesson, rclpy}]}: one
 // variant for each combination of the options, the last option changing first.
@@ -16,59 +16,23 @@ function show(root, level) {
   let setup;
   let now;
   let state;
+  let lists;
 
   const says = element('div', { 'aria-live': 'polite', class: 'replay-says' });
   const ready = element('ul', { 'aria-label': 'ready', role: 'list', class: 'level-ready' });
-  const lists = element('div');
+  const shown = element('div', { class: 'replay-runs' });
+  const time = element('span', { class: 'replay-time' });
   const code = element('pre');
   const again = element('button', { type: 'button', onclick: begin }, 'Play again');
   const selects = level.options.map(({ name, values }) => element('select', { onchange: begin },
     ...values.map(value => element('option', {}, value))));
 
-  function row(name, items) {
-    const list = element('ul', { 'aria-label': name, role: 'list', class: `replay-${name}` });
-    list.append(...items.map(([text, kind]) => element('li', { class: kind }, text)));
-    lists.append(element('div', { class: 'replay-row' },
-      element('b', { 'aria-hidden': 'true' }, name), element('div', {}, list)));
-    return list;
-  }
+  const ROWS = { keep: ['lost'], lose: ['count'], answer: [], stop: ['places'] };
 
   function draw() {
     const over = now.isOver(state);
-    const circle = over ? circleOf(setup, state) : [];
-    const stuck = run => circle.some(({ run: id }) => id === run.id);
-    const kind = run => (stuck(run) ? 'replay-stuck' : 'replay-busy');
-    const about = callback => seq => setup.callbacks.length > 1
-      ? model.named(setup, { callback, seq }) : `${seq}`;
-    lists.textContent = '';
-    if (setup.arrivals.at(-1).at) row('time', [[`${+state.now.toFixed(3)} s`]]);
-    row('threads', setup.threads.map((name, thread) => {
-      const run = state.runs[thread];
-      if (!run) return [`${name}: free`];
-      const seen = run.seen === undefined ? '' : `, has read ${run.seen}`;
-      return [`${name}: ${model.named(setup, run)}${seen}${run.waits ? ', waits' : ''}`, kind(run)];
-    }));
-    if (setup.threads.length * setup.groups.length > 1) {
-      row('groups', setup.groups.map(({ name, exclusive }, group) => {
-        if (!exclusive) return [`${name}: lets all in`];
-        const holder = model.holderOf(setup, state, group);
-        return holder ? [`${name}: held by ${model.named(setup, holder)}`, kind(holder)]
-          : [`${name}: free`];
-      }));
-    }
-    const queue = row('queue', setup.callbacks.flatMap((_, callback) =>
-      state.queues[callback].map(({ seq }) => [about(callback)(seq)])));
-    if (setup.callbacks.length === 1) {
-      const places = element('span', { 'aria-hidden': 'true' });
-      for (let i = state.queues[0].length; i < setup.callbacks[0].depth; i += 1)
-        places.append(element('i'));
-      queue.after(places);
-    }
-    if (level.goal === 'keep')
-      row('lost', state.lost.map(({ callback, seq }) => [about(callback)(seq)]));
-    if (level.goal === 'lose') row('count', [[`${state.values.count ?? 0}`]]);
-    if (level.goal === 'stop') row('places', [[`${state.values.places ?? 0}`]]);
-    circle.forEach(({ says: why }) => lists.append(element('p', { class: 'replay-circle' }, why)));
+    lists.draw(state, over ? circleOf(setup, state) : []);
+    time.textContent = `${+state.now.toFixed(3)} s`;
 
     const index = [...ready.children].findIndex(item => item.contains(document.activeElement));
     ready.textContent = '';
@@ -114,6 +78,12 @@ function show(root, level) {
     setup = variant.setup;
     now = game({ ...variant, goal: level.goal });
     state = now.start();
+    const { threads, groups, arrivals } = setup;
+    const grouped = threads.length * groups.length > 1 ? ['groups'] : [];
+    const names = ['threads', ...grouped, 'queue', ...ROWS[level.goal], 'circle'];
+    lists = board(setup, names, { full: true });
+    const timed = arrivals.at(-1).at ? [row('time', time)] : [];
+    shown.replaceChildren(element('div', { class: 'replay-run' }, ...timed, ...lists.rows));
     code.textContent = variant.code;
     code.hidden = !variant.code;
     says.textContent = '';
@@ -152,15 +122,12 @@ function show(root, level) {
     else KEYS[key]();
   }
 
-  root.classList.add('replay-on');
-  root.setAttribute('role', 'group');
-  root.setAttribute('aria-label', 'level');
-  root.tabIndex = 0;
+  wake(root, 'level');
   root.addEventListener('keydown', onKey);
   root.querySelector('.level-static').replaceWith(
     element('div', { class: 'replay-controls' }, ...level.options.map(
       ({ name }, i) => element('label', {}, `${name} `, selects[i]))),
-    code, says, ready, lists, element('div', { class: 'replay-controls' }, again));
+    code, says, ready, shown, element('div', { class: 'replay-controls' }, again));
   begin();
 }
 

@@ -17,9 +17,9 @@ from html import escape
 from itertools import product
 
 from helpers._plumbing.values import shown
-from helpers.replay.script import attribute, script, source
+from helpers.replay.script import attribute, script, style
 
-SCRIPT = 'model.js', 'game.js', 'circle.js', 'element.js', 'level.js'
+SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'element.js', 'board.js', 'level.js'
 ONE = 'SingleThreadedExecutor()'
 
 
@@ -73,7 +73,7 @@ class Level:
         }
         return (
             f'<div class="replay level" data-level={attribute(record)}>'
-            f'<style>{source("style.css")}{source("level.css")}</style><p>{escape(self.task)}</p>'
+            f'{style("level.css")}<p>{escape(self.task)}</p>'
             '<p class="level-static">To play it, run the cell, or trust the notebook.</p>'
             f'<script>{script(*SCRIPT)}</script></div>'
         )

@@ -1,23 +1,51 @@
-"""The scripts and styles of this folder, as a page gets them."""
+"""The scripts and styles of this folder, as a page gets them, or Python runs them."""
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 
+# Not from `quickjs`: importing that starts a thread, which stays in the kernel.
+from _quickjs import Context
 from rjsmin import jsmin
+
+from helpers._plumbing.look import LOOK, LOOK_CSS
+
+DRAWN = 'model.js', 'rules.js', 'walk.js', 'stories.js', 'picture.js'
+COLOURS = f'const LOOK = {json.dumps(LOOK)};\n'
+
+
+def short(css: str) -> str:
+    """Return a style without comments and needless spaces."""
+    return re.sub(r'/\*.*?\*/|\s*([{};,])\s*|(?<=:) ', r'\1', css, flags=re.DOTALL)
 
 
 @cache
 def source(name: str) -> str:
-    """Return a file of this folder; a script without comments and needless spaces."""
+    """Return a file of this folder without comments and needless spaces."""
     text = Path(__file__).with_name(name).read_text()
-    return jsmin(text) + '\n' if name.endswith('.js') else text
+    return jsmin(text) + '\n' if name.endswith('.js') else short(text)
 
 
 @cache
 def script(*names: str) -> str:
     """Return files of this folder as one script that leaves no name on the page."""
-    return f'(() => {{\n{"".join(map(source, names))}}})();'
+    look = COLOURS if 'picture.js' in names else ''
+    return f'(() => {{\n{look}{"".join(map(source, names))}}})();'
+
+
+@cache
+def style(*names: str) -> str:
+    """Return the look that all share, and files of this folder, as an element of HTML."""
+    return f'<style>{short(LOOK_CSS)}{"".join(map(source, ("style.css", *names)))}</style>'
+
+
+def javascript(function: str, *arguments) -> list | dict:
+    """Return what a function of stories.js or picture.js returns, here in Python."""
+    context = Context()
+    context.eval(COLOURS + ''.join(map(source, ('circle.js', *DRAWN))))
+    given = ', '.join(map(json.dumps, arguments))
+    return json.loads(context.eval(f'JSON.stringify({function}({given}))'))
 
 
 def attribute(value: dict) -> str:

@@ -1,8 +1,8 @@
-// What became of each message of a run, for its picture. No page gets this: Python runs it.
+// What became of each message of a run, for its picture.
 
 // Return of the first `most` messages, in the order of their arrival: {callback, seq, arrived, waits,
 // left, by, runs, ended}. `waits` and `runs` are pairs of a time and the cause that holds from then
-// on; `by` is the message that pushed it out. And `stuck`, the sentences of those that can never go on.
+// on; `by` is the message that pushed it out.
 function stories(record, most) {
   const { setup, moves } = record;
   const { seek } = walk(record);
@@ -41,13 +41,18 @@ function stories(record, most) {
   const isOver = () => found.size === most
     && [...found.values()].every(({ by, ended }) => by !== undefined || ended !== undefined);
 
-  let state = model.start(setup);
   for (let step = 1; step <= moves.length && !isOver(); step += 1) {
-    state = seek(step).state;
+    const { state } = seek(step);
     setup.callbacks.forEach((_, callback) => wait(state, callback));
     state.lost.slice(lost).filter(of).forEach(out => Object.assign(of(out), { left: state.now, by: out.by }));
     lost = state.lost.length;
     run(state);
   }
-  return { messages: [...found.values()], stuck: circleOf(setup, state).map(({ says }) => says) };
+  return [...found.values()];
+}
+
+// Return the sentences of those that can never go on when the run is over.
+function stuck(record) {
+  const { state } = walk(record).seek(record.moves.length);
+  return circleOf(record.setup, state).map(({ says }) => says);
 }

@@ -2,7 +2,7 @@
 
 const CHECKPOINT = 64; // moves between two states that are kept, of a run with many
 const DOES = ['arrive', 'take', 'end', 'go', 'resume'];
-const model = queueModel();
+const model = typeof refereed === 'undefined' ? queueModel() : refereed(queueModel());
 
 // A record is {setup, moves}: the setup of model.js, and moves in short, [microseconds, which of
 // DOES, and two numbers].
@@ -11,7 +11,6 @@ function walk({ setup, moves }) {
   let state = model.copy(kept[0]);
   let at = 0; // moves that are done
   let says = '';
-  let scanned;
 
   function move(index) {
     const [us, kind, one, other] = moves[index];
@@ -38,24 +37,15 @@ function walk({ setup, moves }) {
     return { state, says: to ? says : '' };
   }
 
-  // Return of each step the numbers that it is about, and which steps lose one.
+  // Return the numbers of the steps that lose a message.
   function scan() {
-    if (scanned) return scanned;
-    scanned = { about: [], losses: [] };
     const now = model.start(setup);
-    moves.forEach((_, index) => {
-      const made = move(index);
-      const item = made.do === 'arrive' ? made
-        : made.do === 'take' ? now.queues[made.callback][0] : now.runs[made.thread];
+    return moves.flatMap((_, index) => {
       const before = now.lost.length;
-      model.advance(setup, now, made);
-      scanned.about.push([item?.seq]);
-      if (now.lost.length === before) return;
-      scanned.about.at(-1).push(now.lost[before].seq);
-      scanned.losses.push(index + 1);
+      model.advance(setup, now, move(index));
+      return now.lost.length > before ? [index + 1] : [];
     });
-    return scanned;
   }
 
-  return { setup, seek, scan, times: moves.map(([us]) => us) };
+  return { seek, scan, times: moves.map(([us]) => us) };
 }

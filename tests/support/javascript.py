@@ -81,11 +81,11 @@ const cause = (setup, moves) => model.cause(setup, after(setup, moves).state, 0)
 
 
 class Script:
-    """model.js, a file that makes `model` of it, circle.js, GLUE. `call` exchanges JSON."""
+    """model.js, rules.js, files that use them, circle.js, glue. `call` exchanges JSON."""
 
-    def __init__(self, other: str = 'walk.js', glue: str = GLUE) -> None:
+    def __init__(self, *names: str, glue: str = GLUE) -> None:
         self._context = quickjs.Context()
-        for name in ('model.js', other, 'circle.js'):
+        for name in ('model.js', 'rules.js', *(names or ('walk.js',)), 'circle.js'):
             self._context.eval((FOLDER / name).read_text())
         self._context.eval(glue)
 

@@ -23,6 +23,7 @@ from nbformat.v4 import new_markdown_cell
 from PIL import Image
 from sphinx.cmd.build import build_main
 
+from helpers._plumbing.look import LOOK_CSS
 from helpers.replay.levels import level
 from tools.lessons.lesson import (
     FOLDER,
@@ -34,6 +35,7 @@ from tools.lessons.lesson import (
     lessons,
     tags,
 )
+from tools.site import free_drive
 
 HERE = Path(__file__).parent
 WORK = ROOT / '.site'
@@ -143,7 +145,7 @@ def prepare(pages: Path) -> None:
         (pages / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, pages / file)
     shutil.copy(HERE / 'conf.py', pages)
-    shutil.copy(HERE / 'site.css', static)
+    (static / 'site.css').write_text(LOOK_CSS + (HERE / 'site.css').read_text('utf-8'), 'utf-8')
     parts = _parts(known)
     toctrees = (CONTENTS.format(part=part, pages='\n'.join(parts[part])) for part in parts)
     (pages / 'index.md').write_text(_first_page() + ''.join(toctrees), encoding='utf-8')
@@ -168,8 +170,10 @@ def _parts(known: list[Lesson]) -> dict[str, list[str]]:
 
 
 def _first_page() -> str:
-    raw = f'```{{raw}} html\n{level("save").html()}\n```'
-    return (HERE / 'index.md').read_text('utf-8').replace('{level}', raw)
+    text = (HERE / 'index.md').read_text('utf-8')
+    for name, part in (('{level}', level('save').html()), ('{drive}', free_drive.html())):
+        text = text.replace(name, f'```{{raw}} html\n{part}\n```')
+    return text
 
 
 def main() -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from html import escape
 
 from helpers._plumbing.progress_bar import somebody_watches
-from helpers.replay.script import script, source
+from helpers.replay.script import script, style
 from helpers.robot.robot import Robot
 from helpers.session import current_session
 
@@ -61,7 +61,7 @@ def drive_by_hand(robot: Robot, seconds: float = 60.0) -> None:
     shown = display(box, display_id=True)
     keys = display(
         HTML(
-            f'<style>{source("drive.css")}</style><p class="by-hand-keys" tabindex="0">'
+            f'{style("drive.css")}<p class="by-hand-keys" tabindex="0">'
             f'{escape(HELP)}</p><script>{script("by_hand.js")}</script>'
         ),
         display_id=True,

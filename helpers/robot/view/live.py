@@ -9,7 +9,7 @@ from rclpy.subscription import Subscription
 
 from helpers._plumbing.progress_bar import somebody_watches
 from helpers.replay import Replay
-from helpers.replay.script import source
+from helpers.replay.script import style
 from helpers.robot.floor import Pose
 from helpers.robot.robot import Robot
 from helpers.robot.view.picture import Track, described, picture
@@ -119,8 +119,8 @@ class LiveView:
         said = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
         body = ''.join(_row(name, *map(escape, words)) for name, words in rows)
         return (
-            f'<div class="replay robot-live"><style>{source("style.css")}{source("drive.css")}'
-            f'</style><div role="img" aria-label="{described(record.floor)}">{svg}</div>{body}'
+            f'<div class="replay robot-live">{style("drive.css")}'
+            f'<div role="img" aria-label="{escape(described(record.floor))}">{svg}</div>{body}'
             f'{self._queue()}<p class="replay-says">{escape(said)}</p></div>'
         )
 
@@ -130,10 +130,12 @@ class LiveView:
             return ''
         runs, waits = self._recording.now(self._recording.depth)
         busy = [
-            f'<li class="replay-busy">message {seq}, {s:.2f} s old</li>' for seq, s in runs.items()
+            f'<li class="replay-busy">message <b>{seq}</b>, {age_s:.2f} s old</li>'
+            for seq, age_s in runs.items()
         ]
-        waiting = ''.join(f'<li>{seq}</li>' for seq in waits)
-        return _row('callback', *busy or ['<li>free</li>']) + _row('queue', waiting)
+        waiting = ''.join(f'<li><b>{seq}</b></li>' for seq in waits)
+        busy = busy or ['<li class="replay-free">free</li>']
+        return _row('callback', *busy) + _row('queue', waiting)
 
 
 def _row(name: str, *content: str) -> str:

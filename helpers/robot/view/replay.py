@@ -7,12 +7,10 @@ import math
 from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass, replace
-from html import escape
 
 import numpy as np
 
 from helpers.replay import Replay, replay
-from helpers.replay.picture import address
 from helpers.robot.floor import Pose
 from helpers.robot.record import DriveRecord, Event
 from helpers.robot.sensors import ANGLES
@@ -36,9 +34,7 @@ class Drive:
     summary: str
     recording: ScanRecording | None = None
     name: str = ''
-    lost: bool = False
     setup: None = None
-    names: tuple[str] = ('',)  # in front of rows, of which it has none
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -56,29 +52,26 @@ class Drive:
             [np.interp(times, rows[:, 0], column) for column in columns], axis=1
         )
 
-    def picture(self, span_s, width: int, left: int) -> tuple[str, list[float]]:
-        """Return the floor as an SVG at the end of the drive. It has no axis of time."""
+    def picture(self) -> str:
+        """Return the floor as an SVG at the end of the drive."""
         _, end = self.span_s
         scans = self.record_.scans
         track = Track()
         for x, y, *_ in self.sampled()[1].tolist():
             track.add(x, y)
-        svg = picture(
+        return picture(
             self.record_.floor,
             track,
             place(self.record_, end),
             scans[-1].ranges if scans else None,
             [place(self.record_, bump.t_s) for bump in bumps(self.record_)],
             seconds=[place(self.record_, second) for second in range(min(int(end), POSES) + 1)],
-            paper=True,
         )
-        return svg, [0, 0, 0, 0]
 
-    def figure(self, svg: str) -> str:
-        """Return its picture, with words for it, below the name of one of several runs."""
-        caption = f'<figcaption>{escape(self.name)}</figcaption>' if self.name else ''
-        words = f'{self.summary} {described(self.record_.floor)}'
-        return f'<figure>{caption}<img alt="{escape(words)}" src="{address(svg)}"></figure>'
+    @property
+    def words(self) -> str:
+        """What its picture shows, for everybody who does not see it."""
+        return f'{self.summary} {described(self.record_.floor)}'
 
     def record(self) -> dict:
         """Return what drive.js needs: whole milliseconds, mm/s and mrad/s."""

@@ -1,0 +1,79 @@
+// A state of model.js as lists that can be read. A message moves from where it was before.
+
+const MOST = 27; // of the messages of a list
+const PLACES = 40; // free ones that are drawn
+const MOVES_MS = 250;
+
+// Return the rows of a board, and `draw(state, stuck)`, where `stuck` is what circle.js returns. Names
+// are those of the rows: threads, groups, queue, circle, lost, or a number of the setup. `full` names
+// each message on a thread in full; `losses` is how many messages will be lost.
+function board(setup, names, { full = false, losses = 0 } = {}) {
+  const { callbacks, threads, groups } = setup;
+  const many = callbacks.length > 1;
+  const lists = names.map(name => element('ul', { 'aria-label': name, role: 'list', class: `replay-${name}` }));
+  const free = element('span', { 'aria-hidden': 'true' });
+  const rows = lists.map((list, i) => row(names[i], list, ...(names[i] === 'queue' ? [free] : [])));
+  lists.forEach((list, i) => {
+    if (many || !['queue', 'lost'].includes(names[i])) return;
+    list.parentNode.className = 'replay-places';
+    if (names[i] === 'lost') list.parentNode.style.setProperty('--rows', Math.ceil(Math.min(losses, MOST) / 10));
+  });
+
+  const named = item => (many ? model.named(setup, item) : `${item.seq}`);
+  const message = (item, text = named(item)) => element('b', { 'data-is': `${item.callback} ${item.seq}` }, text);
+
+  // Of each list its items: a class, and what is in it.
+  const ITEMS = {
+    threads: (state, kind) => (threads.length ? threads.map((name, i) => {
+      const run = state.runs[i];
+      if (!run) return ['replay-free', `${name}: free`];
+      const seen = run.seen === undefined ? '' : `, has read ${run.seen}`;
+      return [kind(run), `${name}: `, message(run, full ? model.named(setup, run) : named(run)),
+        `${seen}${run.waits ? ', waits' : ''}`];
+    }) : [['replay-free', 'no executor']]),
+    groups: (state, kind) => groups.map(({ name, exclusive }, group) => {
+      if (!exclusive) return ['replay-free', `${name}: lets all in`];
+      const holder = model.holderOf(setup, state, group);
+      return holder ? [kind(holder), `${name}: held by ${full ? model.named(setup, holder) : named(holder)}`]
+        : ['replay-free', `${name}: free`];
+    }),
+    queue: state => {
+      const waiting = state.queues.flatMap((queue, callback) => queue.map(item => ({ ...item, callback })));
+      const more = waiting.length - PLACES;
+      return waiting.slice(0, PLACES).map(item => ['', message(item)])
+        .concat(more > 0 ? [['replay-more', `and ${more} more`]] : []);
+    },
+    lost: ({ lost }) => (lost.length > MOST ? [['replay-more', `${lost.length - MOST} before`]] : [])
+      .concat(lost.slice(-MOST).map(item => ['', message(item)])),
+    circle: (state, kind, stuck) => stuck.map(({ says }) => ['replay-why', says]),
+  };
+
+  function fill(state, stuck) {
+    const kind = ({ id }) => (stuck.some(({ run }) => run === id) ? 'replay-stuck' : 'replay-busy');
+    lists.forEach((list, i) => {
+      const items = ITEMS[names[i]]?.(state, kind, stuck) ?? [['', `${state.values[names[i]] ?? 0}`]];
+      list.replaceChildren(...items.map(([kind, ...content]) => element('li', { class: kind }, ...content)));
+    });
+    const empty = callbacks.flatMap(({ depth, name }, i) => (many && depth > 4 ? []
+      : Array(Math.max(Math.min(depth, PLACES) - state.queues[i].length, 0)).fill(many ? name : '')));
+    free.replaceChildren(...empty.map(name => element('i', {}, name)));
+  }
+
+  const places = () => new Map(rows.flatMap(one => [...one.querySelectorAll('[data-is]')])
+    .map(node => [node.dataset.is, { node, at: node.getBoundingClientRect() }]));
+
+  function draw(state, stuck = []) {
+    if (matchMedia('(prefers-reduced-motion: reduce)').matches) return fill(state, stuck);
+    const before = places();
+    fill(state, stuck);
+    places().forEach(({ node, at }, is) => {
+      const from = before.get(is)?.at;
+      if (from && from.x === at.x && from.y === at.y) return;
+      const start = from ? { transform: `translate(${from.x - at.x}px, ${from.y - at.y}px)` }
+        : { transform: 'translate(2em)', opacity: 0 };
+      node.animate([start, { transform: 'none' }], { duration: MOVES_MS, easing: 'ease-out' });
+    });
+  }
+
+  return { rows, draw };
+}

@@ -1,0 +1,102 @@
+// A run as one picture: a row for each message, and why it waited. It is SVG as text: Python draws it
+// for pages without scripts, free play in the page. Its ink is currentColor.
+
+const ROWS = 120; // at most
+const [WIDTH, RIGHT, LINE, LETTER] = [480, 14, 20, 7.6]; // pixels; letters are about so wide
+// Why a message waits, and a callback, as model.js calls it: dashes, and the legend's words.
+const WAITS = {
+  '': ['', 'waits, a thread is free'],
+  'thread busy': ['', 'waits, thread busy'],
+  'group busy': ['6 2', 'waits, group busy'],
+  'no executor': ['2 2', 'waits, no executor'],
+  answer: ['4 2', 'waits, for one that waits'],
+  lock: ['2 4', 'waits, for a lock'],
+};
+const RUNS = {
+  '': ['', 'callback runs'],
+  answer: ['2 2', 'callback waits for an answer'],
+  lock: ['1 3', 'callback waits for a lock'],
+};
+const CROSS = 'm-3-3l6 6m0-6l-6 6';
+
+// Return the picture of each run, of the same span of seconds, all on one scale.
+function pictures(runs, span) {
+  const seen = runs.map(run => {
+    const messages = stories(run, ROWS);
+    const { callbacks } = run.setup;
+    const names = messages.map(({ callback, seq }) =>
+      (callbacks.length > 1 ? `${callbacks[callback].name} ${seq}` : `${seq}`));
+    return { ...run, messages, names };
+  });
+  const longest = Math.max(...seen.flatMap(({ names }) => names.map(name => name.length)));
+  const rows = Math.max(1, ...seen.map(({ messages }) => messages.length));
+  const left = Math.max(36, 12 + LETTER * longest);
+  return seen.map(run => picture(run, span, rows, left));
+}
+
+function picture({ messages, names, time }, [from, until], rows, left) {
+  const step = Math.max(2.5, Math.min(15, 200 / rows));
+  const bottom = step * rows;
+  const wide = WIDTH - left - RIGHT;
+  const x = at => +(left + wide * (Math.max(at, from) - from) / (until - from)).toFixed(1);
+  const y = row => +(step * (row + 0.5)).toFixed(1);
+  const path = (d, colour, width, dashes = '') =>
+    `<path d="${d}" stroke="${colour}" stroke-width="${width}" stroke-dasharray="${dashes}"/>`;
+  const text = (words, at, down, anchor = 'start') =>
+    `<text x="${at}" y="${down}" text-anchor="${anchor}">${words}</text>`;
+
+  const found = { waits: {}, runs: {} };
+  const row = new Map(messages.map(({ callback, seq }, index) => [`${callback} ${seq}`, index]));
+  let [crosses, pushed] = ['', ''];
+  messages.forEach((one, index) => {
+    const { callback, left: gone = until, ended = until, by } = one;
+    [['waits', gone], ['runs', ended]].forEach(([kind, end]) => {
+      one[kind].forEach(([begin, cause], i) => {
+        const stop = Math.min(one[kind][i + 1]?.[0] ?? end, end);
+        if (begin >= stop) return;
+        found[kind][cause] = `${found[kind][cause] ?? ''}M${x(begin)} ${y(index)}H${x(stop)}`;
+      });
+    });
+    if (by === undefined) return;
+    crosses += `M${x(gone)} ${y(index)}${CROSS}`;
+    const other = row.get(`${callback} ${by}`);
+    if (other !== undefined) pushed += `M${x(gone)} ${y(index)}V${y(other)}`;
+  });
+
+  // The legend grows with what is drawn.
+  let [drawn, legend, at, down] = ['', '', RIGHT, 16];
+  function add(d, mark, words, ...looks) {
+    drawn += path(d, ...looks);
+    const needed = Math.round(42 + LETTER * words.length);
+    if (at > RIGHT && at + needed > WIDTH) [at, down] = [RIGHT, down + LINE];
+    legend += path(`M${at} ${down - 5}${mark}`, ...looks) + text(words, at + 28, down);
+    at += needed;
+  }
+  const looks = [['waits', WAITS, LOOK.waiting, 0.3, 1.5], ['runs', RUNS, LOOK.heard, 0.75, 3]];
+  looks.forEach(([kind, causes, colour, part, least]) => {
+    const thick = +Math.max(least, part * step).toFixed(1);
+    Object.entries(causes).forEach(([cause, [dashes, words]]) => {
+      if (found[kind][cause]) add(found[kind][cause], 'h22', words, colour, thick, dashes);
+    });
+  });
+  if (pushed) drawn += path(pushed, LOOK.lost, 0.8, '1 2');
+  if (crosses) add(crosses, 'm9-3l6 6m0-6l-6 6', 'pushed out', LOOK.lost, 1.6);
+
+  const rough = (until - from) / 5;
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const tick = power * [1, 2, 5, 10].find(n => n * power >= rough);
+  let axes = path(`M${left} ${bottom}h${wide}`, 'currentColor', 1);
+  for (let n = Math.ceil(from / tick); n * tick <= until; n += 1) {
+    axes += path(`M${x(n * tick)} ${bottom}v5`, 'currentColor', 1)
+      + text(+(n * tick).toPrecision(6), x(n * tick), bottom + 20, 'middle');
+  }
+  const every = [1, 2, 5, 10].find(n => n * step >= 14);
+  for (let i = 0; i < names.length; i += every) axes += text(names[i], left - 6, y(i) + 5, 'end');
+  axes += text(time, left + wide / 2, bottom + 40, 'middle');
+  axes += `<path class="cursor" d="M${left} 0V${bottom}" stroke="currentColor" stroke-width="1.5"/>`;
+  const [top, height] = [down + 12, down + bottom + 60];
+  return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${height}" width="${WIDTH}" `
+    + `height="${height}" font-family="system-ui, sans-serif" font-size="14" color="${LOOK.ink}" `
+    + `fill="currentColor" preserveAspectRatio="xMinYMin" data-wide="${wide}">${legend}`
+    + `<g transform="translate(0 ${top})">${drawn}${axes}</g></svg>`;
+}
