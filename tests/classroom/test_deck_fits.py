@@ -1,64 +1,56 @@
 """Each deck: every slide is reached with Space, and nothing of it is cut off.
 
-All sizes are parts of the slide's height: what fits one projector fits each.
+All sizes are parts of the slide's height: what fits one projector of a shape fits each.
 """
-
-from itertools import pairwise
 
 import nbformat
 import pytest
-from support.lab_page import CUT_OFF, PANEL, SLIDE_DRAWN
+from support.lab_page import CUT_OFF, PANEL
 from support.lab_server import NOTEBOOKS
 
 from tools.lessons.slides import slide_types
 
-# Both scripts go through a whole lesson: from here, each slide would cost several times as much.
-# This one goes on as the key Space does, until nothing follows.
+# This goes through a whole lesson, with the keys of the deck: from here, each slide would cost
+# several times as much. It says what is cut off, also when the answers of a quiz are open.
 WALK = f"""async () => {{
-    const notebook = {PANEL}.content, visited = [];
-    while (notebook.activeCellIndex !== visited.at(-1)) {{
-        visited.push(notebook.activeCellIndex);
-        await window.jupyterapp.commands.execute(
-            'deck:go', {{ direction: 'down', alternate: 'forward' }});
-    }}
-    return visited;
-}}"""
-# This one shows these cells, each the last of its slide, and says what is cut off, also when the
-# answers of a quiz are open.
-MEASURE = f"""async cells => {{
-    const drawn = {SLIDE_DRAWN}, cutOff = {CUT_OFF};
-    const notebook = {PANEL}.content, found = [];
-    const twoFrames = () => new Promise(
-        done => requestAnimationFrame(() => requestAnimationFrame(done)));
-    for (const index of cells) {{
-        notebook.activeCellIndex = index;
-        const {{ node, model }} = notebook.activeCell, limit = performance.now() + 30000;
-        do {{
-            notebook.node.getAnimations({{ subtree: true }}).forEach(fade => fade.finish());
-            await twoFrames();
-            if (performance.now() > limit) throw Error(`Cell ${{index}} is not drawn.`);
-        }} while (!drawn(index));
+    const cutOff = {CUT_OFF}, notebook = {PANEL}.content, found = [], visited = [];
+    const frames = () => new Promise(done => requestAnimationFrame(() => setTimeout(done, 20)));
+    const number = () => +document.querySelector('#deck-head span').textContent.split('/')[0];
+    const press = key => notebook.activeCell.node.dispatchEvent(
+        new KeyboardEvent('keydown', {{ key, bubbles: true, cancelable: true }}));
+    const outer = notebook.outerNode;
+    for (let before = -1; ; press(' ')) {{
+        await frames();
+        const cell = notebook.activeCellIndex, same = visited.at(-1) === number();
+        if (same && before === cell && document.querySelector('#deck-says').textContent) break;
+        before = cell;
+        if (!same) visited.push(number());
+        if (outer.scrollHeight > outer.clientHeight + 4)
+            found.push(`slide ${{number()}} is ${{outer.scrollHeight - outer.clientHeight}} px too high`);
         found.push(...cutOff());
-        if (!model.sharedModel.getSource().startsWith('### Question ')) continue;
-        const answers = [...node.querySelectorAll('details')];
-        if (answers.length < 3) found.push(`cell ${{index}} has not three answers`);
-        answers.forEach(answer => answer.open = true);
-        await twoFrames();
-        found.push(...cutOff());
-        answers.forEach(answer => answer.open = false);
+        for (const answer of document.querySelectorAll('.deck-on details')) {{
+            const title = answer.closest('.jp-Cell').querySelector('h3')?.textContent;
+            if (!title?.startsWith('Question')) continue;
+            answer.open = true;
+            await frames();
+            found.push(...cutOff());
+            answer.open = false;
+        }}
     }}
-    return found;
+    return [visited, [...new Set(found)]];
 }}"""
 
 
+@pytest.mark.parametrize(('width', 'height'), [(1280, 720), (1024, 768)], ids=['16:9', '4:3'])
 @pytest.mark.parametrize('path', NOTEBOOKS, ids=[path.name for path in NOTEBOOKS])
-def test_every_slide_is_reached_and_nothing_is_cut_off(deck, path):
+def test_every_slide_is_reached_and_nothing_is_cut_off(deck, path, width, height):
     notebook = nbformat.read(path, as_version=4)
-    shown = [(i, kind) for i, kind in enumerate(slide_types(notebook)) if kind != 'skip']
-    last = [i for (i, _), (_, after) in pairwise([*shown, (0, 'slide')]) if after != 'fragment']
+    types = slide_types(notebook)
+    deck.page.set_viewport_size({'width': width, 'height': height})
     deck.present(path.name)
     if any('ipywidgets' in cell.source for cell in notebook.cells):
         deck.command('notebook:run-all-cells')  # a widget is not saved
         deck.page.evaluate(f'() => {{ {PANEL}.content.activeCellIndex = 0 }}')
-    assert deck.page.evaluate(WALK) == [i for i, _ in shown]
-    assert deck.page.evaluate(MEASURE, last) == []
+    visited, cut_off = deck.page.evaluate(WALK)
+    assert visited == [*range(1, sum(kind in ('slide', 'subslide') for kind in types) + 1)]
+    assert cut_off == []

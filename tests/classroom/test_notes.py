@@ -1,23 +1,24 @@
 """What the notes window shows for each place in each lesson."""
 
-import shutil
-
 import nbformat
 import pytest
 from nbconvert.filters import markdown2html
 
 from tools.classroom import notes_window
+from tools.classroom.present import Copies
 from tools.lessons.lesson import GLOSSARY, ROOT, lessons, tags
+from tools.lessons.slides import slide_types
 
 LESSONS = [lesson for lesson in lessons() if lesson.number != GLOSSARY]
 
 
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
 def test_slides_and_minutes_only_grow_and_end_at_those_of_the_lesson(tmp_path, lesson):
-    shutil.copytree(ROOT / 'notebooks', tmp_path / 'presentation')
+    (tmp_path / 'notebooks').symlink_to(ROOT / 'notebooks')
+    Copies(tmp_path, '').make([])
     path = f'presentation/{lesson.file}'
     cells = lesson.notebook.cells
-    types = [cell.metadata.slideshow.slide_type for cell in cells]
+    types = slide_types(lesson.notebook)
     walked = [index for index, kind in enumerate(types) if kind != 'skip']
     states = [
         notes_window.state(tmp_path, {'current': path, 'places': {path: at}, 'began': {}})
@@ -26,9 +27,7 @@ def test_slides_and_minutes_only_grow_and_end_at_those_of_the_lesson(tmp_path, l
     for name in ('slide', 'planned'):
         values = [state[name] for state in states]
         assert values == sorted(values)
-    for state, following in zip(states, walked[1:], strict=False):
-        assert (state['next'] == 'Next slide') == (types[following] != 'fragment')
-        assert state['cells']
+    assert all(state['cells'] for state in states if state['slide'] < state['slides'])
     assert states[0]['slide'] == 1
     assert (
         states[-1]['slide']

@@ -1,21 +1,35 @@
 """The copies that `make present` shows: they keep what was typed, and lessons stay as they are."""
 
+import socket
+
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 
-from tools.classroom.present import MADE, copies_of, main
+from tools import lab
+from tools.classroom.plan import plan_of, plans
+from tools.classroom.present import MADE, Copies, main
+from tools.lessons.lesson import ROOT, lessons, minutes_of_note
+
+FILES = ('01_publish.ipynb', '02_lose.ipynb')
 
 
 @pytest.fixture
 def root(tmp_path):
     folder = tmp_path / 'notebooks'
     folder.mkdir()
-    for name in ('01_publish.ipynb', '02_lose.ipynb'):
+    for name in FILES:
         output = new_output('stream', text='lost: 3\n')
         cell = new_code_cell('run()', outputs=[output], execution_count=4)
         nbformat.write(new_notebook(cells=[cell]), folder / name)
     return tmp_path
+
+
+def copy_of(root, number=2, new=False, **how):
+    """Make the copies, and return the path of one."""
+    path = root / 'notebooks' / FILES[number - 1]
+    Copies(root, '', **how).make([path], new)
+    return root / 'presentation' / path.name
 
 
 def change(path, source):
@@ -30,33 +44,68 @@ def code(path):
 
 def test_a_copy_has_no_outputs_and_the_lesson_keeps_its_own(root):
     before = (root / 'notebooks/02_lose.ipynb').read_bytes()
-    [copy] = copies_of('02', root)
+    copy = copy_of(root)
     assert code(copy).outputs == []
     assert code(copy).execution_count is None
-    assert code(*copies_of('02', root, outputs=True)).outputs[0].text == 'lost: 3\n'
+    assert code(copy).metadata.slideshow.slide_type == 'slide'
+    assert code(copy_of(root, outputs=True)).outputs[0].text == 'lost: 3\n'
     assert (root / 'notebooks/02_lose.ipynb').read_bytes() == before
 
 
 def test_what_was_typed_is_kept_until_thrown_away(root):
-    other, copy = copies_of('01 02', root)
+    other, copy = copy_of(root, 1), copy_of(root)
+    assert Copies(root).used(copy.name) == ''
     change(copy, 'typed()')
     change(other, 'typed()')
     change(root / 'notebooks/02_lose.ipynb', 'newer()')
     (root / 'presentation' / MADE).write_text('')  # it was broken off
-    assert code(*copies_of('02', root)).source == 'typed()'
-    assert code(*copies_of('02', root, new=True)).source == 'newer()'
+    assert code(copy_of(root)).source == 'typed()'
+    assert Copies(root).used(copy.name)
+    assert code(copy_of(root, new=True)).source == 'newer()'
     assert code(other).source == 'typed()'
 
 
 def test_an_untouched_copy_follows_its_lesson(root):
-    other, copy = copies_of('01 02', root)
-    for file in ('01_publish.ipynb', '02_lose.ipynb'):
+    other, copy = copy_of(root, 1), copy_of(root)
+    for file in FILES:
         change(root / 'notebooks' / file, 'newer()')
-    copies_of('02', root)
+    copy_of(root)
     assert code(copy).source == code(other).source == 'newer()'
 
 
-@pytest.mark.parametrize('number', ['', '03', '01 03'])
-def test_a_wrong_number_gives_one_sentence(root, capsys, number):
-    assert main(['--lessons', number, '--root', str(root)]) == 1
+@pytest.mark.parametrize('plan', plans(), ids=[plan.title for plan in plans()])
+def test_a_timetable_has_its_steps_and_minutes_only(tmp_path, plan):
+    (tmp_path / 'notebooks').symlink_to(ROOT / 'notebooks')
+    copies = Copies(tmp_path, plan.title)
+    copies.make([])
+    shown = {name: nbformat.read(copies.folder / name, as_version=4) for name in plan.steps}
+    minutes = {
+        name: sum(minutes_of_note(cell.source) for cell in notebook.cells)
+        for name, notebook in shown.items()
+    }
+    known = {lesson.file: lesson for lesson in lessons()}
+    assert minutes == {name: known[name].minutes_of(steps) for name, steps in plan.steps.items()}
+    for name, following in zip(plan.steps, [*plan.steps][1:], strict=False):
+        assert f']({following})' in shown[name].cells[-1].source
+
+
+def test_a_timetable_is_named_by_a_word():
+    assert plan_of('90').title == '90 minutes'
+    assert plan_of('half').title == 'Half a day'
+
+
+@pytest.mark.parametrize(
+    'wrong',
+    [['--lessons', ''], ['--lessons', '03'], ['--lessons', '01 03'], ['--plan', 'tomorrow']],
+)
+def test_a_wrong_name_gives_one_sentence(root, capsys, wrong):
+    assert main([*wrong, '--root', str(root)]) == 1
     assert capsys.readouterr().err.count('\n') == 1
+
+
+def test_a_port_in_use_gives_one_sentence(tmp_path):
+    with socket.create_server(('localhost', 0)) as taken:
+        port = taken.getsockname()[1]
+        options = lab.parser('').parse_args(['--port', str(port), '--root', str(tmp_path)])
+        with pytest.raises(SystemExit, match=rf'^Port {port} is in use[^\n]+$'):
+            lab.open_lab(options, 'lab')

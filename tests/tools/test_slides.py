@@ -35,31 +35,31 @@ def printed(lines):
 @pytest.mark.parametrize(
     ('cells', 'types'),
     [
-        ([code()], 'slide'),
-        ([TITLE, STEP, text(), code(), code()], 'slide slide fragment fragment fragment'),
-        ([TITLE, STEP, text('### Run'), code()], 'slide slide subslide fragment'),
+        ([code()], ['slide']),
+        ([TITLE, STEP, text(), code(), code()], ['slide', 'slide', '', '', '']),
+        ([TITLE, STEP, text('### Run'), code()], ['slide', 'slide', '', '']),
+        # A task starts a slide, but joins a text before it.
+        ([TITLE, STEP, text('### ✎ Task 1'), code()], ['slide', 'slide', '', '']),
+        ([TITLE, code(), text('### ✎ Task 1'), code()], ['slide', '', 'subslide', '']),
         # The text moves to the next slide with the code that it leads to,
-        ([TITLE, STEP, code(18), text(), code(16)], 'slide slide fragment subslide fragment'),
-        # except where the two do not fit together either.
+        ([TITLE, STEP, code(18), text(), code(16)], ['slide', 'slide', '', 'subslide', '']),
+        # except if the two do not fit together either.
+        ([STEP, text('word ' * 80), code(25, outputs=printed(8))], ['slide', '', 'subslide']),
+        # A sentence takes what it is about along.
         (
-            [TITLE, STEP, text('word ' * 80), code(25, outputs=printed(8))],
-            'slide slide fragment subslide',
+            [STEP, code(13), text('word ' * 20), code(5), text()],
+            ['slide', '', 'subslide', '', ''],
         ),
-        ([TITLE, code(), text('### Explain\n\nWhy.')], 'slide fragment fragment'),
-        ([TITLE, code(20), text('### Explain\n\n' + 'word ' * 80)], 'slide fragment subslide'),
-        ([TITLE, code(), code(1, 'solution'), code(1)], 'slide fragment subslide fragment'),
-        ([TITLE, text('', 'deck-break'), code()], 'slide subslide fragment'),
-        ([TITLE, code(25, 'deck-skip'), code(16)], 'slide skip fragment'),
-        ([TITLE, note('word ' * 400), code(16)], 'slide skip fragment'),
+        ([TITLE, code(), code(1, 'solution'), code(1)], ['slide', '', '', '']),
+        ([TITLE, code(), text('', 'deck-break'), code()], ['slide', '', 'subslide', '']),
+        ([TITLE, code(25, 'deck-skip'), code(16)], ['slide', 'skip', '']),
+        ([TITLE, note('word ' * 400), code(16)], ['slide', 'skip', '']),
         # A note does not part a text from its code.
-        (
-            [TITLE, code(18), text(), note(), code(16)],
-            'slide fragment subslide skip fragment',
-        ),
+        ([TITLE, code(18), text(), note(), code(16)], ['slide', '', 'subslide', 'skip', '']),
     ],
 )
 def test_the_rule(cells, types):
-    assert slide_types(new_notebook(cells=cells)) == types.split()
+    assert slide_types(new_notebook(cells=cells)) == types
 
 
 def test_no_slide_holds_more_than_its_height():
@@ -68,7 +68,7 @@ def test_no_slide_holds_more_than_its_height():
         cells += [text('word ' * 7 * lines), code(lines, outputs=printed(25 - lines))]
     filled = []
     for cell, slide_type in zip(cells, slide_types(new_notebook(cells=cells)), strict=True):
-        if slide_type != 'fragment':
+        if slide_type:
             filled.append(0)
         filled[-1] += height(cell)
     assert max(filled) <= SLIDE

@@ -10,7 +10,7 @@ from tools.lessons.slides import heading
 
 
 def of_step(cells: list[NotebookNode], at: int) -> dict:
-    """Return the notes of the step of cell `at`, and the minutes planned to its end and in all."""
+    """Return the notes of the step of cell `at`, and its minutes: own, to its end, in all."""
     steps = [i for i, cell in enumerate(cells) if heading(cell, '##? ')]
     notes = [i for i, cell in enumerate(cells) if 'notes' in tags(cell)]
     minutes = {i: minutes_of_note(cells[i].source) for i in notes}
@@ -19,21 +19,14 @@ def of_step(cells: list[NotebookNode], at: int) -> dict:
     before = [i for i in notes if i < end]
     title = first_heading(cells[step].source)
     own = [i for i in before if i > step]
-    for_it = own or [i for i in before[-1:] if _is_for(cells[i].source, title)]
     return {
         'lesson': first_heading(cells[0].source),
         'step': title,
-        'notes': ''.join(markdown2html(_with_breaks(cells[i].source)) for i in for_it),
+        'notes': ''.join(markdown2html(_with_breaks(cells[i].source)) for i in own),
+        'own': sum(minutes[i] for i in own),
         'planned': sum(minutes[i] for i in before),
         'all': sum(minutes.values()),
     }
-
-
-def _is_for(note: str, title: str) -> bool:
-    """Return whether a note of an earlier step is for this one, too: `for steps 1 to 3`."""
-    steps = re.search(r'for steps (\d+) (?:and|to) (\d+)', note)
-    number = re.match(r'(\d+)\. ', title)
-    return bool(steps and number and int(steps[1]) <= int(number[1]) <= int(steps[2]))
 
 
 def _with_breaks(source: str) -> str:

@@ -1,18 +1,13 @@
 """Which cell of a lesson starts a slide: a rule, so that nobody keeps it up by hand.
 
-A title and a step (`#`, `##`) start a slide. What follows is revealed on it, cell by cell, as long
-as it fits: `fragment`. A part (`###`), a solution, and what no longer fits start a slide below it:
-`subslide`. A cell stays together with the text that leads to it, if a slide has room for both,
-and `### Explain` with what it explains.
-
-If the rule is wrong for a cell, a tag of the cell (JupyterLab, Property Inspector) changes it:
+A title and a step (`#`, `##`) start a slide. What follows joins it as long as it fits: a text
+always with the code that it leads to. A task and a question (`### ✎`, `### Question`) start a slide
+below, unless only text is before them. If the rule is wrong for a cell, a tag of the cell
+(JupyterLab, Property Inspector) changes it:
 
     deck-break      starts a slide below, although it would fit
     deck-skip       is left out of the deck
     notes           is for the instructor: a raw cell, folded in JupyterLab, left out of the deck
-
-jupyterlab-slideshow has traps: it hides a cell of the type `-`, and from one of the type `notes`,
-where Shift+Enter can lead, no key leads on. So no cell gets these types.
 """
 
 import ast
@@ -25,59 +20,72 @@ from nbformat import NotebookNode
 from tools.lessons.lesson import tags
 
 SKIPPED = {'deck-skip', 'notes'}
-ALONE = {'deck-break', 'solution'}
+SENTENCE = 16.0  # a text below this height has no slide of its own
 
 # The sizes of deck.css, in hundredths of the slide's height. Letters are taken a little wider than
-# in most fonts. tests/browser measures what they really are.
-SLIDE, WIDTH = 97.0, 155.0
-FOLDED, BORDER = 4.0, 1.5
-PROSE_LINE, PROSE_GAP, PROSE_CHARACTERS, PROSE_PICTURE = 4.2, 3.1, 82, 47.0
-HEADINGS = {'#': 17.0, '##': 12.0, '###': 9.0}
-TABLE_ROW, TABLE_CHARACTERS = 4.6, 120
+# in most fonts. tests/classroom measures what they really are.
+SLIDE, WIDTH = 90.0, 165.0
+LARGEST = 101.0  # with the smallest letters
+FOLDED, BORDER = 4.2, 2.0
+PROSE_LINE, PROSE_GAP, PROSE_CHARACTERS, PROSE_PICTURE = 4.3, 3.2, 92, 47.0
+HEADINGS = {'#': 10.0, '##': 0.0, '###': 6.5}
+TABLE_ROW, TABLE_CHARACTERS = 4.7, 130
 UNFOLDED = re.compile(r'<summary>(.*?)</summary>.*?</details>', re.DOTALL)
 LISTING = re.compile(r'^```.*?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 MARKUP = re.compile(r'<[^>]+>|\]\([^)]*\)|[*`\[]')
-CODE = {8: 62.0, 18: 38.0, 999: 28.0}  # lines of code at most: the height of a figure
-LETTER = 2.78  # of code
+CODE = {8: 60.0, 18: 38.0, 999: 28.0}  # lines of code at most: the height of a figure
+LETTER = 2.8  # of code
 CODE_LINE, CODE_CHARACTER = 1.2, 0.61  # times the size of a letter
 REPLAY = 80.0  # about; the deck scrolls to the end of a higher one
 PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 
 
 def slide_types(notebook: NotebookNode) -> list[str]:
-    """Return the slide type of each cell: slide, subslide, fragment or skip."""
-    types: list[str] = []
-    used = 0.0
+    """Return the slide type of each cell: slide, subslide, skip, or nothing if it goes on."""
+    types = ['skip' if tags(cell) & SKIPPED else '' for cell in notebook.cells]
+    slide: list[list[int]] = []  # its groups
     for group in _groups(notebook):
-        heights = [height(cell) for cell in group]
-        together = [sum(heights) if sum(heights) <= SLIDE else heights[0], *heights[1:]]
-        for cell, own, needed in zip(group, heights, together, strict=True):
-            kind = _slide_type(cell, set(types) <= {'skip'}, used + needed <= SLIDE)
-            used = own + (used if kind in ('fragment', 'skip') else 0)
-            types.append(kind)
+        cells = [notebook.cells[i] for i in group]
+        fits = _height(notebook, [*slide, group]) <= SLIDE
+        if not slide or heading(cells[0], '##? '):
+            slide, types[group[0]] = [group], 'slide'
+        elif fits and not _breaks(cells[0], after_code=_has_code(notebook, slide)):
+            slide.append(group)
+        else:
+            # A sentence at the end takes what it is about along.
+            last = slide[-1]
+            alone = not _has_code(notebook, [group]) and _height(notebook, [group]) < SENTENCE
+            along = alone and len(slide) > 1 and _height(notebook, [last, group]) <= SLIDE
+            slide = [last, group] if along else [group]
+            types[slide[0][0]] = 'subslide'
     return types
 
 
-def _groups(notebook: NotebookNode) -> list[list[NotebookNode]]:
-    """Return the cells in groups: text, and the code that it leads to."""
-    groups: list[list[NotebookNode]] = []
-    for cell in notebook.cells:
-        follows = tags(cell) & SKIPPED or cell.cell_type != 'markdown' and not tags(cell) & ALONE
-        if groups and follows:
-            groups[-1].append(cell)
+def _groups(notebook: NotebookNode) -> list[list[int]]:
+    """Return the cells that are shown, by index, in groups: text, and the code that it leads to."""
+    groups: list[list[int]] = []
+    for i, cell in enumerate(notebook.cells):
+        if tags(cell) & SKIPPED:
+            continue
+        joins = cell.cell_type != 'markdown' and 'deck-break' not in tags(cell)
+        fits = groups and _height(notebook, [[*groups[-1], i]]) <= SLIDE
+        if groups and joins and (fits or 'solution' in tags(cell)):
+            groups[-1].append(i)
         else:
-            groups.append([cell])
+            groups.append([i])
     return groups
 
 
-def _slide_type(cell: NotebookNode, first: bool, fits: bool) -> str:
-    if tags(cell) & SKIPPED:
-        return 'skip'
-    if first or heading(cell, '##? '):
-        return 'slide'
-    if not fits or heading(cell, '### (?!Explain)') or tags(cell) & ALONE:
-        return 'subslide'
-    return 'fragment'
+def _height(notebook: NotebookNode, groups: list[list[int]]) -> float:
+    return sum(height(notebook.cells[i]) for group in groups for i in group)
+
+
+def _has_code(notebook: NotebookNode, groups: list[list[int]]) -> bool:
+    return any(notebook.cells[i].cell_type == 'code' for group in groups for i in group)
+
+
+def _breaks(cell: NotebookNode, after_code: bool) -> bool:
+    return 'deck-break' in tags(cell) or after_code and heading(cell, '### (✎|Question )')
 
 
 def heading(cell: NotebookNode, form: str) -> bool:
@@ -99,8 +107,10 @@ def height(cell: NotebookNode) -> float:
     lines = len(cell.source.splitlines())
     figure = next(tall for most, tall in CODE.items() if lines <= most)
     source = FOLDED if folded(cell) else _height_of_text(cell.source)
-    outputs = sum(_height_of_output(output, figure) for output in cell.outputs)
-    return BORDER + source + outputs + (BORDER if cell.outputs else 0)
+    # What a solution prints comes into view for whoever runs it.
+    shown = [] if 'solution' in tags(cell) else cell.outputs
+    outputs = sum(_height_of_output(output, figure) for output in shown)
+    return BORDER + source + outputs + (BORDER if shown else 0)
 
 
 def folded(cell: NotebookNode) -> bool:

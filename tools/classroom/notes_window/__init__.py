@@ -1,9 +1,10 @@
 """The notes window, which follows the deck: a part of the server of `make present`.
 
-presenter.js keeps in a workspace of JupyterLab where the deck is. The rest is in the notebook.
+presenter.js tells the server where the deck is. The rest is in the notebook.
 """
 
 import html
+import json
 import time
 from functools import lru_cache
 from pathlib import Path
@@ -17,7 +18,8 @@ from tornado import web
 
 from tools.classroom.class_page import page_file
 from tools.classroom.notes import of_step
-from tools.classroom.present import FOLDER, deck
+from tools.classroom.present import FOLDER, Copies, deck, deck_file
+from tools.lessons.clean import write
 
 HERE = Path(__file__).resolve().parent
 FILES = {  # by the name in the address
@@ -45,15 +47,12 @@ def state(root: Path, deck: dict) -> dict:
     starts = [i for i, kind in enumerate(types) if kind in ('slide', 'subslide')]
     starts += [len(cells)] * 2  # the end of the last slide, and of the one after it, which is empty
     slide = sum(start <= at for start in starts)
-    on_slide = range(at + 1, starts[slide])
-    on_slide = [cells[i] for i in on_slide if types[i] == 'fragment']
     following = [cells[i] for i in range(*starts[slide : slide + 2]) if types[i] != 'skip']
     began = deck['began'].get(deck['current'])
     return of_step(cells, at) | {
         'slide': slide,
         'slides': len(starts) - 2,
-        'next': 'On this slide' if on_slide else 'Next slide',
-        'cells': ''.join(map(_html, on_slide or following)),
+        'cells': ''.join(map(_html, following)),
         'gone': int(time.time() - began) // 60 if began else 0,
     }
 
@@ -91,6 +90,35 @@ class Window(JupyterHandler):
             raise web.HTTPError(404)
 
 
+class Deck(JupyterHandler):
+    """Keep where the deck is, and make a copy anew."""
+
+    def initialize(self, copies: Copies, used: dict[str, str]) -> None:
+        """Take over the copies, and when something was typed in them before the server began."""
+        self.copies, self.used = copies, used
+
+    @web.authenticated
+    def get(self, _name: str) -> None:
+        """Answer with the place."""
+        self.set_header('Cache-Control', 'no-store')
+        self.finish(deck() | {'used': self.used})
+
+    @web.authenticated
+    def post(self, name: str) -> None:
+        """Keep the place, or make the copy of a path anew."""
+        body = self.get_json_body()
+        if name == 'state':
+            write(deck_file(), json.dumps(body))
+            # Who goes on has seen that the copy was used.
+            if body['places'].get(body['current']):
+                self.used.pop(body['current'], None)
+        else:
+            file = Path(body['path']).name
+            self.copies.make([self.copies.root / 'notebooks' / file], new=True)
+            self.used.pop(body['path'], None)
+        self.finish({})
+
+
 class PageOfClass(JupyterHandler):
     """Give the slides the address of the class page; nothing if no class is open."""
 
@@ -104,10 +132,14 @@ class PageOfClass(JupyterHandler):
 def _load_jupyter_server_extension(server: ServerApp) -> None:
     """Add the window to the server of `make present`."""
     base, root = server.web_app.settings['base_url'], Path(server.root_dir)
+    copies = Copies(root)
+    files = copies.folder.glob('*.ipynb')
+    used = {f'{FOLDER}/{file.name}': when for file in files if (when := copies.used(file.name))}
     server.web_app.add_handlers(
         '.*',
         [
             (url_path_join(base, 'notes/(.*)'), Window, {'root': root}),
             (url_path_join(base, 'class'), PageOfClass),
+            (url_path_join(base, 'deck/(state|fresh)'), Deck, {'copies': copies, 'used': used}),
         ],
     )

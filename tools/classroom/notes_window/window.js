@@ -21,7 +21,7 @@ function show(state) {
   document.title = `Notes: ${state.lesson}`;
   find('slide').textContent = `${state.slide} of ${state.slides}`;
   find('gone').classList.toggle('late', state.gone > state.planned);
-  for (const id of ['gone', 'planned', 'all', 'step', 'next']) find(id).textContent = state[id];
+  for (const id of ['gone', 'own', 'planned', 'all', 'step']) find(id).textContent = state[id];
   for (const id of ['notes', 'cells']) {
     if (state[id] === shown[id]) continue; // what is unfolded or scrolled stays so
     find(id).innerHTML = state[id];

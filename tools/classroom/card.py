@@ -1,0 +1,96 @@
+"""The instructor's card of a timetable, one page to print: `make card PLAN=90`.
+
+It holds what comes when, for how many minutes, what goes wrong, and the keys of the deck.
+"""
+
+import html
+import re
+import sys
+
+from nbformat import NotebookNode
+
+from tools.classroom.plan import Plan, keys, plan_of
+from tools.lessons.clean import write
+from tools.lessons.lesson import FOLDER, ROOT, Lesson, first_heading, minutes_of_note, read
+
+FILE = ROOT / 'presentation' / 'card.html'
+WRONG = re.compile(r'What goes wrong[^:.]*: (.+)')
+PAGE = """<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<title>{title}</title>
+<style>
+@page {{ size: A4; margin: 9mm; }}
+body {{ margin: 0; columns: {columns}; column-gap: 5mm; font: {size}pt/1.2 sans-serif; }}
+h1 {{ margin: 0; font-size: 130%; column-span: all; }}
+table {{ width: 100%; margin-bottom: 1mm; border-collapse: collapse; }}
+td {{ padding: 0.2mm 1mm; border-top: 0.2mm solid #bbb; vertical-align: top; }}
+td:first-child {{ white-space: nowrap; font-variant-numeric: tabular-nums; }}
+tr {{ break-inside: avoid; }}
+i {{ color: #444; }}
+</style>
+<h1>{title}</h1>
+<table>
+{rows}
+</table>
+<table>
+{keys}
+</table>
+"""
+
+
+def card(plan: Plan) -> str:
+    """Return the page of a timetable."""
+    rows, at = [], 0
+    for minutes, what in plan.rows:
+        file = next((name for name in plan.steps if name in what), '')
+        if not file:
+            rows.append((at, int(minutes), f'<b>{html.escape(what)}</b>'))
+            at += int(minutes)
+            continue
+        lesson = read((FOLDER / file).read_text(encoding='utf-8'), file)
+        for own, title, wrong in _steps(lesson, plan.steps[file]):
+            told = f'<b>{_plain(title)}</b> <i>{_plain(wrong)}</i>'
+            rows.append((at, own, told))
+            at += own
+    lines = [
+        f'<tr><td>{start // 60}:{start % 60:02d} <b>{own}′</b><td>{told}'
+        for start, own, told in rows
+    ]
+    return PAGE.format(
+        title=f'{html.escape(plan.title)}: {at // 60} h {at % 60} min',
+        columns=1 if len(lines) < 20 else 2,
+        size=10.5 if len(lines) < 20 else 8,
+        rows='\n'.join(lines),
+        keys='\n'.join(f'<tr><td>{_plain(key)}<td>{_plain(does)}' for key, does in keys()),
+    )
+
+
+def _steps(lesson: Lesson, wanted: tuple[int, int] | None) -> list[tuple[int, str, str]]:
+    """Return minutes, title, and what goes wrong, of the steps of a lesson that are wanted."""
+    by_step: dict[str, list[NotebookNode]] = {}
+    for cell, step in zip(lesson.notebook.cells, lesson.steps, strict=True):
+        by_step.setdefault(step, []).append(cell)
+    numbers = [str(n) for n in range(wanted[0], wanted[1] + 1)] if wanted else [*by_step][1:]
+    found = []
+    for number in numbers:
+        title = f'{lesson.number} {first_heading(by_step[number][0].source)}'
+        notes = [cell.source for cell in by_step[number] if cell.cell_type == 'raw']
+        if minutes := sum(map(minutes_of_note, notes)):
+            found.append((minutes, title, ' '.join(WRONG.findall('\n'.join(notes)))))
+    return found
+
+
+def _plain(text: str) -> str:
+    text = re.sub(r'\[(.+?)\]\(.+?\)', r'\1', text)
+    return html.escape(re.sub('[*`]', '', text))
+
+
+if __name__ == '__main__':
+    try:
+        page = card(plan_of(' '.join(sys.argv[1:])))
+    except ValueError as error:
+        sys.exit(str(error))
+    FILE.parent.mkdir(exist_ok=True)
+    write(FILE, page)
+    print(f'{FILE}: open it in a browser, and print it.')
