@@ -6,9 +6,12 @@ help: ## show this list
 lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, OUTPUTS=yes (those of the repository), LAB_ARGS=... change how
 	@exec $(PYTHON) -m tools.lab $(if $(filter yes,$(OUTPUTS)),--outputs) $(server) -- $(LAB_ARGS)
 
-present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02; NEW=yes makes it anew
-	@exec $(PYTHON) -m tools.classroom.present --lessons "$(LESSON)" $(if $(filter yes,$(NEW)),--new) \
+present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02, or PLAN=90, a timetable; NEW=yes makes it anew
+	@exec $(PYTHON) -m tools.classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" $(if $(filter yes,$(NEW)),--new) \
 		$(if $(filter no,$(FRESH)),--saved-outputs) $(server) -- $(LAB_ARGS)
+
+card: set_up ## one page to print for a timetable of teaching.md: PLAN=90
+	@$(PYTHON) -m tools.classroom.card $(PLAN)
 
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join over the network; PORT=8765, BROWSER=no
 	@exec $(PYTHON) -m tools.classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server) $(CLASS_ARGS)
@@ -20,7 +23,7 @@ test-tools: set_up ## the tools: an installation from nothing, two machines, the
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/tools $(PYTEST_ARGS)
 
 test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour: LESSON=lose_messages for one
-	@$(PYTHON) -m pytest -n 2 $(slow) tests/answers $(if $(LESSON),-k "$(LESSON)") $(PYTEST_ARGS)
+	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(if $(LESSON),-k "$(LESSON)") $(PYTEST_ARGS)
 
 test-browser: ## the real JupyterLab and the site in Chromium, as students use them; it takes minutes
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
@@ -93,7 +96,7 @@ test test-tools test-answers test-browser test-classroom notebooks lesson soak b
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present class test test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
+.PHONY: help lab present card class test test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
 	lesson site soak bench release lint lock licences clean set_up
 
 PYTHON := .venv/bin/python

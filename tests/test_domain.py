@@ -4,12 +4,10 @@ import contextlib
 import fcntl
 import os
 import random
-import socket
 
 import pytest
 import rclpy
 from domain_coordinator import domain_id as reserved_domain_id
-from domain_coordinator.impl import PORT_BASE
 from rclpy.node import Node
 from support.nodes import LIMIT_S, Listener, spin
 from support.processes import run_python, running
@@ -128,6 +126,7 @@ def test_hostile_variables(monkeypatch, shared_id):
     }
     for options, expected in (
         ({'domain_id': shared_id, 'discovery': 'SUBNET'}, wide),
+        ({'domain_id': 0}, {**narrow, 'ROS_DOMAIN_ID': '0'}),
         ({}, narrow),
     ):
         with ros_session(**options):
@@ -155,20 +154,6 @@ def test_hostile_variables(monkeypatch, shared_id):
 def test_bad_domain_or_discovery(arguments, said):
     with pytest.raises(ValueError, match=said):
         ros_session(**arguments)
-
-
-def test_a_connection_that_has_the_port_by_chance(shared_id):
-    with socket.create_server(('127.0.0.1', 0)) as server, socket.socket() as client:
-        client.bind(('127.0.0.1', PORT_BASE + shared_id))
-        client.connect(server.getsockname())
-        with ros_session(domain_id=shared_id):
-            assert domain_of_session() == shared_id
-
-
-@pytest.mark.parametrize('free_for_all', [0, 101])
-def test_the_ids_that_no_kernel_reserves(free_for_all):
-    with ros_session(free_for_all):
-        assert domain_of_session() == free_for_all
 
 
 # The turn to make or to end a participant
@@ -210,49 +195,3 @@ def test_participants_are_made_and_ended_in_turn(turn, monkeypatch):
         assert has(turn)
     assert has(turn)
     assert free == {('made', False), ('ended', False)}
-
-
-def test_a_session_waits_for_another_process(turn, monkeypatch):
-    lock, refused = fcntl.flock, []
-
-    def flock(folder, operation):
-        try:
-            lock(folder, operation)
-        except BlockingIOError:
-            refused.append(folder)
-            lock(turn, fcntl.LOCK_UN)
-            raise
-
-    lock(turn, fcntl.LOCK_EX)
-    monkeypatch.setattr(fcntl, 'flock', flock)
-    with ros_session():
-        assert len(refused) == 1
-
-
-@pytest.mark.parametrize('folder', [None, '/proc/no such folder'])
-def test_a_session_opens_without_a_turn(turn, folder, monkeypatch):
-    fcntl.flock(turn, fcntl.LOCK_EX)  # and whoever has it was stopped
-    monkeypatch.setattr(domain, 'TURN_TIMEOUT_S', 0.02)
-    if folder is not None:
-        monkeypatch.setattr(domain, 'SHARED_MEMORY', folder)
-    with ros_session():
-        assert rclpy.ok()
-
-
-def test_a_timed_out_turn_is_not_awaited_again(turn, monkeypatch):
-    lock, asked = fcntl.flock, []
-
-    def flock(folder, operation):
-        if operation & fcntl.LOCK_NB:
-            asked.append(folder)
-        lock(folder, operation)
-
-    lock(turn, fcntl.LOCK_EX)
-    with monkeypatch.context() as patch:
-        patch.setattr(domain, 'TURN_TIMEOUT_S', 0.02)
-        with ros_session():
-            assert rclpy.ok()
-    monkeypatch.setattr(fcntl, 'flock', flock)
-    with ros_session():
-        assert len(asked) == 1
-    assert len(asked) == 2

@@ -9,7 +9,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, LaserScan
 
-from helpers.fusion import ExtendedKalmanFilter
 from helpers.fusion.messages import yaw_of
 from helpers.fusion.nodes import PARTS, EkfNode
 from helpers.robot import ROOMS, Robot
@@ -42,13 +41,6 @@ def test_mounted_sensors_report_in_their_own_frames():
 def test_unknown_mountings_are_refused():
     with ros_session(), pytest.raises(ValueError, match='mounting can name imu_link, base_scan'):
         Robot(mounting={'imu': 0.5})
-
-
-@pytest.mark.parametrize(('initial', 'accepted'), [(None, False), ({'x': 1.0, 'y': 1.0}, True)])
-def test_initial_covariance_decides_on_the_first_fix(initial, accepted):
-    ekf = ExtendedKalmanFilter({'x': 0.002, 'y': 0.002}, initial)
-    ekf.process(0.0, ('vx', 'vyaw'), (0.0, 0.0), (0.01, 0.01))
-    assert ekf.process(1.0, ('x', 'y'), (3.0, 0.0), (0.25, 0.25), gate=3.0).accepted == accepted
 
 
 def test_covariances_of_another_length_are_refused():

@@ -92,13 +92,6 @@ def test_each_installed_interface_is_shown_whole(package, listing):
         assert [line for line in text.splitlines() if not line.startswith('\t')] == own
 
 
-def test_an_overlay_wins_and_a_change_is_seen(prefix, listing):
-    prefix.add('std_msgs/msg/String', 'string data # changed\n')
-    assert listing('std_msgs/msg/String') == 'string data # changed\n'
-    (prefix.share / 'std_msgs/msg/String.msg').write_text('string other\n')
-    assert listing('std_msgs/msg/String') == 'string other\n'
-
-
 @pytest.mark.parametrize(
     ('name', 'hint'),
     [

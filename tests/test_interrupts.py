@@ -1,7 +1,6 @@
 """An Interrupt waits for the end of what must not be cut in two."""
 
 import signal
-import threading
 
 import pytest
 
@@ -22,14 +21,3 @@ def test_an_interrupt_survives_a_failing_block():
         signal.raise_signal(signal.SIGINT)
         raise ZeroDivisionError
     assert isinstance(interrupt.value.__context__, ZeroDivisionError)
-
-
-def test_other_threads_are_never_interrupted():
-    def block():
-        with uninterrupted():
-            done.append(signal.getsignal(signal.SIGINT))
-
-    done, thread = [], threading.Thread(target=block)
-    thread.start()
-    thread.join()
-    assert done == [signal.getsignal(signal.SIGINT)]

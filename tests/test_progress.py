@@ -53,13 +53,6 @@ def test_a_new_student(kept, capsys):
     )
 
 
-def test_a_solved_task_is_in_the_table(kept, capsys):
-    progress.record(2)
-    text = shown(capsys)
-    assert '92 Lose them    1 of 2  task 1\n' in text
-    assert text.endswith('\n1 of 4 tasks are solved.\n')
-
-
 def test_progress_survives_a_new_lesson_number(kept, capsys, folder):
     progress.record(2)
     (folder / '92_lose_them.ipynb').rename(folder / '94_lose_them.ipynb')
@@ -76,11 +69,6 @@ def test_a_broken_notebook_breaks_nothing(kept, capsys, folder, broken):
     text = shown(capsys)
     assert re.search(r'^00 Start here +0 of 1 +task 1$', text, re.MULTILINE)
     assert kept.read_text() == 'lose_them 1\n'
-
-
-def test_elsewhere_the_notebooks_are_those_of_the_checkout(monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    assert 'lose_messages' in {lesson.name for lesson in progress.with_tasks()}
 
 
 def test_passed_tasks_are_kept(kept):
@@ -140,12 +128,3 @@ def test_where_it_is_kept(tmp_path, monkeypatch):
     monkeypatch.delenv('JUPYTER_DATA_DIR')  # on a JupyterHub
     monkeypatch.setenv('HOME', str(tmp_path / 'home'))
     assert progress.file().is_relative_to(tmp_path / 'home')
-
-
-def test_tests_keep_nothing(tmp_path, monkeypatch, capsys):
-    assert progress.file() is None  # conftest.py
-    monkeypatch.setenv('JUPYTER_DATA_DIR', str(tmp_path))
-    progress.record(1)
-    assert '0 of 4' in shown(capsys)
-    progress.start_again()
-    assert [path.name for path in tmp_path.iterdir()] == ['notebooks']

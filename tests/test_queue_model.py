@@ -246,16 +246,6 @@ def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, data):
 # explain: examples
 
 
-def test_numbers_may_start_anywhere():
-    table = predict(0.05, 0.2, 10, 1, 41)
-    shifted = table.assign(seq=table['seq'] + 1000).sample(frac=1, random_state=1)
-    before = shifted.copy()
-    explanation = explain(shifted, 10, 1)
-    pd.testing.assert_frame_equal(shifted, before)
-    assert explanation.complete
-    assert (explanation.losses['pushed_out_by'] == explanation.losses['seq'] + 10).all()
-
-
 def without(table, seq):
     """The message was not heard."""
     broken = table.copy()
@@ -282,42 +272,6 @@ def test_what_is_impossible_is_said(table, said):
     assert said is None or any(said in sentence for sentence in explanation.contradictions)
     assert explanation.complete is (said is None)
     assert ('Everything is' in str(explanation)) is (said is None)
-
-
-# Recorded on two cores on which 24 kernels ran: in ms, when messages were published, and when the
-# callbacks started and finished that could be late. 87 ms passed between the first two.
-LATE_PUBLISHED = [0, 51, 93, 128, 181, 228, 278, 357, 387, 435, 515, 529, *range(585, 1984, 50)]
-LATE_HEARD = {0: (10, 357), 1: (444, 660), 4: (665, 870), 8: (871, 1076), 12: (1077, 1287)}
-
-
-def test_a_worker_may_be_late():
-    published = pd.Series(LATE_PUBLISHED[:23]) / 1e3
-    table = pd.DataFrame({'seq': published.index, 'published_s': published})
-    table[['started_s', 'finished_s']] = np.nan
-    table['thread'] = None
-    for seq, (start, finish) in LATE_HEARD.items():
-        table.loc[seq, CALLBACK] = [start / 1e3, finish / 1e3, 'thread 1']
-    rested = 'Message 2 was pushed out although a worker was free for 0.087 s.'
-    assert rested not in explain(table, 10, 1).contradictions
-    # The same pause on a machine on which all else was in time.
-    table['published_s'] = np.linspace(0, 1.1, len(table))
-    table.loc[0, 'started_s'] = 0.157
-    for seq, start in {1: 0.444, 4: 0.65, 8: 0.86, 12: 1.07}.items():
-        table.loc[seq, ['started_s', 'finished_s']] = start, start + 0.2
-    assert rested in explain(table, 10, 1).contradictions
-    # One worker is one worker, also if its thread is unknown. Of two, nothing is known.
-    table['thread'] = None
-    assert rested in explain(table, 10, 1).contradictions
-    assert rested not in explain(table, 10, 2).contradictions
-
-
-@pytest.mark.filterwarnings('error')
-def test_callbacks_that_are_still_running():
-    table = predict(0.05, 0.2, 10, 1, 41).assign(finished_s=np.nan)[:15]
-    for seq in heard(table)[1:]:
-        table = without(table, seq)
-    explanation = explain(table, 10, 1)
-    assert (explanation.lost, explanation.explained) == (14, 4)
 
 
 def test_last_messages_that_were_never_heard():

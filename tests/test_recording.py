@@ -24,9 +24,20 @@ def watched(messages, work=None, **options):
     return talker, listener, Recording(talker.publisher, listener.subscription)
 
 
-def test_table():
+async def as_coroutine(message): ...
+
+
+def with_info(message, info):
+    assert info['source_timestamp'] > 0
+
+
+@pytest.mark.parametrize('callback', [None, with_info, as_coroutine])
+def test_table(callback):
     with ros_session() as session:
-        talker, listener, recording = watched(6)
+        talker, listener = Talker(6), Listener()
+        if callback:
+            listener.subscription.callback = callback
+        recording = Recording(talker.publisher, listener.subscription)
         spin(session, listener)
         spin(session, talker)
         recording.wait_until_complete(6, LIMIT_S)
@@ -68,18 +79,6 @@ def test_lost_messages():
     assert table['published_s'].notna().all()
 
 
-@pytest.mark.parametrize('messages', [0, 3])
-def test_nothing_heard(messages):
-    with ros_session():
-        talker, _, recording = watched(3)
-        for _ in range(messages):
-            talker.publish()
-    table = recording.table()
-    assert table['seq'].tolist() == list(range(messages))
-    assert [table[name].dtype for name in RUN_COLUMNS[:4]] == [int, float, float, float]
-    assert table['thread'].tolist() == [None] * messages
-
-
 def test_an_interrupted_recording_is_kept_with_its_parameters():
     def run(period_s):
         with ros_session():
@@ -94,19 +93,6 @@ def test_an_interrupted_recording_is_kept_with_its_parameters():
     table = Recording.latest.table()
     assert table['seq'].tolist() == [0]
     assert table.attrs == {'period_s': 0.5, 'depth': 10}
-
-
-def test_threads():
-    gate = Gate()
-    with ros_session() as session:
-        talker, listener, recording = watched(3, gate, callback_group=ReentrantCallbackGroup())
-        spin(session, listener, threads=3)
-        for i in range(3):
-            talker.publish()
-            session.wait_until(lambda expected=i + 1: gate.inside == expected, LIMIT_S)
-        gate.open()
-        recording.wait_until_complete(3, LIMIT_S)
-    assert recording.table()['thread'].tolist() == ['thread 1', 'thread 2', 'thread 3']
 
 
 def test_wait_for_callbacks_that_still_run():
@@ -129,51 +115,6 @@ def test_wait_for_callbacks_that_still_run():
         gate.open()
         recording.wait_until_complete(2, LIMIT_S)
     assert recording.table()['finished_s'].notna().all()
-
-
-def test_nothing_to_wait_for():
-    with ros_session():
-        recording = watched(1)[2]
-        with pytest.raises(
-            ValueError, match='^messages must be a whole number from 1 up, not 0[.]$'
-        ):
-            recording.wait_until_complete(0)
-    with pytest.raises(RuntimeError, match='No session is open'):
-        recording.wait_until_complete(1)
-
-
-def test_progress_is_the_part_that_was_worked_off(monkeypatch):
-    seen = []
-    session = SimpleNamespace(wait_until=lambda _, __, progress, ___: seen.append(progress()))
-    monkeypatch.setattr('helpers.session.current_session', lambda: session)
-    recording = Recording(publisher := Publisher(), subscription := Subscription())
-    recording.wait_until_complete(4)
-    for number in (3, 4, 5):
-        publisher.publish(Int64(data=number))
-    subscription.callback(Int64(data=4))
-    recording.wait_until_complete(4)
-    assert seen == [0, 2 / 4]
-
-
-@pytest.mark.parametrize('kind', ['message and info', 'async'])
-def test_kinds_of_callbacks(kind):
-    seen = []
-
-    def with_info(message, info):
-        assert info['source_timestamp'] > 0
-        seen.append(message.data)
-
-    async def as_coroutine(message):
-        seen.append(message.data)
-
-    with ros_session() as session:
-        talker, listener = Talker(3), Listener()
-        listener.subscription.callback = with_info if kind == 'message and info' else as_coroutine
-        recording = Recording(talker.publisher, listener.subscription)
-        spin(session, talker, listener)
-        recording.wait_until_complete(3, LIMIT_S)
-    assert seen == [f'Hello World: {i}' for i in range(3)]
-    assert recording.table()[TIMES].notna().all(axis=None)
 
 
 # Without ROS: a publisher and a subscription that do nothing
@@ -297,15 +238,6 @@ def test_a_run_is_inside_where_it_starts():
     assert recording.inside('inner', 'outer') == 4
 
 
-def test_watched_function():
-    recording = CallbackRecording(look=Subscription())
-    assert recording.tables()['look'].columns.tolist() == RUN_COLUMNS
-    double = recording.watch('double', lambda number: 2 * number)
-    assert recording.tables()['double'].empty
-    assert [double(2), double(3)] == [4, 6]
-    assert recording.finished('double') == 2
-
-
 def test_a_watched_function_that_asks():
     with ros_session():
         asker = Asker()
@@ -313,3 +245,4 @@ def test_a_watched_function_that_asks():
         recording.watch('job', lambda: asker.client.call_async(asker.ask()))()
     [call] = recording.calls().to_dict('records')
     assert (call['caller'], call['run'], call['style']) == ('job', 0, 'send')
+    assert recording.tables()['job'].columns.tolist() == RUN_COLUMNS

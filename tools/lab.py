@@ -5,6 +5,7 @@ python -m tools.lab --port 8890 --no-browser -- --LabApp.expose_app_in_browser=T
 
 import argparse
 import os
+import socket
 import sys
 from pathlib import Path
 from typing import NoReturn
@@ -31,20 +32,23 @@ def parser(description: str) -> argparse.ArgumentParser:
 
 
 def open_lab(
-    options: argparse.Namespace, address: str, more: tuple[str, ...] = (), slides: bool = False
+    options: argparse.Namespace, address: str, more: tuple[str, ...] = (), deck: bool = False
 ) -> NoReturn:
     """Become the server of JupyterLab, which opens `address`.
 
     A server of `make lab` and one of `make present` may run side by side: each has its settings.
-    `slides` says whether a notebook opens as slides, `more` are options of JupyterLab.
+    `deck` says whether notebooks are shown as slides, `more` are options of JupyterLab.
     """
+    if options.port and not _is_free(int(options.port)):
+        sys.exit(f'Port {options.port} is in use: give another one, such as PORT=8899.')
     config = Path(jupyter_config_dir())
-    settings = config / 'lab' / f'{"presenter" if slides else "user"}-settings'
-    slideshow = settings / 'jupyterlab-slideshow' / 'plugin.jupyterlab-settings'
+    settings = config / 'lab' / f'{"presenter" if deck else "user"}-settings'
+    if deck:  # a slide needs all of its cells, also those that are not on the screen
+        notebooks = settings / '@jupyterlab/notebook-extension/tracker.jupyterlab-settings'
+        notebooks.parent.mkdir(parents=True, exist_ok=True)
+        notebooks.write_text('{"windowingMode": "none", "scrollPastEnd": false}')
     custom = config / 'custom' / 'custom.css'
-    for file in (slideshow, custom):
-        file.parent.mkdir(parents=True, exist_ok=True)
-    slideshow.write_text(f'{{"active": {str(slides).lower()}}}')
+    custom.parent.mkdir(parents=True, exist_ok=True)
     css = Path(__file__).with_name('lab.css').read_text()
     custom.write_text(css.partition(NOTES)[0] if options.outputs else css)
     os.environ['JUPYTERLAB_SETTINGS_DIR'] = str(settings)
@@ -61,6 +65,16 @@ def open_lab(
     if os.getuid() == 0:
         command.append('--allow-root')
     os.execv(sys.executable, [*command, *options.more])
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket() as tried:
+        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            tried.bind(('localhost', port))
+        except OSError:
+            return False
+    return True
 
 
 if __name__ == '__main__':

@@ -51,7 +51,7 @@ def test_from_join_to_forget_everything(lab_page, tabs, student_server, artefact
                 lab.wait_for_notebook(f'{name}/{LESSON}')
                 said = ' '.join(lab.run(0).split())
                 assert f'on seat {number}. Sent to it: your guesses' in said
-                assert lab.run(1) == ''
+                assert lab.run(1).startswith('Your guess is taken')
                 page.get_by_text(f'{number} of {number} have answered').wait_for()
                 if name != 'cyd':
                     assert 'Verdict' in lab.run(2)
@@ -111,10 +111,10 @@ time.sleep(2)
             frame.locator('.bars').wait_for()
             deck.page.wait_for_function(
                 "() => document.activeElement.id !== 'deck-guesses'"
-                " && document.querySelector('#deck-guesses').clientHeight > 100"
+                " && document.querySelector('#deck-guesses').clientHeight > 80"
             )
             deck.screenshot('class_deck_shown')
-            assert deck.press('Space') > GUESS
+            deck.press('Home')
             assert deck.page.locator('#deck-guesses').count() == 0
             deck.walk_to(COMPARED)
             frame.locator('.bars').wait_for()

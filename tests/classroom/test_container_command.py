@@ -1,6 +1,5 @@
 """What container/run.sh says if it cannot go on, with commands that stand for podman."""
 
-import os
 import shutil
 import subprocess
 
@@ -56,28 +55,3 @@ def test_no_image_of_these_lessons(run, answer, problem):
     done = run('lab', f'image) {answer} ;;')
     said = f'{problem}: run `make image`, then try again.\n'
     assert (done.returncode, done.stderr) == (1, said)
-
-
-def label(run):
-    """Return what the script writes onto an image that it builds."""
-    done = run('image', 'build) echo "$*" ;;')
-    assert done.returncode == 0, done.stderr
-    return done.stdout.partition('--label lessons=')[2].split()[0]
-
-
-def test_a_port_in_use(run):
-    own, words = label(run), 'Bind for 127.0.0.1:8931 failed: port is already allocated'
-    done = run('lab', f'image) echo {own} ;; run) echo "{words}" >&2; exit 126 ;;', PORT='8931')
-    assert done.returncode == 126
-    assert done.stderr.startswith('The port 8931 is already in use: choose another one')
-
-
-def test_the_lessons_and_port_of_a_run(run, tmp_path):
-    own = label(run)
-    done = run('lab', f'image) echo {own} ;; run) echo "$*" ;;', PORT='8931')
-    assert done.returncode == 0, done.stderr
-    said = done.stdout
-    assert '--publish 127.0.0.1:8931:8931' in said
-    assert f'--volume {tmp_path / "lessons"}:/home/student' in said
-    assert '--user 0:' not in said
-    assert os.path.isdir(tmp_path / 'lessons')

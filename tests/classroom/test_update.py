@@ -148,14 +148,6 @@ def test_a_file_that_both_changed_is_set_aside(tmp_path, mine, capsys):
     assert read(mine / 'notebooks') == sources(notebook(NEWER).cells)
 
 
-def test_an_interrupted_update_goes_on(tmp_path, mine):
-    fill(tmp_path / 'newer', '02', NEWER, 'newer')
-    (mine / update.BASE).rename(mine / f'{update.BASE}.old')
-    assert update.main([str(tmp_path / 'newer'), '--to', str(mine)]) == 0
-    assert read(mine / 'notebooks') == BOTH
-    assert len(list(mine.iterdir())) == 4
-
-
 def test_a_clone_follows_its_origin(tmp_path, capsys):
     origin, clone = tmp_path / 'origin', tmp_path / 'clone'
     fill(origin, '02', OLD, 'old')

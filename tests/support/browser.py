@@ -16,7 +16,6 @@ import pytest
 
 from support.lab_page import LIMIT_S, LabPage
 from support.lab_server import Server, server
-from tools.classroom.present import DECK
 
 if TYPE_CHECKING:  # only what opens a browser needs it
     from playwright.sync_api import Browser, BrowserContext, Page
@@ -130,8 +129,7 @@ def deck(lab_page, instructor_server, request) -> Iterator[LabPage]:
     """Yield an instructor's page. No change of a copy and no place reaches the next test."""
     folder = instructor_server.folder / 'presentation'
     copies = {path: path.read_bytes() for path in folder.glob('*.ipynb')}
-    kept = instructor_server.folder / 'JUPYTER_CONFIG_DIR' / 'lab' / 'workspaces' / DECK
-    kept.unlink(missing_ok=True)
+    (instructor_server.folder / 'JUPYTER_CONFIG_DIR' / 'deck.json').unlink(missing_ok=True)
     with lab_page(instructor_server, request.node.name) as opened:
         yield opened
     for path, before in copies.items():

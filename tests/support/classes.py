@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import json
-import multiprocessing
 import os
 import re
 import signal
+import subprocess
 import sys
 import urllib.error
 import urllib.request
@@ -21,7 +20,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_
 from helpers.classroom import HUB_VARIABLE
 from helpers.progress import FILE_VARIABLE
 from support.waits import LIMIT_S, wait_for
-from tools.classroom.class_page.__main__ import main
+from tools.lessons.lesson import ROOT
 
 LESSON = '02_lose_messages.ipynb'
 NAME = 'lose_messages'
@@ -31,7 +30,6 @@ OTHER = 'Which ones?'
 STARTED = r"join_class\('(.*)', '(.*)'\)[\s\S]*?(http://localhost:(\d+)/\w+/)[\s\S]*Ctrl\+C"
 STEP, LATER = 'step-1', 'step-2'  # ids of cells
 PREDICT = {'tags': ['predict']}
-FORK = multiprocessing.get_context('fork')
 OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
 
 
@@ -78,20 +76,18 @@ class RunningClass:
             write_lesson(folder)
 
     def start(self) -> None:
-        """Start the server, and wait until it says how to join.
-
-        It is a fork of this process: a new Python would import for seconds.
-        """
-        reader, writer = os.pipe()
-        self._stdout = os.fdopen(reader)
-        arguments = ['--root', self.folder, '--port', self.port, '--no-browser', *self._arguments]
-        self.process = FORK.Process(
-            target=_hold, args=(writer, self.folder / 'jupyter', *map(str, arguments)), daemon=True
+        """Start the server, and wait until it says how to join."""
+        self.process = subprocess.Popen(
+            # If this test is killed, the class is, too.
+            ['setpriv', '--pdeathsig', 'KILL', sys.executable, '-m', 'tools.classroom.class_page']
+            + ['--root', self.folder, '--port', str(self.port), '--no-browser', *self._arguments],
+            cwd=ROOT,
+            env=os.environ | {'JUPYTER_CONFIG_DIR': str(self.folder / 'jupyter')},
+            stdout=subprocess.PIPE,
+            text=True,
         )
-        self.process.start()
-        os.close(writer)
         self.said = ''
-        for line in self._stdout:
+        for line in self.process.stdout:
             self.said += line
             if found := re.search(STARTED, self.said):
                 break
@@ -108,14 +104,12 @@ class RunningClass:
 
     def stop(self) -> str:
         """End the class with Ctrl+C, and return what it said."""
-        os.kill(self.process.pid, signal.SIGINT)
+        self.process.send_signal(signal.SIGINT)
         return self.wait()
 
     def wait(self) -> str:
         """Wait for the end of the server, and return what it said."""
-        self.process.join(LIMIT_S)
-        with self._stdout:
-            return self._stdout.read()
+        return self.process.communicate(timeout=LIMIT_S)[0]
 
     # What a student's computer says
 
@@ -171,15 +165,6 @@ class RunningClass:
     def wait_for(self, condition) -> dict:
         """Wait until the page shows what fulfils a condition, and return it."""
         return wait_for(self.view, condition)
-
-
-def _hold(stdout: int, config: Path, *arguments: str) -> None:
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: it ends with the tests
-    os.environ['JUPYTER_CONFIG_DIR'] = str(config)
-    os.dup2(stdout, 1)
-    os.closerange(3, 4096)  # pipes to other processes, which would not see their ends
-    sys.stdout = os.fdopen(1, 'w', buffering=1)
-    sys.exit(main(arguments))
 
 
 @contextlib.contextmanager

@@ -5,7 +5,7 @@ Its REST API starts the servers, and the cells go to the kernels over their webs
 
 import asyncio
 import contextlib
-import csv
+import io
 import json
 import os
 import secrets
@@ -13,32 +13,30 @@ import signal
 import socket
 import subprocess
 import sys
-from dataclasses import dataclass, field
 from pathlib import Path
 
-import nbformat
+import pandas as pd
 import psutil
 import pytest
 from jupyter_client.jsonutil import json_default
 from jupyter_client.session import Session
-from nbclient import NotebookClient
-from nbformat import NotebookNode
-from nbformat.v4 import new_code_cell, new_notebook
-from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest
+from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse
 from tornado.websocket import websocket_connect
 
 from tools.classroom.class_page.lessons import Known
-from tools.lessons.lesson import read, tags
+from tools.lessons.lesson import read
 
 ROOT = Path(__file__).resolve().parents[2]
+STUDENTS = [f'student{number:02}' for number in range(1, 13)]
 CLAIMS = {  # of the lessons that the students run, by the lesson's name
     'lose_messages': 'All is as a KEEP_LAST queue must do it: True',
     'run_callbacks_in_parallel': 'D explained, threads at work: 8: True',
 }
+LESSONS = [next((ROOT / 'notebooks').glob(f'??_{name}.ipynb')) for name in CLAIMS]
+QUESTIONS = sum(len(Known(read(path.read_text(), path.name)).guesses) for path in LESSONS)
 needs_hub = pytest.mark.skipif(
     not (ROOT / '.venv/hub_proxy').is_dir(), reason='LEFT OUT: `make hub` is not installed.'
 )
-LESSONS = [next((ROOT / 'notebooks').glob(f'??_{name}.ipynb')) for name in CLAIMS]
 START_S = 300  # until the servers of all students answer
 CELL_S = 120
 END_S = 60
@@ -77,9 +75,8 @@ def free_ports(count: int) -> list[int]:
 class Hub:
     """A running JupyterHub: that of `make hub` in `root`, with its state in `folder`.
 
-    It ends with its `with` block. If that fails, it prints what the hub said last.
-
-    `config` is added to its configuration, and `variables` to its environment.
+    It ends with its `with` block. If that fails, it prints what the hub said last. `config` is
+    added to its configuration, and `variables` to its environment.
     """
 
     def __init__(
@@ -119,20 +116,28 @@ class Hub:
             stderr=subprocess.STDOUT,
         )
 
+    async def answer(
+        self, path: str, token: str, method: str = 'GET', body: object = None
+    ) -> HTTPResponse:
+        """Return what the hub answers, whatever its status is."""
+        request = HTTPRequest(
+            self.url + path,
+            method,
+            headers={'Authorization': f'token {token}'},
+            body=None if body is None else json.dumps(body),
+            allow_nonstandard_methods=True,
+            follow_redirects=False,
+            connect_timeout=START_S,
+            request_timeout=START_S,
+        )
+        return await AsyncHTTPClient().fetch(request, raise_error=False)
+
     async def ask(
         self, path: str, method: str = 'GET', body: object = None, token: str | None = None
     ) -> object:
-        answer = await AsyncHTTPClient().fetch(
-            HTTPRequest(
-                self.url + path,
-                method,
-                headers={'Authorization': f'token {token or self.token}'},
-                body=None if body is None else json.dumps(body),
-                allow_nonstandard_methods=True,
-                connect_timeout=START_S,
-                request_timeout=START_S,
-            )
-        )
+        """Return what the JSON of an answer holds. Raises HTTPClientError if it is refused."""
+        answer = await self.answer(path, token or self.token, method, body)
+        answer.rethrow()
         return json.loads(answer.body) if answer.body else None
 
     async def token_of(self, name: str) -> str:
@@ -141,20 +146,13 @@ class Hub:
             await self.ask(f'/hub/api/users/{name}', 'POST')
         return (await self.ask(f'/hub/api/users/{name}/tokens', 'POST', {}))['token']
 
-    async def text(self, path: str, token: str) -> str:
-        headers = {'Authorization': f'token {token}'}
-        answer = await AsyncHTTPClient().fetch(
-            self.url + path, headers=headers, follow_redirects=False
-        )
-        return answer.body.decode()
-
-    async def status(self, path: str, token: str) -> int:
-        """Return the status with which something is refused; 200 if it is not."""
-        try:
-            await self.text(path, token)
-        except HTTPClientError as refused:
-            return refused.code
-        return 200
+    async def guesses(self) -> list[int]:
+        """Return how many questions each seat has answered, as an administrator's CSV says it."""
+        answer = await self.answer('/services/class/class.csv', await self.token_of('teacher'))
+        told = pd.read_csv(io.BytesIO(answer.body))
+        assert set(told['name']) == {'""'}  # nobody has given one
+        guessed = told[told['kind'] == 'guess'].drop_duplicates(['seat', 'lesson', 'what'])
+        return guessed['seat'].value_counts().tolist()
 
     async def until_ready(self) -> None:
         async with asyncio.timeout(START_S):
@@ -165,15 +163,14 @@ class Hub:
                 await asyncio.sleep(0.1)
         raise RuntimeError(f'JupyterHub ended: {self.process.returncode}\n{self.log.read_text()}')
 
-    def processes(self, student: str = '') -> list[psutil.Process]:
-        """Return all processes of the students that are alive, in containers or not, or of one."""
+    def processes(self) -> list[psutil.Process]:
+        """Return all processes of the students that are alive, in containers or not."""
         found = []
         for process in psutil.process_iter():
             with contextlib.suppress(psutil.Error):
                 variables = process.environ()
                 mine = f':{self.hub_port}/' in variables.get('JUPYTERHUB_API_URL', '')
-                name = variables.get('JUPYTERHUB_USER')
-                if mine and name and student in ('', name):
+                if mine and variables.get('JUPYTERHUB_USER'):  # empty in the hub's services
                     found.append(process)
         return found
 
@@ -219,38 +216,24 @@ class Kernel:
             max_message_size=2**26,
         )
 
-    async def run(self, source: str) -> list[NotebookNode]:
-        """Run a cell as JupyterLab does. Return its outputs as JupyterLab shows them.
-
-        Raises KernelEndedError.
-        """
+    async def text(self, source: str) -> str:
+        """Run a cell that must not fail. Return what it printed. Raises KernelEndedError."""
         request = self._session.msg('execute_request', {'code': source, 'allow_stdin': True})
         message = json.dumps(request | {'channel': 'shell'}, default=json_default)
         await self._socket.write_message(message)
-        cell = new_code_cell(source)
-        shown = NotebookClient(new_notebook(cells=[cell]), record_timing=False)
-        shown.clear_before_next_output = False
-        waited_for = {'idle', 'execute_reply'}
+        printed, waited_for = '', {'idle', 'execute_reply'}
         async with asyncio.timeout(CELL_S):
             while waited_for:
                 message = json.loads(await self._messages.get())
-                state = message['content'].get('execution_state')
+                kind, content = message['msg_type'], message['content']
+                state = content.get('execution_state')
                 if state in ('restarting', 'dead'):
                     raise KernelEndedError
-                if message['parent_header'].get('msg_id') != request['msg_id']:
-                    continue
-                if message['msg_type'] in ('status', 'execute_reply'):
-                    waited_for -= {message['msg_type'], state}
-                else:
-                    shown.process_message(message, cell, 0)
-        # A progress bar is empty at its end.
-        return [output for output in cell.outputs if output.get('data') != {'text/html': ''}]
-
-    async def text(self, source: str) -> str:
-        """Run a cell that must not fail, and return what it printed."""
-        outputs = await self.run(source)
-        assert [o.get('evalue') for o in outputs if o.output_type == 'error'] == []
-        return ''.join(output.get('text', '') for output in outputs)
+                if message['parent_header'].get('msg_id') == request['msg_id']:
+                    waited_for -= {kind, state}
+                    printed += content['text'] if kind == 'stream' else ''
+                    assert kind != 'error', (self.student.name, source, content)
+        return printed
 
     async def end(self) -> None:
         self._socket.close()
@@ -295,58 +278,42 @@ class Student:
                 await asyncio.sleep(0.2)
 
 
-@dataclass
-class LessonRun:
-    """A lesson as one student ran it: the outputs of its code cells."""
+async def run_lesson(student: Student, path: Path) -> None:
+    """Write a guess in place of the dots, and run all cells of the student's copy of a lesson.
 
-    student: str
-    path: Path
-    outputs: list[NotebookNode] = field(default_factory=list)
-
-    @property
-    def errors(self) -> list[str]:
-        return [output.evalue for output in self.outputs if output.output_type == 'error']
-
-    @property
-    def explained(self) -> bool:
-        text = ''.join(output.get('text', '') for output in self.outputs)
-        return CLAIMS[self.path.stem[3:]] in text
-
-
-async def run_lesson(student: Student, path: Path) -> LessonRun:
-    """Write a guess in place of the dots, and run all cells of the student's copy of a lesson."""
+    No cell fails, and every loss is explained.
+    """
     kernel = await student.open(path)
-    model = await student.ask(f'api/contents/{path.name}')
-    notebook = nbformat.from_dict(model['content'])
-    run = LessonRun(student.name, path)
-    for cell in notebook.cells:
-        if cell.cell_type == 'code':
-            guessed = (
-                cell.source.replace(', ...)', ', 1)') if 'predict' in tags(cell) else cell.source
-            )
-            run.outputs += await kernel.run(guessed)
-    return run
+    printed = ''
+    for cell in (await student.ask(f'api/contents/{path.name}'))['content']['cells']:
+        if cell['cell_type'] == 'code':
+            predicts = 'predict' in cell['metadata'].get('tags', ())
+            source = cell['source'].replace(', ...)', ', 1)') if predicts else cell['source']
+            printed += await kernel.text(source)
+    assert CLAIMS[path.stem[3:]] in printed, student.name
 
 
-async def log_in(students: list[Student]) -> None:
-    """Log in all at once, as soon as the hub answers."""
-    await students[0].hub.until_ready()
-    await asyncio.gather(*(student.log_in() for student in students))
-
-
-async def run_lessons(students: list[Student]) -> list[LessonRun]:
+async def run_lessons(students: list[Student]) -> None:
     """Let all run both lessons at once, every second student the later one first."""
 
-    async def run(student: Student, paths: list[Path]) -> list[LessonRun]:
-        return [await run_lesson(student, path) for path in paths]
+    async def run(student: Student, paths: list[Path]) -> None:
+        for path in paths:
+            await run_lesson(student, path)
 
     runs = (run(student, LESSONS[:: (-1) ** i]) for i, student in enumerate(students))
-    return sum(await asyncio.gather(*runs), [])
+    await asyncio.gather(*runs)
+
+
+async def log_in(hub: Hub) -> list[Student]:
+    """Log in all students at once, as soon as the hub answers."""
+    await hub.until_ready()
+    students = [Student(hub, name) for name in STUDENTS]
+    await asyncio.gather(*(student.log_in() for student in students))
+    return students
 
 
 # Everybody talks on one topic until everybody has heard something.
 TALK = """
-import threading
 from helpers.session import ros_session
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -365,9 +332,9 @@ _session.spin(_executor)
 LISTEN = """
 _before = len(_heard)
 _session.wait_until(lambda: len(_heard) >= _before + 5 and {expected!r} <= set(_heard), 60)
+_session.__exit__(None, None, None)
 print(*set(_heard))
 """
-CLOSE = '_session.__exit__(None, None, None)'
 
 
 async def talk(kernels: dict[str, Kernel], session: str = '') -> None:
@@ -376,40 +343,9 @@ async def talk(kernels: dict[str, Kernel], session: str = '') -> None:
     await asyncio.gather(*texts)
 
 
-async def listen(kernels: dict[str, Kernel], guests: dict[str, set[str]]) -> dict[str, set[str]]:
-    """Return whom each kernel hears, once it has heard itself and its guests."""
-    texts = (
-        kernel.text(LISTEN.format(expected={name} | guests.get(name, set())))
-        for name, kernel in kernels.items()
-    )
-    heard = dict(zip(kernels, await asyncio.gather(*texts), strict=True))
-    await asyncio.gather(*(kernel.text(CLOSE) for kernel in kernels.values()))
-    return {name: set(text.split()) for name, text in heard.items()}
-
-
-async def told_to_the_class(hub: Hub) -> list[list[str]]:
-    """Return the rows of the CSV that an administrator gets from the page of the class."""
-    teacher = await hub.token_of('teacher')
-    text = await hub.text('/services/class/class.csv', teacher)
-    return list(csv.reader(text.splitlines()))
-
-
-def guesses_of(told: list[list[str]]) -> dict[str, set[tuple[str, str]]]:
-    """Return what each seat has guessed: lesson and question. Nobody has given a name."""
-    guessed = {}
-    for _, _, seat, name, lesson, kind, what, _ in told[1:]:
-        assert name == '""'
-        guessed.setdefault(seat, set())
-        if kind == 'guess':
-            guessed[seat].add((lesson, what))
-    return guessed
-
-
-def asked_in(paths: list[Path]) -> set[tuple[str, str]]:
-    """Return the questions of these lessons: lesson and question."""
-    return {
-        (known.lesson.name, question)
-        for path in paths
-        for known in [Known(read(path.read_text(), path.name))]
-        for question in known.guesses
-    }
+async def listen(kernels: dict[str, Kernel], guests: dict[str, set[str]]) -> None:
+    """Each kernel that talks hears itself and its guests, and nobody else."""
+    expected = {name: {name} | guests.get(name, set()) for name in kernels}
+    texts = (k.text(LISTEN.format(expected=expected[name])) for name, k in kernels.items())
+    heard = zip(kernels, await asyncio.gather(*texts), strict=True)
+    assert {name: set(text.split()) for name, text in heard} == expected

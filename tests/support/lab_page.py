@@ -36,22 +36,20 @@ HAS_FOCUS = f"""() => {{
 }}"""
 SLIDE_DRAWN = f"""index => {{
     const widgets = {PANEL}.content.widgets;
-    const slide = widgets.filter(cell => cell.node.classList.contains('jp-deck-mod-onscreen'));
+    const slide = widgets.filter(cell => cell.node.classList.contains('deck-on'));
     const drawn = cell => cell.model.type === 'code'
         ? cell.inputHidden || cell.node.querySelectorAll('.cm-line').length
             >= cell.model.sharedModel.getSource().split('\\n').length
         : cell.rendered && cell.node.querySelector('.jp-RenderedMarkdown').childElementCount;
     return slide.includes(widgets[index])
-        && widgets[index].node.classList.contains('jp-deck-mod-visible')
         && widgets[index].node.contains(document.activeElement)
         && slide.every(drawn)
-        && slide.every(cell => [...cell.node.querySelectorAll('img')].every(img => img.complete))
-        && slide.every(cell => cell.node.getAnimations().length === 0);
+        && slide.every(cell => [...cell.node.querySelectorAll('img')].every(img => img.complete));
 }}"""
-SLIDES_SHOWN = "() => document.querySelector('.jp-deck-mod-onscreen')?.isConnected"
+SLIDES_SHOWN = "() => document.querySelector('.jp-Deck .deck-on')?.isConnected"
 # What of a slide is cut off, or needs a scroll bar.
 CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
-    if (!cell.node.classList.contains('jp-deck-mod-onscreen')) return [];
+    if (!cell.node.classList.contains('deck-on')) return [];
     const found = [];
     const box = cell.node.getBoundingClientRect();
     if (box.top < 0 || box.bottom > innerHeight || box.left < 0 || box.right > innerWidth)
@@ -92,7 +90,6 @@ class LabPage:
         """Open the copy of a notebook as slides, from the first, and wait for its kernel."""
         self.goto(f'lab/workspaces/present/tree/presentation/{name}')
         self.wait_for_notebook(f'presentation/{name}')
-        self.command('deck:start')  # which does nothing where slides are shown
         self.page.wait_for_function(SLIDES_SHOWN)
         self.page.keyboard.press('Home')
         self.wait_for_slide(0)
@@ -193,9 +190,13 @@ class LabPage:
         self.page.wait_for_function(SLIDE_DRAWN, arg=index)
 
     def walk_to(self, index: int) -> None:
-        """Press Space until a cell is shown."""
+        """Press Space until a cell is shown, and choose it."""
+        shown = f"index => {PANEL}.content.widgets[index].node.classList.contains('deck-on')"
+        while not self.page.evaluate(shown, index):
+            self.page.keyboard.press('Space')
         while self.active() < index:
-            self.press('Space')
+            self.page.keyboard.press('ArrowDown')
+        self.wait_for_slide(index)
 
     # What a test keeps
 

@@ -1,20 +1,14 @@
 """Runs of a queue: drawn by chance, in whole seconds, so that instants are equal; real ones."""
 
 import math
-import time
 
 import numpy as np
 import pandas as pd
 import pytest
 from hypothesis import assume, settings
 from hypothesis import strategies as st
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
 
 from helpers._plumbing.values import RUN_COLUMNS
-from helpers.recording import Recording
-from helpers.session import ros_session
-from support.nodes import LIMIT_S, Listener, Talker, spin
 
 CALLBACK = ['started_s', 'finished_s', 'thread']
 NOT_HEARD = math.nan, math.nan, None
@@ -107,32 +101,6 @@ def changed_happenings(draw):
         change(draw, table)
     assume((table['started_s'].isna() | (table['started_s'] >= table['published_s'])).all())
     return table, depth, threads
-
-
-def real_runs(threads, group, depth, count):
-    """Let `count` pairs of nodes run at the same time, each slower than its publisher."""
-    kinds = {
-        'mutually exclusive': MutuallyExclusiveCallbackGroup,
-        'reentrant': ReentrantCallbackGroup,
-    }
-    recordings = []
-    with ros_session() as session:
-        for number in range(count):
-            topic = f'topic{number}'
-            talker = Talker(25, period_s=0.004, topic=topic)
-            listener = Listener(
-                lambda message: time.sleep(0.012),
-                depth,
-                topic,
-                callback_group=kinds[group](),
-                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
-            )
-            recordings.append(Recording(talker.publisher, listener.subscription))
-            spin(session, listener, threads=threads)
-            spin(session, talker)
-        for recording in recordings:
-            recording.wait_until_complete(25, LIMIT_S)
-    return [recording.table() for recording in recordings]
 
 
 def assert_is_the_run(states, table, depth, accuracy_s=1e-6):

@@ -5,16 +5,22 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_output, new_raw_cell
 
 from tools.lessons import rules
-from tools.lessons.clean import clean
+from tools.lessons.clean import clean, text_of
 from tools.lessons.lesson import FOLDER, Lesson
-from tools.lessons.new import TEMPLATE
+from tools.lessons.new import template
+from tools.lessons.run import execute
 
-TEXT = TEMPLATE.read_text(encoding='utf-8')
 FILE = '90_write_a_lesson.ipynb'
 ALT = 'alt="One dot for each of five messages."'
 
 
-def lesson(text=TEXT, *cells, file=FILE):
+@pytest.fixture(scope='module')
+def text():
+    """Return the text of the template, which has been run."""
+    return text_of(execute(template(), FOLDER))
+
+
+def lesson(text, *cells, file=FILE):
     """Return the template, or what its text has become, with some cells before its recap."""
     notebook = nbformat.reads(text, as_version=4)
     at = next(i for i, cell in enumerate(notebook.cells) if cell.source.startswith('## Recap'))
@@ -54,8 +60,8 @@ def complaints(built):
     return names
 
 
-def test_the_template_keeps_all_rules():
-    built = lesson()
+def test_the_template_keeps_all_rules(text):
+    built = lesson(text)
     assert rules.problems(built) == []
     nbformat.validate(built.notebook)
     assert clean(built.notebook) == built.notebook
@@ -113,14 +119,14 @@ ADDED = [
 
 
 @pytest.mark.parametrize(('rule', 'old', 'new'), CHANGED)
-def test_a_changed_template_breaks_a_rule(rule, old, new):
-    assert old in TEXT
-    assert rule in complaints(lesson(TEXT.replace(old, new, 1)))
+def test_a_changed_template_breaks_a_rule(text, rule, old, new):
+    assert old in text
+    assert rule in complaints(lesson(text.replace(old, new, 1)))
 
 
 @pytest.mark.parametrize(('rule', 'cell'), ADDED)
-def test_an_added_cell_breaks_a_rule(rule, cell):
-    assert rule in complaints(lesson(TEXT, cell))
+def test_an_added_cell_breaks_a_rule(text, rule, cell):
+    assert rule in complaints(lesson(text, cell))
 
 
 def test_every_rule_is_broken_once():
@@ -141,13 +147,13 @@ def test_every_rule_is_broken_once():
         note('For the instructor: ask first'),
     ],
 )
-def test_what_is_allowed_breaks_no_rule(cell):
-    assert complaints(lesson(TEXT, cell)) <= {'executed_in_order'}
+def test_what_is_allowed_breaks_no_rule(text, cell):
+    assert complaints(lesson(text, cell)) <= {'executed_in_order'}
 
 
-def test_the_numbers_of_the_notebooks():
+def test_the_numbers_of_the_notebooks(text):
     def built(*files):
-        return rules.problems_of_all([lesson(file=file) for file in files])
+        return rules.problems_of_all([lesson(text, file=file) for file in files])
 
     assert built('00_start_here.ipynb', '01_lose.ipynb') != []
     for files in (['00_a', '02_b'], ['01_a', '02_b'], ['00_a', '00_b'], ['00_a', '01-b']):

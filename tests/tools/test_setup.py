@@ -4,10 +4,8 @@ import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -174,27 +172,6 @@ def test_a_wrong_hash_installs_nothing_and_the_next_call_repairs(checkout):
     checkout.lock()
     assert checkout.set_up().returncode == 0
     assert checkout.installed() == ALL
-
-
-def test_of_two_calls_at_once_the_second_waits(checkout):
-    (checkout.root / '.venv/set_up.stamp').unlink(missing_ok=True)
-    with ThreadPoolExecutor(2) as pool:
-        answers = list(pool.map(lambda _: checkout.set_up(), range(2)))
-    assert [answer.returncode for answer in answers] == [0, 0], answers
-    assert sorted('Making' in answer.stderr for answer in answers) == [False, True]
-
-
-def test_after_an_interruption_the_next_call_repairs(checkout):
-    """Ctrl+C while packages are installed, as a terminal sends it: to all processes."""
-    (checkout.root / '.venv/set_up.stamp').unlink(missing_ok=True)
-    with checkout.start() as process:
-        while not process.stderr.readline().startswith('Installing'):
-            assert process.poll() is None
-        os.killpg(process.pid, signal.SIGINT)
-    assert checkout.stamp() == ''
-    again = checkout.set_up()
-    assert again.returncode == 0, again.stderr
-    assert again.stderr.startswith('Making .venv')
 
 
 def test_a_moved_checkout_is_made_anew(checkout):

@@ -85,7 +85,10 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
             try:
                 data = _merged(old, own, newer / file)
             except ValueError:
-                aside = own.rename(_free(own))
+                aside = own.with_name(f'{own.name}.yours')
+                if aside.exists():  # what an earlier update has set aside stays
+                    aside = own.with_name(f'{own.name}.{uuid4().hex[:8]}.yours')
+                own.rename(aside)
                 said.append(f'Both have changed {file}: yours is now {aside.name}.')
         _write(target, data, (newer / file).stat().st_mode)
         if own not in (target, None):
@@ -111,15 +114,6 @@ def _found(path: Path) -> Path:
     if path.is_file() or not re.match(r'\d\d_.*\.ipynb', path.name):
         return path
     return next(iter(sorted(path.parent.glob(f'[0-9][0-9]{path.name[2:]}'))), path)
-
-
-def _free(path: Path) -> Path:
-    """Return the name for a file that is set aside. What an earlier update has set aside stays."""
-    aside, number = path.with_name(f'{path.name}.yours'), 1
-    while aside.exists():
-        number += 1
-        aside = path.with_name(f'{path.name}.{number}.yours')
-    return aside
 
 
 def _bytes(path: Path) -> bytes | None:
@@ -148,22 +142,12 @@ def _write(path: Path, data: bytes, mode: int) -> None:
 
 
 def update_from_folder(newer: Path, mine: Path) -> list[str]:
-    """Merge a folder into `mine`, and keep it there as what was handed out last."""
-    old = mine / f'{BASE}.old'
-    if old.exists() and not (mine / BASE).exists():  # the last update was interrupted
-        old.rename(mine / BASE)
+    """Merge a folder into `mine`, and keep it there as what was handed out last.
+
+    After an interruption the next update goes on: to merge once more changes nothing.
+    """
     said = merge_folders(mine / BASE, mine, newer)
-    fresh = mine / f'{BASE}.new'
-    shutil.rmtree(fresh, ignore_errors=True)
-    fresh.mkdir(parents=True)
-    for file in files_of(newer):
-        (fresh / file).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(newer / file, fresh / file)
-    shutil.rmtree(old, ignore_errors=True)
-    if (mine / BASE).exists():
-        (mine / BASE).rename(old)
-    fresh.rename(mine / BASE)
-    shutil.rmtree(old, ignore_errors=True)
+    merge_folders(mine / BASE, mine / BASE, newer)
     return said
 
 
@@ -178,11 +162,11 @@ def update_from_archive(archive: Path, mine: Path) -> list[str]:
             raise ValueError(f'{archive} is no archive of `make handout`.')
         lock = _bytes(mine / 'requirements.lock')
         said = update_from_folder(newer, mine)
-        if (newer / 'wheels').is_dir():
-            shutil.rmtree(mine / 'wheels', ignore_errors=True)
-            (newer / 'wheels').rename(mine / 'wheels')
-        elif _bytes(mine / 'requirements.lock') != lock:
+        brought = (newer / 'wheels').is_dir()
+        if brought or _bytes(mine / 'requirements.lock') != lock:
             shutil.rmtree(mine / 'wheels', ignore_errors=True)  # they are those of the old lock
+        if brought:
+            (newer / 'wheels').rename(mine / 'wheels')
     return said
 
 

@@ -1,7 +1,4 @@
-"""Clean a notebook, so that a diff shows only what changed, and write it at once.
-
-Every cell gets its slide type.
-"""
+"""Clean a notebook, so that a diff shows only what changed, and write it at once."""
 
 import hashlib
 import re
@@ -14,7 +11,6 @@ import nbformat
 from nbformat import NotebookNode
 
 from helpers._plumbing.fresh import AS_SAVED, MARK
-from tools.lessons.slides import slide_types
 
 NOTEBOOK_METADATA = {
     'kernelspec': {
@@ -32,8 +28,8 @@ OVERWRITTEN = re.compile(r'^.*\r(?=[^\n])', re.MULTILINE)
 def clean(notebook: NotebookNode) -> NotebookNode:
     """Return a copy of a notebook without what changes by itself from run to run.
 
-    Kept are sources, tags, hidden sources, cell ids, execution counts and outputs. The slide types
-    are made anew, and so is which cells JupyterLab does not let edit: answers that unfold.
+    Kept are sources, tags, hidden sources, cell ids, execution counts and outputs. Made anew is
+    which cells JupyterLab does not let edit: answers that unfold.
     Neighbouring pieces of one stream become one, because where a stream is cut is chance. The
     model of a widget lives only as long as its kernel: of its view, the text is kept.
     """
@@ -50,8 +46,6 @@ def clean(notebook: NotebookNode) -> NotebookNode:
             cell.metadata.editable = False  # a double click on an answer must not show the source
         if cell.cell_type == 'code':
             cell.outputs = _clean_outputs(cell)
-    for cell, slide_type in zip(notebook.cells, slide_types(notebook), strict=True):
-        cell.metadata.slideshow = nbformat.from_dict({'slide_type': slide_type})
     return notebook
 
 

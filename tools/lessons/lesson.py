@@ -89,13 +89,20 @@ class Lesson:
         return re.findall(r'^### ✎ (Task \d.*)', text, re.MULTILINE)
 
     @cached_property
-    def minutes_by_step(self) -> dict[str, int]:
-        """The minutes of the instructor's notes: `1`, `2`, ... to their sum."""
-        found: dict[str, int] = {}
-        step = ''
+    def steps(self) -> list[str]:
+        """The step of each cell, such as `1`; empty before the first one."""
+        found, step = [], ''
         for cell in self.notebook.cells:
             if heading := re.match(r'## (\w+)', cell.source):
                 step = heading[1]
+            found.append(step)
+        return found
+
+    @cached_property
+    def minutes_by_step(self) -> dict[str, int]:
+        """The minutes of the instructor's notes: `1`, `2`, ... to their sum."""
+        found: dict[str, int] = {}
+        for cell, step in zip(self.notebook.cells, self.steps, strict=True):
             if minutes := minutes_of_note(cell.source):
                 found[step] = found.get(step, 0) + minutes
         return found
@@ -167,7 +174,7 @@ def chosen(numbers: str, folder: Path = FOLDER) -> list[Path]:
         raise ValueError(f'There is no notebook in {folder}.')
     found = []
     for number in numbers.split():
-        match = [path for path in known if path.name.startswith(f'{number}_')]
+        match = [path for path in known if path.name.startswith(f'{number:0>2}_')]
         if len(match) != 1:
             names = ', '.join(path.name[:2] for path in known)
             raise ValueError(f'There is no single lesson {number!r}. Give one of {names}.')

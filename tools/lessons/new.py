@@ -4,10 +4,10 @@
     python -m tools.lessons.new count_the_losses --after 04      as lesson 05
     python -m tools.lessons.new count_the_losses --remove        out again
 
-The new lesson is a copy of template.ipynb, a complete small lesson that keeps all rules. A notebook
-that gets another number is renamed; its title, its workspace and the
-links to it follow. What is said of it in words is printed: a person must look at these lines. All
-texts are computed before the first file is touched.
+The new lesson is a copy of template.txt, a complete small lesson that keeps all rules. A notebook
+that gets another number is renamed; its title, its workspace and the links to it follow. What is
+said of it in words is printed: a person must look at these lines. All texts are computed before the
+first file is touched.
 """
 
 import argparse
@@ -16,28 +16,43 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tools.lessons import tables
-from tools.lessons.clean import write
-from tools.lessons.lesson import GLOSSARY, ROOT, START
+import nbformat
+from nbformat import NotebookNode
 
-TEMPLATE = Path(__file__).resolve().parent / 'template.ipynb'
-TEMPLATE_STEM = '90_write_a_lesson'
+from tools.lessons import tables
+from tools.lessons.clean import clean, text_of, write
+from tools.lessons.lesson import GLOSSARY, ROOT, START
+from tools.lessons.rules import FOLDED
+
+TEMPLATE = Path(__file__).with_name('template.txt')
 EXAMPLE = 'make lesson NAME=count_the_losses'
 
 
-def with_new_links(text: str, old: str, new: str) -> str:
-    """Return a text whose links, and whatever else names the file, lead to the renamed notebook.
+def template(stem: str = '90_write_a_lesson', part: str = 'nodes') -> NotebookNode:
+    """Return the lesson of template.txt, where a line `%% TYPE TAG...` begins a cell."""
+    text = TEMPLATE.read_text(encoding='utf-8').replace('Part: nodes', f'Part: {part}')
+    title = f'# {stem[:2]} {stem[3:].replace("_", " ").capitalize()}'
+    cells = []
+    for cell in re.split('^%% ', text.replace('# 90 Write a lesson', title), flags=re.M)[1:]:
+        head, _, source = cell.partition('\n')
+        kind, *tags = head.split()
+        metadata = {'tags': tags}
+        if FOLDED.keys() & {*tags}:
+            metadata['jupyter'] = {'source_hidden': True}
+        new_cell = getattr(nbformat.v4, f'new_{kind}_cell')
+        cells.append(new_cell(source.strip('\n'), metadata=metadata))
+    return clean(nbformat.v4.new_notebook(cells=cells))
+
+
+def renumbered(texts: tables.Texts, old: str, new: str) -> tables.Texts:
+    """Return the texts after a notebook was renamed: its title, and the links that lead to it.
 
     `old` and `new` are file names without their ending, such as 05_run_a_long_job.
     """
-    text = re.sub(rf'\[{old[:2]}(?=[^\]\n]*\]\((?:notebooks/)?{old}\.)', f'[{new[:2]}', text)
-    return text.replace(old, new)
-
-
-def with_new_number(text: str, old: str, new: str) -> str:
-    """Return the text of a notebook whose title and workspace have its new number."""
-    text = text.replace(f'"# {old[:2]} ', f'"# {new[:2]} ', 1)
-    return re.sub(rf'lesson_{old[:2]}\b', f'lesson_{new[:2]}', text)
+    text = texts.pop(_path(old)).replace(f'"# {old[:2]} ', f'"# {new[:2]} ', 1)
+    texts[_path(new)] = re.sub(rf'lesson_{old[:2]}\b', f'lesson_{new[:2]}', text)  # a workspace
+    link = re.compile(rf'\[{old[:2]}(?=[^\]\n]*\]\((?:notebooks/)?{old}\.)')
+    return {path: link.sub(f'[{new[:2]}', text).replace(old, new) for path, text in texts.items()}
 
 
 def plan(name: str, after: str, remove: bool, root: Path) -> tuple[dict[str, str], tables.Texts]:
@@ -81,17 +96,16 @@ def plan(name: str, after: str, remove: bool, root: Path) -> tuple[dict[str, str
         for number, stem in enumerate(inner, 1)
         if stem and stem[:2] != f'{number:02d}'
     }
-    for old, new in moved.items():
-        texts[_path(new)] = with_new_number(texts.pop(_path(old)), old, new)
-    for old, new in moved.items():
-        texts = {path: with_new_links(text, old, new) for path, text in texts.items()}
+    # If numbers grow the last notebook moves first, if they shrink the first one.
+    for old in sorted(moved, reverse=not remove):
+        texts = renumbered(texts, old, moved[old])
     if remove:
         moved[found] = ''
     else:
         new = f'{place + 1:02d}_{name}'
         before = tables.lessons_of(texts)[place]
         part = before.part if before.is_lesson else 'nodes'
-        texts[_path(new)] = _from_template(new, part)
+        texts[_path(new)] = text_of(template(new, part))
     return moved, texts | tables.made(texts)
 
 
@@ -115,14 +129,11 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
     parser.add_argument('--remove', action='store_true', help='take the lesson out')
     options = parser.parse_args(arguments)
     try:
-        if options.remove and options.after:
-            raise ValueError('Give AFTER or REMOVE, not both.')
         before = _tracked(root) | tables.texts_of(root)
         moved, texts = plan(options.name, options.after, options.remove, root)
         if moved and _git(root, 'status', '--porcelain', '-uno'):
             raise ValueError('Commit your changes first: the new numbers would mix with them.')
-        # If numbers grow the last notebook moves first, if they shrink the first one.
-        for old in sorted(moved, reverse=not options.remove):
+        for old in sorted(moved, reverse=not options.remove):  # as above
             new = moved[old]
             _git(root, *(['mv', _path(old), _path(new)] if new else ['rm', '-q', _path(old)]))
     except ValueError as error:
@@ -135,19 +146,13 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
             print(f'{path}: written')
     if moved and (lines := to_look_at(texts, moved)):
         print('Look at these lines, which name a lesson by its old number:', *lines, sep='\n')
-    print(f'Now run `{tables.COMMAND}`. CONTRIBUTING.md says what comes next.')
+    new = next((path for path in texts if back.get(path, path) not in before), _path(START))
+    print(f'Now run `make notebooks LESSON={Path(new).name[:2]}`.')
     return 0
 
 
 def _path(stem: str) -> str:
     return f'notebooks/{stem}.ipynb'
-
-
-def _from_template(stem: str, part: str) -> str:
-    text = with_new_number(TEMPLATE.read_text(encoding='utf-8'), TEMPLATE_STEM, stem)
-    title = f'# {stem[:2]} {stem[3:].replace("_", " ").capitalize()}'
-    text = text.replace(f'# {stem[:2]} Write a lesson', title, 1)
-    return text.replace('Part: nodes', f'Part: {part}', 1)
 
 
 def _tracked(root: Path) -> tables.Texts:
@@ -163,10 +168,7 @@ def _tracked(root: Path) -> tables.Texts:
 
 
 def _git(root: Path, *arguments: str) -> str:
-    try:
-        done = subprocess.run(['git', *arguments], cwd=root, capture_output=True, text=True)
-    except FileNotFoundError:
-        raise ValueError('Numbers are changed with git: install it, then try again.') from None
+    done = subprocess.run(['git', *arguments], cwd=root, capture_output=True, text=True)
     if done.returncode:
         raise ValueError(f'git {arguments[0]} failed: {done.stderr.strip().splitlines()[0]}.')
     return done.stdout

@@ -14,7 +14,7 @@ from nbval.plugin import comment_markers, metadata_tags
 
 from tools.lessons.code import guess_of, names_of
 from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, tags
-from tools.lessons.slides import PICTURE, SKIPPED, SLIDE, height
+from tools.lessons.slides import LARGEST, PICTURE, SKIPPED, height
 
 MAX_CODE_LINES = 24  # what a slide has room for
 MIN_WORDS = 6  # of an alternative text
@@ -41,18 +41,10 @@ def code_cells(lesson: Lesson) -> list[tuple[str, NotebookNode]]:
     return [(f'code cell {count}', cell) for count, cell in enumerate(cells, 1)]
 
 
-def prose(lesson: Lesson) -> Iterator[tuple[int, str]]:
-    """Yield each line of Markdown with its cell's index, without fenced code."""
-    for index, cell in enumerate(lesson.notebook.cells):
-        if cell.cell_type == 'markdown':
-            text = re.sub(r'^(```|~~~).*?^\1', '', cell.source, flags=re.MULTILINE | re.DOTALL)
-            yield from ((index, line) for line in text.splitlines())
-
-
-def headings(lesson: Lesson) -> list[tuple[int, int, str]]:
-    """Return (cell index, level, text) of every heading."""
-    found = ((index, re.match(r'(#{1,6}) +(.*)', line)) for index, line in prose(lesson))
-    return [(index, len(match[1]), match[2].strip()) for index, match in found if match]
+def prose(lesson: Lesson) -> str:
+    """Return the Markdown of all cells, without fenced code."""
+    cells = (cell.source for cell in lesson.notebook.cells if cell.cell_type == 'markdown')
+    return re.sub(r'^(```|~~~).*?^\1', '', '\n'.join(cells), flags=re.MULTILINE | re.DOTALL)
 
 
 def texts(cell: NotebookNode) -> Iterator[str]:
@@ -199,7 +191,7 @@ def fits_a_slide(lesson: Lesson) -> Iterator[str]:
                 f'Cell {index} has {lines} lines of code, more than {MAX_CODE_LINES}: make two '
                 'cells of it. A file can stand in two: `%%write PATH part 1`, then `part 2`.'
             )
-        if (percent := height(cell)) > SLIDE:
+        if (percent := height(cell)) > LARGEST:
             yield f'Cell {index} with its outputs takes {percent:.0f} % of the height.'
 
 
@@ -224,7 +216,7 @@ def named(lesson: Lesson) -> Iterator[str]:
 
 def links_lead_somewhere(lesson: Lesson) -> Iterator[str]:
     """Every relative link names a file, seen from the notebook's folder."""
-    for target in re.findall(r'\]\(([^)\s]+)', '\n'.join(line for _, line in prose(lesson))):
+    for target in re.findall(r'\]\(([^)\s]+)', prose(lesson)):
         file = target.partition('#')[0]
         if not re.match(r'[a-z]+:|#', target) and not (FOLDER / file).exists():
             yield f'The link {target} leads nowhere.'

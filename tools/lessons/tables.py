@@ -13,6 +13,7 @@ before all of it is right.
 
 import re
 from collections.abc import Callable
+from itertools import zip_longest
 from pathlib import Path
 
 from helpers import progress
@@ -104,19 +105,26 @@ def _table(what: str, old: str, lessons: list[Lesson]) -> str:
     if kind not in TABLES:
         raise ValueError(f'No table is called {what!r}. Name one of {", ".join(TABLES)}.')
     head, *rows = TABLES[kind](name, old, lessons)
-    lines = [f'| {" | ".join(row)} |\n'.replace('|  |', '| |') for row in [head, *rows]]
+    lines = [
+        f'|{"|".join(f" {cell} " if cell else " " for cell in row)}|\n' for row in [head, *rows]
+    ]
     return ''.join([lines[0], '|---' * len(head) + '|\n', *lines[1:]])
 
 
 def _readme(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
-    return [
-        ['', 'lesson', 'at the end you can', 'minutes'],
-        *(
-            [one.number, f'[{one.title}](notebooks/{one.file})', one.can, str(one.minutes)]
+    columns = [
+        [
+            f'[{one.number} {one.title}](notebooks/{one.file})'
             for one in lessons
-            if one.number != GLOSSARY
-        ),
+            if _is_in(one, part)
+        ]
+        for part in PARTS
     ]
+    return [[part.capitalize() for part in PARTS], *map(list, zip_longest(*columns, fillvalue=''))]
+
+
+def _is_in(lesson: Lesson, part: str) -> bool:
+    return lesson.number not in (START, GLOSSARY) and lesson.part == part
 
 
 def _map(part: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
@@ -124,11 +132,7 @@ def _map(part: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
         raise ValueError(f'The map has no part {part!r}. Name one of {", ".join(PARTS)}.')
     return [
         ['lesson', 'you can then', 'minutes'],
-        *(
-            [one.next_link, one.can, str(one.minutes)]
-            for one in lessons
-            if one.number not in (START, GLOSSARY) and one.part == part
-        ),
+        *([one.next_link, one.can, str(one.minutes)] for one in lessons if _is_in(one, part)),
     ]
 
 

@@ -65,19 +65,13 @@ class _Report:
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if report.when == 'call' or report.failed:
-            row = {
-                'notebook': Path(report.location[0]).stem,
-                # nbval's `Cell 0` is called as the tests call it: `code cell 1`.
-                'item': re.sub(
-                    r'Cell (\d+)',
-                    lambda found: f'code cell {int(found[1]) + 1}',
-                    report.nodeid.rpartition('::')[2],
-                ),
-                'failed': COLOURS.sub('', report.longreprtext) if report.failed else None,
-                'seconds': report.duration,
-            }
+            # nbval's `Cell 0` is called as the tests call it: `code cell 1`.
+            name = report.nodeid.rpartition('::')[2]
+            item = re.sub(r'Cell (\d+)', lambda found: f'code cell {int(found[1]) + 1}', name)
+            failed = COLOURS.sub('', report.longreprtext) if report.failed else None
+            row = {'item': item, 'failed': failed, **dict(report.user_properties)}
             with self.file.open('a', encoding='utf-8') as file:
-                print(json.dumps(row | dict(report.user_properties)), file=file)
+                print(json.dumps(row), file=file)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -138,43 +132,35 @@ class Interrupted(IPyNbCell):
         after_s = random_time_s()
         for _ in range(2):
             try:
-                error = self._interrupt(after_s)
+                sent, error = self._interrupt(after_s)
                 break
             except KERNEL_LOST as lost:
                 why = repr(lost)
-                self.user_properties.append(('kernel_lost', True))
                 fresh_kernel(self, self.cell_num)
-        else:  # ipykernel does so by itself (CONTRIBUTING.md), a lesson that is wrong does it twice
+        else:  # ipykernel does so by itself, a lesson that is wrong does it twice
             self.raise_cell_error(f'Run for {after_s:.3f} s. The kernel is lost: {why}')
         traceback = COLOURS.sub('', '\n'.join(error.get('traceback', [])))
-        self.user_properties.append(('traceback', traceback))  # says why a later cell fails
-        sent = 'interrupted_after_s' in dict(self.user_properties)
         unsaid = sent and not traceback and IMPORTS.search(self.cell.source)
-        if unsaid or IN_IMPORT.search(traceback):
+        if unsaid or IN_IMPORT.search(traceback) or IN_TRACKER.search(traceback):
             # Python cannot repeat a half-done import of NumPy: the reader restarts the kernel.
-            self.user_properties.append(('in_import', True))
-            fresh_kernel(self, self.cell_num)
-        elif IN_TRACKER.search(traceback):
-            self.user_properties.append(('in_tracker', True))
             fresh_kernel(self, self.cell_num)
         elif error.get('ename', 'KeyboardInterrupt') != 'KeyboardInterrupt':
             self.raise_cell_error(f'Interrupted after {after_s:.3f} s, it fails', traceback)
 
-    def _interrupt(self, after_s: float) -> dict:
-        """Interrupt the cell, and return its error. Raises one of KERNEL_LOST."""
+    def _interrupt(self, after_s: float) -> tuple[bool, dict]:
+        """Return whether the cell was interrupted, and its error. Raises one of KERNEL_LOST."""
         kernel = self.parent.kernel
         message = kernel.execute_cell_input(self.cell.source, allow_stdin=False)
         listen(kernel, message, 'execute_input', ANSWER_TIMEOUT_S)
         try:
-            return listen(kernel, message, 'idle', after_s)
+            return False, listen(kernel, message, 'idle', after_s)
         except Empty:
-            self.user_properties.append(('interrupted_after_s', after_s))
             kernel.interrupt()
             # When the signal meets ipykernel beside the cell, it sends no reply, or a broken one.
             error = listen(kernel, message, 'idle', ANSWER_TIMEOUT_S)
             with suppress(Empty):
                 kernel.get_message('shell', timeout=REPLY_S)
-            return error
+            return True, error
 
 
 class Killed(IPyNbCell):
@@ -182,12 +168,11 @@ class Killed(IPyNbCell):
 
     def runtest(self) -> None:
         """Run the cells before this one, kill the kernel in it, and start a fresh kernel."""
-        kernel, after_s = self.parent.kernel, random_time_s()
-        self.user_properties.append(('killed_after_s', after_s))
+        kernel = self.parent.kernel
         run_first(self.parent, self.cell_num)
         message = kernel.execute_cell_input(self.cell.source, allow_stdin=False)
         with suppress(Empty):  # it is in the middle
-            listen(kernel, message, 'idle', after_s)
+            listen(kernel, message, 'idle', random_time_s())
         fresh_kernel(self, 0)
 
 

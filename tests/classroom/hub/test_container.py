@@ -1,16 +1,18 @@
 """The image of the lessons, used: `make test-classroom`."""
 
 import contextlib
-import json
 import shutil
 import subprocess
 import time
 import urllib.request
 from pathlib import Path
 
+import nbformat
 import pytest
 from support.containers import IMAGE, LIMITS
 from support.hubs import free_ports
+
+from tools.lessons.lesson import tags
 
 # One that compiles, for the class in containers runs others.
 LESSON = 'use_a_message_in_your_own_interface'
@@ -54,11 +56,10 @@ def test_size_and_user(image):
 
 
 def judged(notebook: Path) -> list[str]:
-    """Return what the checks of a lesson have printed."""
-    cells = json.loads(notebook.read_text())['cells']
-    kinds = {'check', 'solution'}
-    checks = [cell for cell in cells if kinds & set(cell['metadata'].get('tags', ()))]
-    return [''.join(out.get('text', ())) for cell in checks for out in cell['outputs']]
+    """Return what each check of a lesson has printed, in however many pieces it came."""
+    cells = nbformat.read(notebook, as_version=4).cells
+    checks = [cell for cell in cells if {'check', 'solution'} & tags(cell)]
+    return [''.join(out.get('text', '') for out in cell.outputs) for cell in checks]
 
 
 def test_a_lesson(podman, image, make):

@@ -35,7 +35,7 @@ function put(id, state, draw) {
 // The first one is shown of what differs in capitals only.
 const same = (one, other) => one.toLowerCase() === other?.toLowerCase();
 
-function guess({ question, answered, shown: open, bars = [], given, measured = [], by }, seats) {
+function guess({ question, answered, shown: open, bars = [], measured = [], by }, seats) {
   const box = element('article');
   const count = element('p', `${answered} of ${seats} have answered `, { className: 'count' });
   count.append(button(open ? 'Hide' : 'Show', open ? 'hide' : 'show', { question }));
@@ -45,15 +45,13 @@ function guess({ question, answered, shown: open, bars = [], given, measured = [
   for (const { label, count } of bars) {
     const right = same(label, measured[0]);
     const row = element('li', '', { className: right ? 'right' : '' });
-    const bar = element('span', count, { className: same(label, given) ? 'bar given' : 'bar' });
+    const bar = element('span', count, { className: 'bar' });
     bar.style.setProperty('--share', count / answered);
     row.append(element('span', `${right ? '✓ ' : ''}${label}`, { className: 'label' }), bar);
     list.append(row);
   }
   box.append(list);
-  if (bars.some(({ label }) => same(label, given)))
-    box.append(element('p', `Striped: ${given} stood there before anybody wrote a guess`, { className: 'measured' }));
-  if (by) box.append(element('p', `Measured by ${by}: ${measured.join('; ')}`, { className: 'measured' }));
+  if (by) box.append(element('p', `Measured in the last run of ${by === 1 ? 'one student' : `each of ${by} students`}: ${measured.join('; ')}`, { className: 'measured' }));
   return box;
 }
 
@@ -61,9 +59,12 @@ function show(state) {
   const [, cell] = location.hash.match(/^#cell=(.*)/) ?? [];
   document.body.className = cell ? 'slide' : location.hash === '#wall' ? 'wall' : '';
   find('trouble').textContent = '';
-  const { planned, all, gone } = state;
-  const texts = { ...state, of_step: planned - gone, of_lesson: all - gone };
-  for (const id of ['seats', 'of_step', 'of_lesson', 'step']) find(id).textContent = texts[id];
+  const { planned, own, all, gone } = state;
+  const left = minutes => (minutes < 0 ? `0 (${-minutes} over)` : minutes);
+  const who = state.seats === 1 ? 'student' : 'students';
+  // What was not used before is not more time for this step.
+  const texts = { ...state, who, of_step: left(Math.min(planned - gone, own)), of_lesson: left(all - gone) };
+  for (const id of ['seats', 'who', 'of_step', 'of_lesson', 'step']) find(id).textContent = texts[id];
   put('lessons', state.lessons, ({ name, title, here, now }) =>
     element('option', here ? `${title} (${here})` : title, { value: name, selected: now }));
   const { name } = state.lessons.find(lesson => lesson.now);
@@ -89,7 +90,7 @@ function show(state) {
     return row;
   }));
   find('joins').textContent = state.joins.join('\n');
-  if (cell) parent.postMessage(document.documentElement.offsetHeight, '*'); // to presenter.js
+  if (cell) parent.postMessage(document.documentElement.offsetHeight, '*'); // to the deck
   if (shown.notes !== state.notes) find('notes').innerHTML = shown.notes = state.notes; // the lesson's
 }
 

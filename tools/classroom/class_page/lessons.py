@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 from nbformat import NotebookNode
 
-from helpers.classroom import small
 from tools.classroom.notes import of_step
 from tools.lessons.code import guess_of
 from tools.lessons.lesson import Lesson, first_heading
@@ -19,7 +18,6 @@ class Guess(NamedTuple):
 
     asked: str
     compared: str
-    given: object  # what the cell holds before anybody writes a guess; None for `...`
 
 
 @dataclass(frozen=True)
@@ -63,14 +61,13 @@ class Known:
         found = {}
         for index, cell in enumerate(self.cells):
             if guess := guess_of(cell):
-                _, question, value = guess
+                question = guess[1]
                 later = (
                     one.id
                     for one in self.cells[index + 1 :]
                     if one.cell_type == 'code' and repr(question) in one.source
                 )
-                given = None if value is ... else small(value)
-                found[question] = Guess(cell.id, next(later, cell.id), given)
+                found[question] = Guess(cell.id, next(later, cell.id))
         return found
 
     @cached_property

@@ -12,8 +12,7 @@ import json
 import secrets
 import sqlite3
 import time
-from collections import Counter, defaultdict
-from dataclasses import dataclass, field
+from collections import Counter
 from pathlib import Path
 
 from tools.classroom.class_page import events
@@ -32,6 +31,7 @@ CREATE TABLE IF NOT EXISTS events (
     n INTEGER PRIMARY KEY, seat INTEGER, id TEXT, at_s REAL, lesson TEXT, kind TEXT, what TEXT,
     value TEXT, UNIQUE (seat, id)
 );
+CREATE INDEX IF NOT EXISTS by_kind ON events (kind, lesson, what);
 """
 INSERT = """
 INSERT OR IGNORE INTO events (seat, id, at_s, lesson, kind, what, value)
@@ -39,44 +39,16 @@ VALUES (?, ?, ?, ?, ?, ?, ?)
 """
 
 
-BySeat = dict[int, object]
-
-
-@dataclass
-class Latest:
-    """What counts of the events: the last ones of each seat, by the number of the seat."""
-
-    places: dict[int, tuple[str, str]] = field(default_factory=dict)  # lesson and cell
-    hands: dict[int, str] = field(default_factory=dict)  # the lesson, of hands that are up
-    # By lesson and question, or lesson and number of the task:
-    guesses: dict[tuple, BySeat] = field(default_factory=lambda: defaultdict(dict))
-    outcomes: dict[tuple, BySeat] = field(default_factory=lambda: defaultdict(dict))
-    solved: dict[tuple, BySeat] = field(default_factory=lambda: defaultdict(dict))
-
-    def note(self, seat: int, lesson: str, kind: str, what: str, value: object) -> None:
-        """Take an event in."""
-        match kind:
-            case 'cell':
-                self.places[seat] = (lesson, value)
-            case 'hand' if value:
-                self.hands[seat] = lesson
-            case 'hand':
-                self.hands.pop(seat, None)
-            case 'guess':
-                self.guesses[lesson, what][seat] = value
-            case 'outcome':
-                self.outcomes[lesson, what][seat] = value
-            case 'task':  # what is solved stays so
-                tries = self.solved[lesson, what]
-                tries[seat] = value or tries.get(seat, False)
-
-    def forget(self, seat: int) -> None:
-        """Forget a seat."""
-        for answers in (self.places, self.hands):
-            answers.pop(seat, None)
-        for several in (self.guesses, self.outcomes, self.solved):
-            for answers in several.values():
-                answers.pop(seat, None)
+# The last event of a kind of each seat, in their order: of all lessons, or of one question.
+LATEST = """
+SELECT seat, lesson, value, max(n) AS n FROM events
+WHERE kind = ? AND lesson = coalesce(?, lesson) AND what = coalesce(?, what)
+GROUP BY seat ORDER BY n
+"""
+# What is solved stays so, whatever a student tries later: 'false' comes before 'true'.
+SOLVED = """
+SELECT max(value) FROM events WHERE kind = 'task' AND lesson = ? AND what = ? GROUP BY seat
+"""
 
 
 class ClassStore:
@@ -95,13 +67,6 @@ class ClassStore:
         self.code, self.secret = self._db.execute('SELECT code, secret FROM class').fetchone()
         self.went_on = self._db.execute('SELECT 1 FROM events').fetchone() is not None
         self.shown: set[tuple[str, str]] = set()  # lesson and question
-        self._latest = Latest()
-        for row in self._db.execute(
-            'SELECT seat, lesson, kind, what, value FROM events ORDER BY n'
-        ):
-            seat, lesson, kind, what, value = (*row[:4], json.loads(row[4]))
-            if self._is_known(lesson, kind, value):
-                self._latest.note(seat, lesson, kind, what, value)
 
     # Seats
 
@@ -129,7 +94,6 @@ class ClassStore:
         with self._db:
             self._db.execute('DELETE FROM seats WHERE seat = ?', [seat])
             self._db.execute('DELETE FROM events WHERE seat = ?', [seat])
-        self._latest.forget(seat)
 
     # Events
 
@@ -146,17 +110,14 @@ class ClassStore:
         if kept + len(rows) > EVENTS_OF_SEAT:
             return 'This seat has told enough.'
         with self._db:
-            for row in rows:
-                new = self._db.execute(INSERT, row)
-                if new.rowcount:
-                    _, _, _, lesson, kind, what, value = row
-                    self._latest.note(seat, lesson, kind, what, json.loads(value))
+            self._db.executemany(INSERT, rows)
         return refused
 
     def lower(self, seat: int) -> None:
-        """Take the hand of a seat down. Raises LookupError if it has raised none."""
-        hand = {'id': secrets.token_hex(8), 'kind': 'hand', 'lesson': self._latest.hands[seat]}
-        self.take(seat, [hand | {'up': False}])
+        """Take the hand of a seat down. Raises ValueError if it has raised none."""
+        [lesson] = [lesson for one, lesson, _ in self._latest('hand') if one == seat]
+        hand = {'id': secrets.token_hex(8), 'kind': 'hand', 'lesson': lesson, 'up': False}
+        self.take(seat, [hand])
 
     def _problem(self, event: object) -> str:
         if not events.is_event(event):
@@ -164,28 +125,40 @@ class ClassStore:
         known = self.lessons.get(event['lesson'])
         if known is None:
             return 'There is no such lesson.'
-        if event.get('question', None) not in (None, *known.guesses):
-            return 'The lesson has no such question.'
-        if event.get('task', None) not in (None, *known.tasks):
-            return 'The lesson has no such task.'
-        if event.get('cell', None) not in (None, *known.step_of):
-            return 'The lesson has no such cell.'
+        has = {'question': known.guesses, 'task': known.tasks, 'cell': known.step_of}
+        for field in has.keys() & event:
+            if event[field] not in has[field]:
+                return f'The lesson has no such {field}.'
         return ''
 
-    def _is_known(self, lesson: str, kind: str, value: object) -> bool:
-        """Return whether the lessons, which may have changed since, have what an event names."""
-        known = self.lessons.get(lesson)
-        return known is not None and (kind != 'cell' or value in known.step_of)
+    def _latest(
+        self, kind: str, lesson: str | None = None, what: str | None = None
+    ) -> list[tuple[int, str, object]]:
+        """Return seat, lesson and value of the last event of a kind of each seat."""
+        rows = self._db.execute(LATEST, (kind, lesson, what))
+        return [(seat, lesson, json.loads(value)) for seat, lesson, value, _ in rows]
+
+    def _places(self) -> Counter:
+        """Return how many students are at each step: by lesson and step.
+
+        The lessons may have changed since a class was broken off.
+        """
+        steps = {name: known.step_of for name, known in self.lessons.items()}
+        return Counter(
+            (name, steps[name][cell])
+            for _, name, cell in self._latest('cell')
+            if cell in steps.get(name, ())
+        )
 
     # What the page says
 
     def view(self, lesson: str, step: int) -> dict:
         """Return what the page shows of a step of a lesson."""
         known = self.lessons[lesson]
-        places = self._latest.places.values()
-        at = Counter((name, self.lessons[name].step_of[cell]) for name, cell in places)
+        at = self._places()
         names = dict(self._db.execute('SELECT seat, name FROM seats'))
-        here = Counter(name for name, _ in places)
+        here = Counter(name for name, _ in at.elements())
+        hands = [seat for seat, _, up in self._latest('hand') if up]
         return {
             'seats': len(names),
             'lessons': [
@@ -193,11 +166,7 @@ class ClassStore:
                 for name, one in self.lessons.items()
             ],
             'steps': [
-                {
-                    'title': notes['step'],
-                    'here': at[lesson, number],
-                    'now': number == step,
-                }
+                {'title': notes['step'], 'here': at[lesson, number], 'now': number == step}
                 for number, notes in enumerate(known.notes)
             ],
             'guesses': [
@@ -206,37 +175,32 @@ class ClassStore:
                 if known.step_of[guess.asked] <= step <= known.step_of[guess.compared]
             ],
             'tasks': [self._task(lesson, number, len(names)) for number in known.tasks],
-            'hands': [{'seat': seat, 'name': names.get(seat, '')} for seat in self._latest.hands],
+            'hands': [{'seat': seat, 'name': names.get(seat, '')} for seat in hands],
         }
 
     def _guesses(self, lesson: str, question: str, guess: Guess) -> dict:
-        answers = self._latest.guesses[lesson, question]
+        answers = [value for *_, value in self._latest('guess', lesson, question)]
         cells = [guess.asked, guess.compared]
         found = {'question': question, 'cells': cells, 'answered': len(answers)}
         if (lesson, question) not in self.shown:  # what is hidden does not leave the server
             return found | {'shown': False}
-        measured = self._latest.outcomes[lesson, question].values()
+        measured = [value for *_, value in self._latest('outcome', lesson, question)]
         return found | {
             'shown': True,
-            'bars': bars(list(answers.values())),
-            'given': None if guess.given is None else label(guess.given),
+            'bars': bars(answers),
             'measured': [label(value) for value, _ in _counted(measured)][:3],
             'by': len(measured),
         }
 
     def _task(self, lesson: str, number: int, seats: int) -> dict:
-        tries = self._latest.solved[lesson, str(number)].values()
-        solved = sum(map(bool, tries))
+        tries = self._db.execute(SOLVED, (lesson, str(number))).fetchall()
+        solved = tries.count(('true',))
         tried = len(tries) - solved
         return {'number': number, 'solved': solved, 'tried': tried, 'open': seats - len(tries)}
 
     def busiest(self) -> tuple[str, int] | None:
         """Return the lesson and the step at which most students are, None if nobody is."""
-        places = self._latest.places.values()
-        if not places:
-            return None
-        steps = Counter((name, self.lessons[name].step_of[cell]) for name, cell in places)
-        return steps.most_common(1)[0][0]
+        return next((place for place, _ in self._places().most_common(1)), None)
 
     def as_csv(self) -> str:
         """Return all events as CSV, texts as JSON: so no program takes one for a formula."""
@@ -258,7 +222,6 @@ class ClassStore:
             self._db.execute("UPDATE seats SET name = ''")
         self._db.execute('VACUUM')  # what is deleted is in no page of the file,
         self._db.execute('PRAGMA wal_checkpoint(TRUNCATE)')  # nor in its log
-        self._latest = Latest()
         self.shown.clear()
 
     def close(self) -> None:
@@ -278,9 +241,7 @@ def bars(answers: list) -> list[dict]:
     if answers and len(numbers) == len(answers) and len(set(numbers)) > BARS:
         low, high = min(numbers), max(numbers)
         width = (high - low) / BARS
-        counts = Counter(
-            min(int((number - low) / (high - low) * BARS), BARS - 1) for number in numbers
-        )
+        counts = Counter(min(int((one - low) / width), BARS - 1) for one in numbers)
         return [
             {'label': f'{low + i * width:.4g} to {low + (i + 1) * width:.4g}', 'count': counts[i]}
             for i in range(BARS)

@@ -16,6 +16,7 @@ from tornado import web
 from tornado.httpserver import HTTPServer
 from tornado.iostream import StreamClosedError
 
+from helpers._plumbing.look import LOOK_CSS
 from tools.classroom.class_page import events
 from tools.classroom.class_page.events import Limit, parse
 from tools.classroom.class_page.store import ClassStore
@@ -173,7 +174,8 @@ class Instructor(Handler):
         """Answer with the page, one of its files, its changes as they come, or all as CSV."""
         if name in FILES:
             self.set_header('Content-Type', f'{FILES[name]}; charset=UTF-8')
-            self.finish((HERE / (name or 'class.html')).read_bytes())
+            look = LOOK_CSS if name == 'class.css' else ''
+            self.finish(look + (HERE / (name or 'class.html')).read_text('utf-8'))
         elif name == 'live':
             await self._send_changes()
         elif name == 'class.csv':
