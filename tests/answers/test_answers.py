@@ -1,54 +1,106 @@
 """Every check judges the answers that students give: wrong ones of many kinds, and right ones.
 
-A file `<lesson>.py` beside this one holds the answers of a lesson's tasks:
+A file `<lesson>.yaml` beside this one has the answers of a lesson's tasks:
 
-    ANSWERS = {2: {'wrong': ['source of a cell', ...], 'right': [...]}}
+    3 wrong:
+    - self.publisher.publish(message): ''  # publishes nothing
+    - x = self.speed: x = 0.5  # two edits are one answer
+      z = self.turn: z = 1.0
+    3 right:
+    - message = ... (message): |-
+        from geometry_msgs.msg import Vector3
+        self.publisher.publish(Twist(linear=Vector3(x=self.speed), angular=Vector3(z=self.turn)))
 
-One kernel runs the lesson from the top. Before the check of each task, it runs each answer in place
-of the starter, and then the check.
+An answer is the notebook's solution, edited: `old text: new text`. ` ... ` in the old text is
+whatever lies between, and a space is any white space. If the old text is not in the solution, the
+starter is edited. New lines are indented as the line in which the old text begins. An answer that
+has little in common with both is given as a whole, as text.
+
+YAML wants quotes around text that begins with a quote, a bracket or another sign of its own, or
+that has a colon or a # with a space in it.
 """
 
-import runpy
+import re
+from collections import defaultdict
 from pathlib import Path
 
 import nbformat
 import pytest
+import yaml
 from support.kernel import NOTEBOOKS, Kernel
 
 HERE = Path(__file__).parent
-WRONG, RIGHT = 5, 3  # how many a task has at least
+LEAST = {'wrong': 5, 'right': 3}  # answers of a task
 
-LESSONS = sorted(path.stem for path in HERE.glob('*.py') if path.stem != 'test_answers')
+LESSONS = sorted(path.stem for path in HERE.glob('*.yaml'))
 
 
-def tags(cell) -> list[str]:
-    return cell.metadata.get('tags', [])
+def source_of(answer: str | dict[str, str], *sources: str) -> str:
+    """Return the source of an answer: its own text, or the first source that it can edit.
+
+    Raises ValueError if no source has each old text exactly once.
+    """
+    if isinstance(answer, str):
+        return answer
+    for source in sources:
+        found = [list(re.finditer(pattern(old), source)) for old in answer]
+        if all(len(places) == 1 for places in found):
+            edits = zip((place.span() for [place] in found), answer.values(), strict=True)
+            return edited(source, list(edits))
+    raise ValueError(f'Neither the solution nor the starter has this exactly once: {list(answer)}')
+
+
+def pattern(old: str) -> str:
+    """Return the regular expression that finds the old text of an edit."""
+    parts = [r'\s+'.join(map(re.escape, part.split())) for part in old.split(' ... ')]
+    return '(?s)' + '.*?'.join(parts)
+
+
+def edited(source: str, edits: list[tuple[tuple[int, int], str]]) -> str:
+    """Return the source with new text from one place to another, as often as there are edits."""
+    result = source
+    for (start, end), new in sorted(edits, reverse=True):
+        indent = re.match(' *', source[source.rfind('\n', 0, start) + 1 :]).group()
+        result = result[:start] + new.replace('\n', '\n' + indent) + result[end:]
+    return result
+
+
+def judge(kernel: Kernel, answers: dict, key: str, cells: dict[str, list[str]]) -> None:
+    """Run each answer, and the check: it must find that the answer is of its kind."""
+    kind = key.split()[1]
+    some = answers.pop(key)
+    assert len(some) >= LEAST[kind], f'Task {key}: {len(some)} answers'
+    starters = cells['exercise']
+    files = starters if len(starters) > 1 else []  # the answer changes what they have written
+    for answer in some:
+        source = source_of(answer, *cells['solution'], *starters)
+        said = ''.join(map(kernel.run, [*files, source, *cells['check']]))
+        assert ('All done.' in said) == (kind == 'right'), (
+            f'Task {key} answer:\n{source}\nThe check said:\n{said}'
+        )
 
 
 @pytest.mark.parametrize('lesson', LESSONS)
 def test_checks_judge_right_and_wrong_answers(lesson):
     [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{lesson}.ipynb')
-    answers = runpy.run_path(str(HERE / f'{lesson}.py'))['ANSWERS']
-    cells = [cell for cell in nbformat.read(path, 4).cells if cell.cell_type == 'code']
-    task, judged, starter = 0, set(), False
+    answers = yaml.load((HERE / f'{lesson}.yaml').read_text(), yaml.BaseLoader)
+    task, cells = 1, defaultdict(list)  # the cells of this task, by their tag
     with Kernel() as kernel:
-        for place, cell in enumerate(cells):
-            if 'exercise' in tags(cell) and not starter:
-                task, starter = task + 1, True
-                rest = cells[place:]
-                checks = [one for one in rest if 'check' in tags(one)]
-                end = next(one for one in rest if 'solution' in tags(one))
-                checks = [one.source for one in checks if rest.index(one) < rest.index(end)]
-                for kind, sources in answers[task].items():
-                    for source in sources:
-                        said = ''.join(map(kernel.run, [source, *checks]))
-                        assert ('All done.' in said) == (kind == 'right'), (
-                            f'Task {task}, a {kind} answer:\n{source}\nThe check said:\n{said}'
-                        )
-                judged.add(task)
-            starter = starter and 'solution' not in tags(cell)
-            kernel.run(cell.source)
-    assert judged == set(answers)
-    for task, kinds in answers.items():
-        assert len(kinds['wrong']) >= WRONG, f'Task {task} needs {WRONG} wrong answers.'
-        assert len(kinds['right']) >= RIGHT, f'Task {task} needs {RIGHT} right answers.'
+        for cell in nbformat.read(path, 4).cells:
+            tags = cell.metadata.get('tags', [])
+            if 'solution' in tags:
+                cells['solution'] = [cell.source.split('\n', 1)[1]]
+                judge(kernel, answers, f'{task} wrong', cells)
+                # What a right answer builds stays, so the solution is tried before.
+                said = ''.join(map(kernel.run, [*cells['exercise'], cell.source]))
+                assert re.search(r'Solution of task \d+: (\d+) of \1\.', said), said
+                judge(kernel, answers, f'{task} right', cells)
+                for source in [*cells['exercise'], *cells['check'], cell.source]:
+                    kernel.run(source)
+                task, cells = task + 1, defaultdict(list)
+            elif cell.cell_type == 'code':
+                said = kernel.run(cell.source)
+                assert 'All done.' not in said, f'The starter of task {task} is right.'
+                for tag in {'exercise', 'check'}.intersection(tags):
+                    cells[tag].append(cell.source)
+    assert not answers, 'There are no such tasks.'
