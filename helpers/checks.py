@@ -29,6 +29,8 @@ from helpers._plumbing.rclpy_private import can_ask
 from helpers._plumbing.text import wrap
 
 NO_GUESS = 'No guess yet. Write one in place of the three dots, run that cell, then this one again.'
+ENDLESS = 'it did not end. Is there a loop that never ends?'
+NOT_TRIED = 'not tried, for the one above did not end'
 CPU_LIMIT_S = 5.0  # of one test of a check: an endless loop uses it up
 LIMIT_S = 90.0  # a build on a busy machine takes its time
 
@@ -105,7 +107,8 @@ def check(task: int, *requirements: tuple[str, object | Callable[[], object], st
     it again. What was found must not move from run to run. Hints are shown when the task is still
     wrong at the second try. A task that passes is kept in the student's progress.
 
-    A test may use CPU_LIMIT_S seconds of CPU and LIMIT_S seconds of the clock.
+    A test may use CPU_LIMIT_S seconds of CPU and LIMIT_S seconds of the clock. If one needs more,
+    those after it are not tried.
     """
     _requirements[task] = requirements
     with _without_solution(task):
@@ -118,7 +121,11 @@ def check(task: int, *requirements: tuple[str, object | Callable[[], object], st
 
 def _print_results(title: str, requirements: Sequence[tuple], task: int | None = None) -> bool:
     """Print the results; with a `task`, count the tries at it. Return whether all is right."""
-    results = [(what, *_run(test), hint) for what, test, hint in requirements]
+    results, endless = [], False
+    for what, test, hint in requirements:
+        met, found = (False, NOT_TRIED) if endless else _run(test)
+        results.append((what, met, found, hint))
+        endless = endless or found.endswith(ENDLESS)
     met_ones = sum(met for _, met, _, _ in results)
     done = met_ones == len(results)
     if task is not None:
@@ -264,7 +271,7 @@ def _limited() -> Iterator[None]:
     except KeyboardInterrupt:
         if not over:
             raise
-        raise TimeoutError('it did not end. Is there a loop that never ends?') from None
+        raise TimeoutError(ENDLESS) from None
     finally:
         for number, (timer, _) in timers.items():
             signal.setitimer(timer, 0)
