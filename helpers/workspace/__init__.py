@@ -10,9 +10,10 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
     processes     a process that prints lines, and ends
     build_output  what a build says, and which of its lines matter
     small_rclcpp  a package in C++: the part of rclcpp that lesson 13 needs, over rcl
+    colleague.sh  makes the repository of somebody else that lesson 10 brings in
     sourcing      what `source install/setup.bash` gives, for a kernel that already runs
 """
 
-from helpers.workspace.workspace import SMALL_RCLCPP, Workspace
+from helpers.workspace.workspace import COLLEAGUE, SMALL_RCLCPP, Workspace
 
-__all__ = ['SMALL_RCLCPP', 'Workspace']
+__all__ = ['COLLEAGUE', 'SMALL_RCLCPP', 'Workspace']

@@ -27,6 +27,8 @@ CMAKE_MODULES = Path(__file__).with_name('cmake')
 MOVING = r'(?<=\w) \[-?[\d.]+s(, .*)?\]$|^\[-?[\d.]+s\] WARNING.*any .local_setup\..*\n'
 # A package in C++ for lessons: copy it into `src`.
 SMALL_RCLCPP = Path(__file__).with_name('small_rclcpp')
+# A script for a terminal: the repository of somebody else, on a server.
+COLLEAGUE = Path(__file__).with_name('colleague.sh')
 CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
 
 _open_workspace: Workspace | None = None
