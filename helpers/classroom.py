@@ -46,6 +46,10 @@ LARGEST = 2**53  # of numbers, which a browser holds exactly
 TEXT = 200  # letters of a text, at most
 ITEMS = 20  # of a list or a set, at most
 UNUSABLE = 'The class hears nothing, because {} cannot be used ({}): remove it, then join again.'
+SILENT = (
+    'The class does not answer. What you tell is kept until it does. If the class is over, '
+    'leave_class() ends this.'
+)
 NOT_JOINED = 'You are in no class: join_class(address, code) joins one.'
 NO_LESSON = 'Nothing is sent, because this notebook is no lesson: do it in the lesson itself.'
 ONE_ANSWER = (
@@ -77,15 +81,16 @@ class Class(NamedTuple):
 def guess(question: str, *answers: object) -> object:
     """Return the answer that a student gives to a question; `...` if there is none yet.
 
-    If there is a class, it is told in the background. The class counts the last guess of each
-    student, of questions that the lesson has. An answer is a number, True or False, a text, or a
-    few of them in a list, a tuple or a set.
+    It says that it was taken. If there is a class, it is told in the background. The class counts
+    the last guess of each student, of questions that the lesson has. An answer is a number, True or
+    False, a text, or a few of them in a list, a tuple or a set.
     """
     if len(answers) != 1:
         print(*wrap(ONE_ANSWER), sep='\n')
         return ...
     [value] = answers
     if value is not ...:
+        print('Your guess is taken:', value)
         _tell('guess', question=question, value=value)
         _outbox.say_trouble()
     return value
@@ -231,7 +236,7 @@ class _Outbox:
                 self._trouble = str(refused)
                 return False
             except OSError:
-                self._trouble = 'The class does not answer. What you tell is kept until it does.'
+                self._trouble = SILENT
                 return True
             with db:
                 db.executemany('DELETE FROM waiting WHERE n = ?', [(n,) for n, _ in rows])

@@ -118,12 +118,25 @@ def table(known: Iterable[Tasks], solved: Collection[str] = ()) -> str:
     rows, sums = [['lesson', 'solved', 'open']], [0, 0]
     for lesson in known:
         tasks = enumerate(lesson.lines(), 1)
-        left = [str(count) for count, line in tasks if line not in solved]
+        left = [count for count, line in tasks if line not in solved]
         done = lesson.tasks - len(left)
         sums = [sums[0] + done, sums[1] + lesson.tasks]
-        words = f'task{"s" * (len(left) > 1)} {", ".join(left)}' if left else ''
+        words = f'task{"s" * (len(left) > 1)} {_runs(left)}' if left else ''
         rows.append([f'{lesson.number} {lesson.title}', f'{done} of {lesson.tasks}', words])
     return f'{text.table(rows)}\n{sums[0]} of {sums[1]} tasks are solved.'
+
+
+def _runs(numbers: list[int]) -> str:
+    """Return rising numbers in words: `1, 2, 4 to 8`."""
+    found = []
+    for number in numbers:
+        if found and number == found[-1][-1] + 1:
+            found[-1].append(number)
+        else:
+            found.append([number])
+    return ', '.join(
+        f'{run[0]} to {run[-1]}' if len(run) > 2 else ', '.join(map(str, run)) for run in found
+    )
 
 
 def _notebooks(number: str = '[0-9][0-9]') -> list[Path]:
