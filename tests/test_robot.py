@@ -108,6 +108,8 @@ def test_it_is_never_inside_a_wall(commands):
 @given(place=places, yaw=angles)
 def test_at_its_range_is_a_wall_and_before_it_none(place, yaw):
     assume(ROOMS.clearance(*place) > 1e-6)
+    # A beam along the edge of a wall touches it, and sees past it.
+    assume(abs(math.sin(2 * yaw)) > 1e-9 or all(c % 0.5 for c in place))
 
     def clearance(r):
         return ROOMS.clearance(place[0] + r * math.cos(yaw), place[1] + r * math.sin(yaw))
