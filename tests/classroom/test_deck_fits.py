@@ -25,8 +25,8 @@ WALK = f"""async () => {{
         if (same && before === cell && document.querySelector('#deck-says').textContent) break;
         before = cell;
         if (!same) visited.push(number());
-        if (outer.scrollHeight > outer.clientHeight + 4)
-            found.push(`slide ${{number()}} is ${{outer.scrollHeight - outer.clientHeight}} px too high`);
+        const over = outer.scrollHeight - outer.clientHeight;
+        if (over > 4) found.push(`slide ${{number()}} is ${{over}} px too high`);
         found.push(...cutOff());
         for (const answer of document.querySelectorAll('.deck-on details')) {{
             const title = answer.closest('.jp-Cell').querySelector('h3')?.textContent;

@@ -68,7 +68,7 @@ def test_added_in_the_middle_and_at_the_end(tmp_path, capsys):
             assert int(one.number) == int(old.number) + 1
             assert f'Exercise 1 of lesson {old.number}' not in nbformat.writes(one.notebook)
     readme = (copy / 'README.md').read_text(encoding='utf-8')
-    assert f'| 05 | [Find your keys](notebooks/05_{MIDDLE}.ipynb) |' in readme
+    assert f'| [05 Find your keys](notebooks/05_{MIDDLE}.ipynb) |' in readme
 
     commit(copy)
     for name in (MIDDLE, 'lose_your_keys'):
