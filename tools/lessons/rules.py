@@ -29,6 +29,7 @@ PATH = re.compile(
     r'|\b[A-Z]:\\\S+|(?<!\S)(?!python3/)\S*(?:site|dist)-packages\S*|'
     + '|'.join(rf'{re.escape(folder)}\b' for folder in sorted(THIS_MACHINE))
 )
+PRIVATE = re.compile(r'^\s*(?:from|import) (helpers\._\w+)', re.MULTILINE)
 Rule = Callable[[Lesson], Iterator[str]]
 
 
@@ -145,6 +146,12 @@ def pictures_described(lesson: Lesson) -> Iterator[str]:
 
 
 # Cells
+
+
+def imports_what_is_public(lesson: Lesson) -> Iterator[str]:
+    for name, cell in code_cells(lesson):
+        if found := PRIVATE.search(cell.source):
+            yield f'{name} imports {found[1]}: a lesson imports what helpers offer.'
 
 
 def names_stay(lesson: Lesson) -> Iterator[str]:
@@ -280,6 +287,7 @@ RULES: list[Rule] = [
     prints_what_stays,
     compared,
     pictures_described,
+    imports_what_is_public,
     names_stay,
     tagged,
     fits_a_slide,
