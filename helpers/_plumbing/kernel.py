@@ -9,12 +9,13 @@ NOT_RUN = (
     'This kernel has not run the first cells of the lesson: choose Run > Run All Above Selected '
     'Cell, then run this cell again.'
 )
+NO_GUESS = '{} is a guess: make it in its cell above, run that cell, then this one again.'
 
 
 def load_ipython_extension(shell) -> None:
     """Let `!ros2` be found, and a name or a magic that is missing say what to run.
 
-    The latter only as long as no helper is imported: later a missing name is the student's own.
+    When a helper is imported, a missing name is the student's own, but for the name of a guess.
     """
     commands, path = os.path.join(sys.prefix, 'bin'), os.environ.get('PATH', os.defpath)
     if commands not in path.split(os.pathsep):
@@ -24,5 +25,7 @@ def load_ipython_extension(shell) -> None:
         shell.showtraceback((kind, error, traceback), tb_offset=tb_offset)
         if 'helpers.session' not in sys.modules and 'helpers.workspace' not in sys.modules:
             print(NOT_RUN)
+        elif (getattr(error, 'name', None) or '').startswith('my_'):
+            print(NO_GUESS.format(error.name))
 
     shell.set_custom_exc((NameError, UsageError), explain)
