@@ -3,12 +3,11 @@
     python -m tools.site
 
 Sphinx and myst-nb make the pages from the saved outputs: nothing runs. What they read is prepared
-in .site/pages: the documents, and the notebooks with their notes and solutions folded, their
-figures as files, and a link to the lesson as it is.
+in .site/pages: the documents, and the notebooks without notes for the instructor, with their
+solutions folded, their figures as files, and a link to the lesson as it is.
 """
 
 import hashlib
-import html
 import io
 import re
 import shutil
@@ -19,7 +18,6 @@ from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
-from nbformat.v4 import new_markdown_cell
 from PIL import Image
 from sphinx.cmd.build import build_main
 
@@ -65,9 +63,9 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
     """Return a notebook as myst-nb shall read it, and write its figures into a folder."""
     notebook, cells = deepcopy(notebook), []
     for cell in notebook.cells:
-        if cell.cell_type == 'raw':
-            cell = _folded_note(cell.source)
-        elif cell.cell_type == 'code':
+        if cell.cell_type == 'raw':  # a note for the instructor
+            continue
+        if cell.cell_type == 'code':
             _fold(cell)
             cell.outputs = [output for output in cell.outputs if not is_widget(output)]
             for data in (output.get('data', {}) for output in cell.outputs):
@@ -87,13 +85,6 @@ def is_widget(output: NotebookNode) -> bool:
     """Return whether an output is the text of a widget, such as `VBox(children=(...))`."""
     data = output.get('data', {})
     return set(data) == {'text/plain'} and bool(re.match(r'\w+\(children=', data['text/plain']))
-
-
-def _folded_note(source: str) -> NotebookNode:
-    summary, _, text = source.partition('\n')
-    return new_markdown_cell(
-        f'<details class="note"><summary>{html.escape(summary)}</summary>\n\n{text}\n\n</details>'
-    )
 
 
 def _fold(cell: NotebookNode) -> None:
