@@ -40,6 +40,7 @@ ADDRESS = re.compile(r'(https?://)?[\w.-]+(:\d+)?(/[\w./-]*)?')
 ANSWER_LIMIT_S = 5.0
 TRY_AGAIN_S = 2.0
 TOGETHER_S = 0.05  # events of this time are one message
+GIVE_UP_S = 600.0  # of a class that does not answer: its teacher has ended it
 BATCH = 50
 WAITING = 1000  # events that are kept while the class does not answer; the oldest ones go first
 LARGEST = 2**53  # of numbers, which a browser holds exactly
@@ -47,9 +48,10 @@ TEXT = 200  # letters of a text, at most
 ITEMS = 20  # of a list or a set, at most
 UNUSABLE = 'The class hears nothing, because {} cannot be used ({}): remove it, then join again.'
 SILENT = (
-    'The class does not answer. What you tell is kept until it does. If the class is over, '
+    'The class does not answer. What you tell is kept for ten minutes. If the class is over, '
     'leave_class() ends this.'
 )
+OVER = 'The class has not answered for ten minutes, so you have left it. You can join again.'
 NOT_JOINED = 'You are in no class: join_class(address, code) joins one.'
 NO_LESSON = 'Nothing is sent, because this notebook is no lesson: do it in the lesson itself.'
 ONE_ANSWER = (
@@ -168,6 +170,7 @@ class _Outbox:
         self._lock, self._keeping = threading.Lock(), threading.Lock()
         self._thread: threading.Thread | None = None
         self._trouble = self._said = ''
+        self._silent_since: float | None = None
         atexit.register(self._at_exit)
 
     def put(self, event: dict) -> None:
@@ -229,18 +232,25 @@ class _Outbox:
             try:
                 _ask(known, 'events', {'events': [json.loads(event) for _, event in rows]})
             except ValueError as refused:  # the class knows no such seat, or no such event
-                with db:
-                    db.execute('DELETE FROM waiting')
-                    if not os.environ.get(HUB_VARIABLE):
-                        db.execute('DELETE FROM class WHERE token = ?', [known.token])
-                self._trouble = str(refused)
-                return False
+                return self._forget(db, known, str(refused))
             except OSError:
+                self._silent_since = self._silent_since or time.monotonic()
+                if time.monotonic() - self._silent_since > GIVE_UP_S:
+                    return self._forget(db, known, OVER)
                 self._trouble = SILENT
                 return True
+            self._silent_since = None
             with db:
                 db.executemany('DELETE FROM waiting WHERE n = ?', [(n,) for n, _ in rows])
             self._trouble = ''
+        return False
+
+    def _forget(self, db: sqlite3.Connection, known: Class, why: str) -> bool:
+        with db:
+            db.execute('DELETE FROM waiting')
+            if not os.environ.get(HUB_VARIABLE):
+                db.execute('DELETE FROM class WHERE token = ?', [known.token])
+        self._trouble = why
         return False
 
 

@@ -212,7 +212,7 @@ def test_events_survive_a_dead_server_exactly_once(tmp_path):
             opened.kill()
             process.communicate()
         with kernel(ada, third) as said:
-            assert 'The class does not answer. What you tell is kept until it does.' in said
+            assert 'The class does not answer. What you tell is kept for ten minutes.' in said
             opened.start()
             assert 'goes on' in opened.said
             opened.go(1)
@@ -228,3 +228,18 @@ def test_events_survive_a_dead_server_exactly_once(tmp_path):
         assert 'The class that you joined is over. To tell a new one, join it.' in said
         assert opened.csv()[1:] == []
     assert in_kernel(ada, 'raise_hand()') == classroom.NOT_JOINED
+
+
+def test_a_class_that_stays_silent_is_left(tmp_path):
+    with running_class(tmp_path / 'class') as opened:
+        in_kernel(tmp_path, join(opened))
+    script = f"""
+import time
+classroom.GIVE_UP_S = 0.0
+guess({QUESTION!r}, 1)
+while classroom._known():
+    time.sleep(0.05)
+guess({QUESTION!r}, 2)
+"""
+    assert in_kernel(tmp_path, script).endswith(classroom.OVER)
+    assert in_kernel(tmp_path, 'raise_hand()') == classroom.NOT_JOINED
