@@ -63,8 +63,8 @@ site: set_up ## write the lessons and documents as a web site into site/, which 
 	@tools/set_up.sh site
 	@$(PYTHON) -m tools.site
 
-soak: set_up ## before a release, as root: run the notebooks in hard conditions; CONDITIONS=idle,busy LESSON=02
-	@$(PYTHON) -m tools.soak $(if $(CONDITIONS),--conditions "$(CONDITIONS)") $(if $(LESSON),--lesson "$(LESSON)")
+soak: set_up ## before a release, as root: run the notebooks in hard conditions; CONDITIONS="idle busy" LESSON=02
+	@$(PYTHON) -m tools.soak $(if $(CONDITIONS),--conditions $(CONDITIONS)) $(if $(LESSON),--lesson "$(LESSON)")
 
 bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="20 200" for some rates
 	@$(PYTHON) -m benchmarks $(ONLY)
