@@ -2,10 +2,10 @@
 
 The comparison stays nbval's own, with the settings of pyproject.toml. `--soak` says how:
 
-- `idle`, `busy` as nbval does
-- `twice` each cell twice, then all cells again in the same kernel
-- `interrupt` each cell is interrupted at a random time, then run again and compared
-- `kill` the kernel is killed in the middle of a random cell, then all in a fresh one
+- `idle`, `busy`: as nbval does
+- `twice`: each cell twice, then all cells again in the same kernel
+- `interrupt`: each cell is interrupted at a random time, then run again and compared
+- `kill`: the kernel is killed in the middle of a random cell, then all in a fresh one
 
 After the last cell, and after each interrupt, the kernel must have nothing that it had not at its
 start.
