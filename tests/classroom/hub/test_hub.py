@@ -78,4 +78,4 @@ def test_a_port_in_use(tmp_path):
         hub = Hub(tmp_path, CONFIG, port=taken.getsockname()[1])
         assert hub.process.wait(START_S) == 1
     *_, said = hub.log.read_text().splitlines()
-    assert f'The port of {hub.url} is already in use: choose another one' in said
+    assert f'The port of {hub.url} cannot be used (Address already in use' in said
