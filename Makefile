@@ -14,7 +14,7 @@ card: set_up ## one page to print for a timetable of teaching.md: PLAN=90
 	@$(PYTHON) -m tools.classroom.card $(PLAN)
 
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join over the network; PORT=8765, BROWSER=no
-	@exec $(PYTHON) -m tools.classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server) $(CLASS_ARGS)
+	@exec $(PYTHON) -m tools.classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
 
 test: set_up lint ## lint, tests of the helpers, every notebook compared with its saved outputs
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(PYTEST_ARGS)
@@ -63,8 +63,8 @@ site: set_up ## write the lessons and documents as a web site into site/, which 
 	@tools/set_up.sh site
 	@$(PYTHON) -m tools.site
 
-soak: set_up ## before a release, as root: run the notebooks in hard conditions; CONDITIONS=idle,busy LESSON=02
-	@$(PYTHON) -m tools.soak $(if $(CONDITIONS),--conditions "$(CONDITIONS)") $(if $(LESSON),--lesson "$(LESSON)")
+soak: set_up ## before a release, as root: run the notebooks in hard conditions; CONDITIONS="idle busy" LESSON=02
+	@$(PYTHON) -m tools.soak $(if $(CONDITIONS),--conditions $(CONDITIONS)) $(if $(LESSON),--lesson "$(LESSON)")
 
 bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="20 200" for some rates
 	@$(PYTHON) -m benchmarks $(ONLY)

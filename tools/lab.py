@@ -39,7 +39,9 @@ def open_lab(
     A server of `make lab` and one of `make present` may run side by side: each has its settings.
     `deck` says whether notebooks are shown as slides, `more` are options of JupyterLab.
     """
-    if options.port and not _is_free(int(options.port)):
+    try:
+        socket.create_server(('localhost', int(options.port or 0))).close()
+    except OSError:
         sys.exit(f'Port {options.port} is in use: give another one, such as PORT=8899.')
     config = Path(jupyter_config_dir())
     settings = config / 'lab' / f'{"presenter" if deck else "user"}-settings'
@@ -65,16 +67,6 @@ def open_lab(
     if os.getuid() == 0:
         command.append('--allow-root')
     os.execv(sys.executable, [*command, *options.more])
-
-
-def _is_free(port: int) -> bool:
-    with socket.socket() as tried:
-        tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            tried.bind(('localhost', port))
-        except OSError:
-            return False
-    return True
 
 
 if __name__ == '__main__':

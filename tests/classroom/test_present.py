@@ -7,6 +7,7 @@ import pytest
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 
 from tools import lab
+from tools.classroom.card import card
 from tools.classroom.plan import plan_of, plans
 from tools.classroom.present import MADE, Copies, main
 from tools.lessons.lesson import ROOT, lessons, minutes_of_note
@@ -87,6 +88,14 @@ def test_a_timetable_has_its_steps_and_minutes_only(tmp_path, plan):
     assert minutes == {name: known[name].minutes_of(steps) for name, steps in plan.steps.items()}
     for name, following in zip(plan.steps, [*plan.steps][1:], strict=False):
         assert f']({following})' in shown[name].cells[-1].source
+
+
+@pytest.mark.parametrize('plan', plans(), ids=[plan.title for plan in plans()])
+def test_a_card_takes_as_long_as_its_timetable(plan):
+    minutes = sum(int(own) for own, _ in plan.rows)
+    page = card(plan)
+    assert f'{plan.title}: {minutes // 60} h {minutes % 60} min</h1>' in page
+    assert 'black; any key brings the slide back' in page
 
 
 def test_a_timetable_is_named_by_a_word():

@@ -9,12 +9,11 @@ import re
 import signal
 import subprocess
 import sys
-import urllib.error
-import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
 import nbformat
+import requests
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
 
 from helpers.classroom import HUB_VARIABLE
@@ -30,7 +29,8 @@ OTHER = 'Which ones?'
 STARTED = r"join_class\('(.*)', '(.*)'\)[\s\S]*?(http://localhost:(\d+)/\w+/)[\s\S]*Ctrl\+C"
 STEP, LATER = 'step-1', 'step-2'  # ids of cells
 PREDICT = {'tags': ['predict']}
-OPENER = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+WEB = requests.Session()
+WEB.trust_env = False  # no proxy
 
 
 def write_lesson(root: Path) -> None:
@@ -117,12 +117,8 @@ class RunningClass:
         """Send a message, bytes or what becomes JSON, and return the answer."""
         data = body if isinstance(body, bytes) else json.dumps(body).encode()
         headers = {'Authorization': f'token {token}'}
-        request = urllib.request.Request(f'{self.url}/{path}', data, headers)
-        try:
-            with OPENER.open(request, timeout=LIMIT_S) as answer:
-                return answer.status, json.load(answer)
-        except urllib.error.HTTPError as refused:
-            return refused.code, json.load(refused)
+        answer = WEB.post(f'{self.url}/{path}', data, headers=headers, timeout=LIMIT_S)
+        return answer.status_code, answer.json()
 
     def join(self, **what: str) -> str:
         """Take a seat, and return its token."""
@@ -148,8 +144,8 @@ class RunningClass:
 
     def view(self) -> dict:
         """Return what the page shows now."""
-        with OPENER.open(f'{self.page}live', timeout=LIMIT_S) as live:
-            return json.loads(live.readline().removeprefix(b'data: '))
+        with WEB.get(f'{self.page}live', stream=True, timeout=LIMIT_S) as live:
+            return json.loads(next(live.iter_lines(1)).removeprefix(b'data: '))
 
     def bars(self, question: str = QUESTION) -> dict[str, int]:
         """Return the bars of a question after "show"."""
@@ -159,8 +155,7 @@ class RunningClass:
 
     def csv(self) -> list[str]:
         """Return the lines of the CSV, the heading first."""
-        with OPENER.open(f'{self.page}class.csv', timeout=LIMIT_S) as answer:
-            return answer.read().decode().splitlines()
+        return WEB.get(f'{self.page}class.csv', timeout=LIMIT_S).text.splitlines()
 
     def wait_for(self, condition) -> dict:
         """Wait until the page shows what fulfils a condition, and return it."""

@@ -52,7 +52,6 @@ def printed(lines):
         ),
         ([TITLE, code(), code(1, 'solution'), code(1)], ['slide', '', '', '']),
         ([TITLE, code(), text('', 'deck-break'), code()], ['slide', '', 'subslide', '']),
-        ([TITLE, code(25, 'deck-skip'), code(16)], ['slide', 'skip', '']),
         ([TITLE, note('word ' * 400), code(16)], ['slide', 'skip', '']),
         # A note does not part a text from its code.
         ([TITLE, code(18), text(), note(), code(16)], ['slide', '', 'subslide', 'skip', '']),

@@ -7,11 +7,9 @@ import html
 import re
 import sys
 
-from nbformat import NotebookNode
-
-from tools.classroom.plan import Plan, keys, plan_of
+from tools.classroom.plan import Plan, keys, lesson_of, plan_of
 from tools.lessons.clean import write
-from tools.lessons.lesson import FOLDER, ROOT, Lesson, first_heading, minutes_of_note, read
+from tools.lessons.lesson import FOLDER, ROOT, Lesson, first_heading, read
 
 FILE = ROOT / 'presentation' / 'card.html'
 WRONG = re.compile(r'What goes wrong[^:.]*: (.+)')
@@ -41,22 +39,17 @@ i {{ color: #444; }}
 
 def card(plan: Plan) -> str:
     """Return the page of a timetable."""
-    rows, at = [], 0
+    lines, at = [], 0
     for minutes, what in plan.rows:
-        file = next((name for name in plan.steps if name in what), '')
-        if not file:
-            rows.append((at, int(minutes), f'<b>{html.escape(what)}</b>'))
-            at += int(minutes)
-            continue
-        lesson = read((FOLDER / file).read_text(encoding='utf-8'), file)
-        for own, title, wrong in _steps(lesson, plan.steps[file]):
+        file, steps = lesson_of(what)
+        rows = [(int(minutes), what, '')]
+        if file:
+            lesson = read((FOLDER / file).read_text(encoding='utf-8'), file)
+            rows = _steps(lesson, steps)
+        for own, title, wrong in rows:
             told = f'<b>{_plain(title)}</b> <i>{_plain(wrong)}</i>'
-            rows.append((at, own, told))
+            lines.append(f'<tr><td>{at // 60}:{at % 60:02d} <b>{own}′</b><td>{told}')
             at += own
-    lines = [
-        f'<tr><td>{start // 60}:{start % 60:02d} <b>{own}′</b><td>{told}'
-        for start, own, told in rows
-    ]
     return PAGE.format(
         title=f'{html.escape(plan.title)}: {at // 60} h {at % 60} min',
         columns=1 if len(lines) < 20 else 2,
@@ -68,16 +61,16 @@ def card(plan: Plan) -> str:
 
 def _steps(lesson: Lesson, wanted: tuple[int, int] | None) -> list[tuple[int, str, str]]:
     """Return minutes, title, and what goes wrong, of the steps of a lesson that are wanted."""
-    by_step: dict[str, list[NotebookNode]] = {}
-    for cell, step in zip(lesson.notebook.cells, lesson.steps, strict=True):
-        by_step.setdefault(step, []).append(cell)
-    numbers = [str(n) for n in range(wanted[0], wanted[1] + 1)] if wanted else [*by_step][1:]
     found = []
-    for number in numbers:
-        title = f'{lesson.number} {first_heading(by_step[number][0].source)}'
-        notes = [cell.source for cell in by_step[number] if cell.cell_type == 'raw']
-        if minutes := sum(map(minutes_of_note, notes)):
-            found.append((minutes, title, ' '.join(WRONG.findall('\n'.join(notes)))))
+    for number, minutes in lesson.minutes_by_step.items():
+        if wanted and number not in map(str, range(wanted[0], wanted[1] + 1)):
+            continue
+        cells = [
+            c for c, step in zip(lesson.notebook.cells, lesson.steps, strict=True) if step == number
+        ]
+        title = f'{lesson.number} {first_heading(cells[0].source)}'
+        notes = '\n'.join(cell.source for cell in cells if cell.cell_type == 'raw')
+        found.append((minutes, title, ' '.join(WRONG.findall(notes))))
     return found
 
 

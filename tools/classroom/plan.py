@@ -10,20 +10,28 @@ HEADING = re.compile(r'^### (.+)$', re.MULTILINE)
 
 
 class Plan(NamedTuple):
-    """What happens, as (minutes, text); and by file which steps of a lesson, None for all."""
+    """What happens, as (minutes, text)."""
 
     title: str
     rows: list[tuple[str, str]]
 
     @property
     def steps(self) -> dict[str, tuple[int, int] | None]:
-        """The lessons in their order, by file name."""
+        """The lessons in their order, by file name: the first and the last step, None for all."""
         found = {}
         for _, what in self.rows:
-            if link := LINK.match(what):
-                _, path, first, last = link.groups()
-                found[path.rpartition('/')[2]] = (int(first), int(last or first)) if first else None
+            file, steps = lesson_of(what)
+            if file:  # a lesson may come again, with later steps
+                found[file] = steps and (found.get(file, steps)[0], steps[1])
         return found
+
+
+def lesson_of(what: str) -> tuple[str, tuple[int, int] | None]:
+    """Return the file of a row's lesson and its steps, None for all; no file for another row."""
+    if not (link := LINK.match(what)):
+        return '', None
+    _, path, first, last = link.groups()
+    return path.rpartition('/')[2], (int(first), int(last or first)) if first else None
 
 
 NO_PLAN = Plan('', [])

@@ -1,7 +1,6 @@
 """Clean a notebook, so that a diff shows only what changed, and write it at once."""
 
 import hashlib
-import re
 import shutil
 from collections.abc import Iterator
 from copy import deepcopy
@@ -22,7 +21,6 @@ NOTEBOOK_METADATA = {
     MARK: AS_SAVED,
 }
 WIDGET = 'application/vnd.jupyter.widget-view+json'
-OVERWRITTEN = re.compile(r'^.*\r(?=[^\n])', re.MULTILINE)
 
 
 def clean(notebook: NotebookNode) -> NotebookNode:
@@ -67,9 +65,6 @@ def _clean_outputs(cell: NotebookNode) -> list[NotebookNode]:
             output.execution_count = cell.execution_count
         output.get('data', {}).pop(WIDGET, None)
         outputs.append(output)
-    for output in outputs:
-        if output.output_type == 'stream':
-            output.text = OVERWRITTEN.sub('', output.text)
     return outputs
 
 

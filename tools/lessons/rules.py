@@ -14,13 +14,13 @@ from nbval.plugin import comment_markers, metadata_tags
 
 from tools.lessons.code import guess_of, names_of
 from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, tags
-from tools.lessons.slides import LARGEST, PICTURE, SKIPPED, height
+from tools.lessons.slides import LARGEST, PICTURE, height
 
 MAX_CODE_LINES = 24  # what a slide has room for
 MIN_WORDS = 6  # of an alternative text
 TASK = ('exercise', 'check', 'solution')
 FOLDED = {'solution': '%%solution ', 'check': '# ✔ Check of task ', 'harness': '# ', 'notes': NOTE}
-TAGS = {'predict', 'nbval-ignore-output', 'deck-break', *TASK, *FOLDED, *SKIPPED}
+TAGS = {'predict', 'nbval-ignore-output', 'deck-break', *TASK, *FOLDED}
 REASON = '# Not compared: '
 THIS_MACHINE = {str(Path(__file__).resolve().parents[2]), str(Path.home()), sys.prefix} - {'/'}
 PATH = re.compile(

@@ -2,12 +2,8 @@
 
 A title and a step (`#`, `##`) start a slide. What follows joins it as long as it fits: a text
 always with the code that it leads to. A task and a question (`### ✎`, `### Question`) start a slide
-below, unless only text is before them. If the rule is wrong for a cell, a tag of the cell
-(JupyterLab, Property Inspector) changes it:
-
-    deck-break      starts a slide below, although it would fit
-    deck-skip       is left out of the deck
-    notes           is for the instructor: a raw cell, folded in JupyterLab, left out of the deck
+below, unless only text is before them; a cell with the tag `deck-break` does so, too (JupyterLab,
+Property Inspector). A raw cell is a note for the instructor, and left out.
 """
 
 import ast
@@ -19,7 +15,6 @@ from nbformat import NotebookNode
 
 from tools.lessons.lesson import tags
 
-SKIPPED = {'deck-skip', 'notes'}
 SENTENCE = 16.0  # a text below this height has no slide of its own
 
 # The sizes of deck.css, in hundredths of the slide's height. Letters are taken a little wider than
@@ -42,7 +37,7 @@ PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 
 def slide_types(notebook: NotebookNode) -> list[str]:
     """Return the slide type of each cell: slide, subslide, skip, or nothing if it goes on."""
-    types = ['skip' if tags(cell) & SKIPPED else '' for cell in notebook.cells]
+    types = ['skip' if cell.cell_type == 'raw' else '' for cell in notebook.cells]
     slide: list[list[int]] = []  # its groups
     for group in _groups(notebook):
         cells = [notebook.cells[i] for i in group]
@@ -65,7 +60,7 @@ def _groups(notebook: NotebookNode) -> list[list[int]]:
     """Return the cells that are shown, by index, in groups: text, and the code that it leads to."""
     groups: list[list[int]] = []
     for i, cell in enumerate(notebook.cells):
-        if tags(cell) & SKIPPED:
+        if cell.cell_type == 'raw':
             continue
         joins = cell.cell_type != 'markdown' and 'deck-break' not in tags(cell)
         fits = groups and _height(notebook, [[*groups[-1], i]]) <= SLIDE
@@ -95,7 +90,7 @@ def heading(cell: NotebookNode, form: str) -> bool:
 
 def height(cell: NotebookNode) -> float:
     """Return about how high a cell is with its outputs, in hundredths of the slide's height."""
-    if tags(cell) & SKIPPED or cell.cell_type == 'raw':
+    if cell.cell_type == 'raw':
         return 0.0
     if cell.cell_type == 'markdown':
         source = UNFOLDED.sub(r'\1', cell.source)  # a reader unfolds one part at a time

@@ -1,7 +1,7 @@
 """Run the notebooks in hard conditions, once in each: `make soak`, before a release.
 
     python -m tools.soak
-    python -m tools.soak --conditions interrupt,kill --lesson "02 03"
+    python -m tools.soak --conditions interrupt kill --lesson "02 03"
 
 It prints a line for each run, and at its end what failed. Ctrl+C ends it.
 """
@@ -9,24 +9,20 @@ It prints a line for each run, and at its end what failed. Ctrl+C ends it.
 from __future__ import annotations
 
 import argparse
-import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
 from tools.lessons.lesson import ROOT, chosen
 
-# Each with the mode of plugin.py, and the number of busy processes beside the run.
-CONDITIONS = {
-    'idle': ('once', 0),
-    'busy': ('once', 4),
-    'twice': ('twice', 0),
-    'interrupt': ('interrupt', 0),
-    'kill': ('kill', 0),
-}
+CONDITIONS = ('idle', 'busy', 'twice', 'interrupt', 'kill')  # plugin.py says what they do
+BUSY_LOOPS = 4  # beside a run that is `busy`
+COLOURS = re.compile(r'#x1B\[[0-9;]*m')  # of IPython's tracebacks, as pytest's report has them
 RUN_TIMEOUT_S = 1800.0
 # What would be in the home otherwise.
 STATE = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR', 'IPYTHONDIR')
@@ -50,7 +46,6 @@ def run(notebook: Path, condition: str) -> dict[str, str]:
 
     The run has a /dev/shm, a table of processes, a home and a temporary folder of its own.
     """
-    mode, busy_loops = CONDITIONS[condition]
     with tempfile.TemporaryDirectory(prefix='soak-', ignore_cleanup_errors=True) as temporary:
         folder = Path(temporary)
         for part in ('home', 'tmp', 'state'):
@@ -59,10 +54,10 @@ def run(notebook: Path, condition: str) -> dict[str, str]:
         variables |= dict.fromkeys(STATE, f'{folder}/state')
         before = _files_of(folder)
         loop = [sys.executable, '-ISc', 'while True: pass']
-        loops = [subprocess.Popen(loop) for _ in range(busy_loops)]
+        loops = [subprocess.Popen(loop) for _ in range(BUSY_LOOPS if condition == 'busy' else 0)]
         try:
             status = subprocess.run(
-                _command(notebook, mode, folder),
+                _command(notebook, condition, folder),
                 cwd=ROOT,
                 env=variables,
                 stdin=subprocess.DEVNULL,
@@ -75,9 +70,7 @@ def run(notebook: Path, condition: str) -> dict[str, str]:
             for each in loops:
                 each.kill()
                 each.wait()
-        rows = [json.loads(line) for line in _lines(folder / 'report.jsonl')]
-        failed = {row['item']: row['failed'] for row in rows if row['failed']}
-        held = {file for row in rows for file in row.get('held', ())}
+        failed, held = _reported(folder / 'report.xml')
         left = [line for line in _lines(folder / 'left') if not any(file in line for file in held)]
         left += sorted(f'{file} has changed.' for file in _files_of(folder) - before)
         if status and not failed:
@@ -89,15 +82,31 @@ def run(notebook: Path, condition: str) -> dict[str, str]:
     return failed
 
 
-def _command(notebook: Path, mode: str, folder: Path) -> list:
+def _command(notebook: Path, condition: str, folder: Path) -> list:
     return [
         *('unshare', '--mount', '--pid', '--fork', '--kill-child', '--mount-proc'),
         *('sh', '-c', INSIDE, folder, sys.executable),
         *(sys.executable, '-m', 'pytest', notebook, '-c', ROOT / 'pyproject.toml'),
         *('--rootdir', ROOT, '-p', 'no:cacheprovider', '--color=no', '-n', '0'),
-        *('-o', 'faulthandler_timeout=0', '-p', 'tools.soak.plugin'),
-        *('--soak-mode', mode, '--soak-report', folder / 'report.jsonl'),
+        *('-o', 'faulthandler_timeout=0', '--junit-xml', folder / 'report.xml'),
+        *('-p', 'tools.soak.plugin', '--soak', condition),
     ]
+
+
+def _reported(file: Path) -> tuple[dict[str, str], list[str]]:
+    """Return how cells failed, by name, and the shared memory that a killed kernel held."""
+    if not file.exists():
+        return {}, []
+    report = ElementTree.parse(file)
+    failed = {
+        # nbval's `Cell 0` is called as the tests call it: `code cell 1`.
+        re.sub(r'Cell (\d+)', lambda cell: f'code cell {int(cell[1]) + 1}', case.get('name')): (
+            COLOURS.sub('', problem.text)
+        )
+        for case in report.iter('testcase')
+        for problem in [*case.iter('failure'), *case.iter('error')]
+    }
+    return failed, [one.get('value') for one in report.iter('property')]
 
 
 def _lines(file: Path) -> list[str]:
@@ -117,12 +126,9 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog='make soak', description='Run the notebooks in hard conditions.'
     )
-    parser.add_argument('--conditions', default='', metavar='A,B', help=', '.join(CONDITIONS))
+    parser.add_argument('--conditions', nargs='+', choices=CONDITIONS, default=CONDITIONS)
     parser.add_argument('--lesson', default='', metavar='NN', help='for example 02 or "02 03"')
     options = parser.parse_args(arguments)
-    wanted = options.conditions.replace(',', ' ').split() or list(CONDITIONS)
-    if unknown := set(wanted) - CONDITIONS.keys():
-        parser.error(f'There is no condition {min(unknown)!r}: take of {", ".join(CONDITIONS)}.')
     try:
         paths = chosen(options.lesson)
     except ValueError as error:
@@ -130,7 +136,7 @@ def main(arguments: list[str] | None = None) -> int:
     if os.getuid():
         parser.error('Each run has a /dev/shm of its own, which only root can mount: use sudo.')
     texts = []
-    for condition in wanted:
+    for condition in options.conditions:
         for path in paths:
             if '"cell_type": "code"' not in path.read_text('utf-8'):
                 continue

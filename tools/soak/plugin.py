@@ -1,19 +1,18 @@
 """A plugin for pytest beside nbval: it runs the cells of a notebook in harder ways.
 
-The comparison stays nbval's own, with the settings of pyproject.toml. `--soak-mode` says how:
+The comparison stays nbval's own, with the settings of pyproject.toml. `--soak` says how:
 
-- `once`       as nbval does
-- `twice`      each cell twice, then all cells again in the same kernel
-- `interrupt`  each cell is interrupted at a random time, then run again and compared
-- `kill`       the kernel is killed in the middle of a random cell, then all cells in a fresh one
+- `idle`, `busy`: as nbval does
+- `twice`: each cell twice, then all cells again in the same kernel
+- `interrupt`: each cell is interrupted at a random time, then run again and compared
+- `kill`: the kernel is killed in the middle of a random cell, then all in a fresh one
 
 After the last cell, and after each interrupt, the kernel must have nothing that it had not at its
-start. A line of JSON for each cell goes to the file `--soak-report`.
+start.
 """
 
 from __future__ import annotations
 
-import json
 import random
 import re
 import time
@@ -46,37 +45,13 @@ COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the options of this plugin."""
-    group = parser.getgroup('soak')
-    group.addoption('--soak-mode', choices=('once', 'twice', 'interrupt', 'kill'), default='once')
-    group.addoption('--soak-report', type=Path)
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Report what the cells do."""
-    config.pluginmanager.register(_Report(config.option.soak_report))
-
-
-class _Report:
-    """Writes one line of JSON for what was done, and for what failed before and after it."""
-
-    def __init__(self, file: Path) -> None:
-        self.file = file
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if report.when == 'call' or report.failed:
-            # nbval's `Cell 0` is called as the tests call it: `code cell 1`.
-            name = report.nodeid.rpartition('::')[2]
-            item = re.sub(r'Cell (\d+)', lambda found: f'code cell {int(found[1]) + 1}', name)
-            failed = COLOURS.sub('', report.longreprtext) if report.failed else None
-            row = {'item': item, 'failed': failed, **dict(report.user_properties)}
-            with self.file.open('a', encoding='utf-8') as file:
-                print(json.dumps(row), file=file)
+    """Add the option of this plugin."""
+    parser.addoption('--soak', default='idle')
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Give each notebook the cells that the mode asks for."""
-    mode, plain, items[:] = config.option.soak_mode, list(items), []
+    """Give each notebook the cells that the condition asks for."""
+    mode, plain, items[:] = config.option.soak, list(items), []
     for _, group in groupby(plain, key=lambda item: item.parent):
         cells = list(group)
         items.append(_look_after(cells[0], 'the first look'))
@@ -206,8 +181,8 @@ def fresh_kernel(item: IPyNbCell, cells_to_run: int) -> None:
     file = item.parent
     with suppress(psutil.NoSuchProcess):
         psutil.Process(file.kernel.km.provisioner.pid).suspend()  # it holds what is noted
-    held = [str(path) for path in Path('/dev/shm').glob('fastrtps_*')]
-    item.user_properties.append(('held', held))  # nobody could remove it
+    for path in Path('/dev/shm').glob('fastrtps_*'):
+        item.user_properties.append(('held', path))  # nobody could remove it
     file.kernel.stop()
     file.setup()
     file.kernel.await_idle(file.kernel.execute_cell_input(LOOK), ANSWER_TIMEOUT_S)

@@ -125,7 +125,7 @@ async def teach(hub: Hub) -> None:
         # All in one domain, and not on their own machine only. Nobody hears anybody else.
         kernels = {student.name: student.kernels[LESSONS[0].name] for student in others}
         await talk(kernels, 'domain_id=42, discovery="SUBNET"')
-        await listen(kernels, {})
+        await listen(kernels)
         for student in others:
             await use(student)
     finally:

@@ -92,7 +92,8 @@ def test_a_student_stops_and_goes_on(lab, make, podman, port):
     assert not subprocess.run([*podman, 'healthcheck', 'run', 'lab']).returncode
     # The port is the student's machine's only, and another container cannot have it.
     done = make('lab-container', f'PORT={port}', f'RUN_ARGS={LIMITS}', f'LESSONS={mine}-2')
-    assert f'The port {port} is already in use' in done.stdout
+    assert done.returncode
+    assert 'in use' in done.stdout
     [notebook] = mine.glob(f'ros2_notebooks/??_{LESSON}.ipynb')
     written = notebook.read_text().replace('**You will do**', 'I have written this.')
     notebook.write_text(written)

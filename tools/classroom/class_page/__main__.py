@@ -38,16 +38,15 @@ async def hold(store: ClassStore, options: argparse.Namespace) -> None:
     asyncio.get_running_loop().add_signal_handler(signal.SIGINT, over.set)
     room = Room(store, stop=over.set)
     address = '0.0.0.0' if options.lan else '127.0.0.1'
-    tls = options.ssl_cert and {'certfile': options.ssl_cert, 'keyfile': options.ssl_key}
     sockets = bind_sockets(options.port, address, socket.AF_INET)
-    server = serve(application(room), sockets, tls or None)
+    server = serve(application(room), sockets)
     port = sockets[0].getsockname()[1]
-    page = f'{"https" if tls else "http"}://localhost:{port}/{store.secret}/'
+    page = f'http://localhost:{port}/{store.secret}/'
     one, *others = (options.lan and in_networks()) or ['127.0.0.1']
     room.joins = [
         '# Type this into a new cell of a lesson, then press Shift+Enter:',
         'from helpers.classroom import *',
-        f"join_class('{'https://' if tls else ''}{one}:{port}', '{store.code}')",
+        f"join_class('{one}:{port}', '{store.code}')",
     ]
     print('For the wall:', *room.joins, sep='\n    ')
     if others:
@@ -77,12 +76,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument('--port', type=int, default=8765)
     parser.add_argument('--root', type=Path, default=ROOT, help='of the lessons')
     parser.add_argument('--no-browser', dest='browser', action='store_false')
-    parser.add_argument('--ssl-cert', help='a certificate, as that of the hub')
-    parser.add_argument('--ssl-key')
     options = parser.parse_args(arguments)
-    tls = options.ssl_cert, options.ssl_key
-    if any(tls) and not all(file and Path(file).is_file() for file in tls):
-        parser.error('--ssl-cert and --ssl-key must both name a file.')
     folder().mkdir(mode=0o700, parents=True, exist_ok=True)
     try:
         # Until this process ends: another class, at its end, would delete what this one was told.
@@ -96,11 +90,10 @@ def main(arguments: list[str] | None = None) -> int:
     except OSError as error:
         store.close()
         print(
-            f'Port {options.port} cannot be used ({error.strerror}). Is another class open? ',
-            end='',
+            f'Port {options.port} cannot be used ({error.strerror}). Is another class open? '
+            f'Name another one: make class PORT={options.port + 1}',
             file=sys.stderr,
         )
-        print(f'Name another one: make class PORT={options.port + 1}', file=sys.stderr)
         return 1
     store.end()
     print('The class is over. What it was told is deleted.')

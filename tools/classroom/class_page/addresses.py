@@ -16,12 +16,8 @@ def in_networks() -> list[str]:
         for one in interface
         if one.family == socket.AF_INET and not one.address.startswith(THIS_MACHINE)
     ]
-    first = _towards_the_internet()
-    return sorted(found, key=lambda address: address != first)
-
-
-def _towards_the_internet() -> str:
     with socket.socket(type=socket.SOCK_DGRAM) as nothing_is_sent, suppress(OSError):
         nothing_is_sent.connect(('192.0.2.1', 9))
-        return nothing_is_sent.getsockname()[0]
-    return ''
+        first = nothing_is_sent.getsockname()[0]
+        found.sort(key=lambda address: address != first)
+    return found

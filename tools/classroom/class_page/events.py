@@ -1,7 +1,6 @@
 """What a student's computer may send. Everything else is refused with one sentence."""
 
 import json
-import time
 
 from jsonschema import Draft202012Validator
 
@@ -59,25 +58,3 @@ def is_event(event: object) -> bool:
     """Return whether an event has the form of its kind."""
     kind = event.get('kind') if isinstance(event, dict) else None
     return isinstance(kind, str) and kind in KINDS and KINDS[kind].is_valid(event)
-
-
-class Limit:
-    """Allows `rate` things a second for long, and `burst` at once."""
-
-    def __init__(self, rate: float, burst: int) -> None:
-        self.rate, self.burst = rate, burst
-        self._left, self._at = float(burst), time.monotonic()
-
-    def left(self) -> float:
-        """Return how many things are allowed now."""
-        now = time.monotonic()
-        self._left = min(self.burst, self._left + (now - self._at) * self.rate)
-        self._at = now
-        return self._left
-
-    def take(self, count: int = 1) -> bool:
-        """Return whether `count` things are allowed now, and count them if they are."""
-        if self.left() < count:
-            return False
-        self._left -= count
-        return True

@@ -25,34 +25,13 @@ name=${container%% *}
 $container version > /dev/null 2>&1 ||
     fail "${name##*/} does not answer: start it (podman machine start, Docker Desktop, or sudo systemctl start docker), then try again."
 
-# The command's own words stay on the screen. If it fails, a sentence follows where the cause is known.
-trouble() { # FILE with what the command said
-    if grep -qi 'no space left on device' "$1"; then
-        say='The disk is full: the image needs 5 GB while it is made. Remove old ones with `podman image prune` or `docker image prune`, then try again.'
-    elif [ -n "${port-}" ] && grep -qiE 'address already in use|port is already allocated|ports are not available' "$1"; then
-        say="The port $port is already in use: choose another one, for example \`make lab-container PORT=8890\`."
-    else
-        return 0
-    fi
-    printf '%s\n' "$say" >&2
-}
-watched() {
-    said=$(mktemp)
-    # The status of the command, not that of tee.
-    { "$@" 2>&1 && echo 0 > "$said.status" || echo $? > "$said.status"; } | tee "$said"
-    status=$(cat "$said.status")
-    [ "$status" = 0 ] || trouble "$said"
-    rm -f "$said" "$said.status"
-    return "$status"
-}
-
 make_image() {
     set -- --file Containerfile --tag "$image" --label "lessons=$inside" ${BASE:+--build-arg "BASE=$BASE"}
     # The wheels of ROS 2 are for x86-64; a base with ROS 2 is for the machine that it is on.
     case ${BASE-} in *ros:*) ;; *) [ "$(uname -m)" = x86_64 ] || set -- "$@" --platform linux/amd64 ;; esac
     # Podman's own format of images has no health check.
     case $($container --version) in *podman*) set -- "$@" --format docker ;; esac
-    watched $container build "$@" ${IMAGE_ARGS-} .
+    $container build "$@" ${IMAGE_ARGS-} .
 }
 
 run_lab() {
@@ -73,7 +52,7 @@ run_lab() {
         case $($container --version) in *podman*) set -- --userns=keep-id ;; esac
     fi
     [ ! -t 0 ] || set -- "$@" --interactive --tty
-    watched $container run --rm "$@" --user "$user:$group" --shm-size=256m \
+    $container run --rm "$@" --user "$user:$group" --shm-size=256m \
         --publish "127.0.0.1:$port:$port" --env "JUPYTER_PORT=$port" \
         --volume "$lessons:/home/student" ${RUN_ARGS-} "$image"
 }

@@ -5,7 +5,6 @@ student's server runs in a container of the image of `make image`, with limits o
 """
 
 import asyncio
-import errno
 import os
 import socket
 import subprocess
@@ -42,18 +41,17 @@ class Proxy(ConfigurableHTTPProxy):
         """Start it, or end the hub with a sentence."""
         self._check_previous_process()  # one that a hub has left, which was killed
         where = urlsplit(self.public_url)
-        with socket.socket() as one:
-            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                one.bind((where.hostname, where.port or (443 if where.scheme == 'https' else 80)))
-            except OSError as problem:
-                if problem.errno == errno.EADDRINUSE:
-                    self.log.critical(
-                        'The port of %s is already in use: choose another one, for example '
-                        "`make hub HUB_ARGS='--url=http://127.0.0.1:8001'`.",
-                        self.public_url,
-                    )
-                    self.app.exit(1)
+        port = where.port or (443 if where.scheme == 'https' else 80)
+        try:
+            socket.create_server((where.hostname, port)).close()
+        except OSError as problem:
+            self.log.critical(
+                'The port of %s cannot be used (%s): choose another one, for example '
+                "`make hub HUB_ARGS='--url=http://127.0.0.1:8001'`.",
+                self.public_url,
+                os.strerror(problem.errno),
+            )
+            self.app.exit(1)
         await super().start()
 
 
