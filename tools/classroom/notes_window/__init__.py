@@ -16,6 +16,7 @@ from jupyter_server.utils import url_path_join
 from nbconvert.filters import markdown2html
 from tornado import web
 
+from helpers._plumbing.look import LOOK_FILE
 from tools.classroom.class_page import page_file
 from tools.classroom.notes import of_step
 from tools.classroom.present import FOLDER, Copies, deck, deck_file
@@ -23,9 +24,10 @@ from tools.lessons.clean import write
 
 HERE = Path(__file__).resolve().parent
 FILES = {  # by the name in the address
-    '': ('window.html', 'text/html'),
-    'window.css': ('window.css', 'text/css'),
-    'window.js': ('window.js', 'text/javascript'),
+    '': (HERE / 'window.html', 'text/html'),
+    'look.css': (LOOK_FILE, 'text/css'),
+    'window.css': (HERE / 'window.css', 'text/css'),
+    'window.js': (HERE / 'window.js', 'text/javascript'),
 }
 
 
@@ -85,7 +87,7 @@ class Window(JupyterHandler):
         elif name in FILES:
             file, kind = FILES[name]
             self.set_header('Content-Type', f'{kind}; charset=UTF-8')
-            self.finish((HERE / file).read_bytes())
+            self.finish(file.read_bytes())
         else:
             raise web.HTTPError(404)
 

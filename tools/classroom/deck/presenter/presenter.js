@@ -52,8 +52,8 @@ async function begin(app, tracker, actions, { makeRequest }, dialog) {
     return answer;
   };
   server = { baseUrl, ask, open: path => app.commands.execute('docmanager:open', { path }) };
-  const style = element('link', { rel: 'stylesheet', href: `${baseUrl}lab/extensions/presenter/deck.css` });
-  document.head.append(style);
+  for (const file of ['notes/look.css', 'lab/extensions/presenter/deck.css'])
+    document.head.append(element('link', { rel: 'stylesheet', href: baseUrl + file }));
   document.body.append(head, line, back);
   back.onclick = () => show(tracker.currentWidget);
   const fetched = ask('deck/state').then(async answer => (kept = { ...kept, ...(await answer.json()) })).catch(console.warn);
