@@ -3,16 +3,15 @@
 import os
 import signal
 import tempfile
-from functools import partial
 from itertools import count
 from pathlib import Path
 
-import nbval.kernel
 import pytest
 from hypothesis import settings
 from jupyter_client.manager import KernelManager
 
 from helpers.progress import FILE_VARIABLE
+from tools.lessons.comparison import start_kernels_by
 
 # No test reads or changes what the user of this checkout has solved. Kernels inherit it.
 os.environ[FILE_VARIABLE] = ''
@@ -46,5 +45,4 @@ def pytest_configure(config: pytest.Config) -> None:
         file = Path(folder.name, f'{next(number)}.json')
         return KernelManager(transport='ipc', connection_file=str(file), **options)
 
-    config.add_cleanup(partial(setattr, nbval.kernel, 'KernelManager', nbval.kernel.KernelManager))
-    nbval.kernel.KernelManager = kernel_manager
+    config.add_cleanup(start_kernels_by(kernel_manager))

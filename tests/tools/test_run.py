@@ -1,21 +1,18 @@
 """What `make notebooks` saves, and that nbval compares it."""
 
 import os
-import re
 import subprocess
 import sys
 from html import unescape
-from pathlib import Path
 
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
-from nbval.plugin import get_sanitize_patterns
 
 from tools.lessons import rules, run
 from tools.lessons.clean import WIDGET, clean, text_of
+from tools.lessons.comparison import MASKS, masked
 
-SANITIZE = Path(__file__).parents[1] / 'nbval_sanitize.cfg'
 RANDOM_LOG = """\
 import random
 for number in random.sample(range(1000), k=random.randint(5, 15)):
@@ -154,25 +151,19 @@ def test_nbval_agrees_with_what_the_tool_saves(tmp_path, monkeypatch):
 
 def nbval(path):
     """Run nbval as `make test` does; return what it printed."""
-    options = ['--nbval', '--nbval-current-env', f'--nbval-sanitize-with={SANITIZE}']
+    options = ['--nbval', '--nbval-current-env', f'--nbval-sanitize-with={MASKS}']
     command = [sys.executable, '-m', 'pytest', '-q', '-p', 'no:cacheprovider', *options, str(path)]
     return subprocess.run(command, cwd=path.parent, capture_output=True, text=True).stdout
-
-
-def sanitized(text):
-    for regex, replacement in get_sanitize_patterns(SANITIZE.read_text(encoding='utf-8')):
-        text = re.sub(regex, replacement, text)
-    return text
 
 
 def test_only_the_log_of_the_slow_subscriber_is_replaced():
     line = '[INFO] [slow_subscriber]: I heard: "Hello World: {}"\n'
     log = ''.join(line.format(count) for count in range(5))
-    assert sanitized(f'before\n{log}after\n') == 'before\n<what slow_subscriber heard>\nafter\n'
-    assert sanitized(log + line.format(17)) == sanitized(log)
+    assert masked(f'before\n{log}after\n') == 'before\n<what slow_subscriber heard>\nafter\n'
+    assert masked(log + line.format(17)) == masked(log)
     for compared in (
         log.replace('slow_subscriber', 'minimal_subscriber'),
         log.replace('INFO', 'WARN'),
         log.replace('I heard', 'I lost'),
     ):
-        assert sanitized(compared) == compared
+        assert masked(compared) == compared

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from nbformat import NotebookNode
-from nbval.plugin import comment_markers, metadata_tags
 
 from tools.lessons.code import guess_of, names_of
+from tools.lessons.comparison import comment_markers, metadata_tags
 from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, tags
 from tools.lessons.slides import LARGEST, PICTURE, height
 

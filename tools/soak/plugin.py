@@ -25,8 +25,8 @@ from queue import Empty
 import psutil
 import pytest
 from nbformat.v4 import new_code_cell
-from nbval.kernel import RunningKernel
-from nbval.plugin import IPyNbCell, IPyNbFile
+
+from tools.lessons.comparison import IPyNbCell, IPyNbFile, RunningKernel
 
 LOOK = '__import__("tools.soak.leftovers", fromlist=["look"]).look()'
 SHORTEST_S, LONGEST_S = 0.001, 10.0
