@@ -16,8 +16,7 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 
 from helpers._plumbing.values import RUN_COLUMNS
 
-CALL_COLUMNS = ['client', 'service', 'caller', 'run', 'style', 'sent_s', 'answered_s', 'answer']
-CALL_COLUMNS += ['resumed_by']
+CALL_COLUMNS = ['client', 'service', 'caller', 'run', 'sent_s', 'answered_s', 'answer']
 
 
 def number_of(message) -> int:
@@ -44,14 +43,13 @@ class CallbackRun:
     """One run of a callback: when it started (`time.monotonic`, in seconds), and in which thread.
 
     `finished_s` is None while it runs. `seq` is the number of its message, if that is recorded.
-    `resumed_by` is the thread that finished it, if it is a coroutine. Threads are their idents.
+    Threads are their idents.
     """
 
     started_s: float
     thread: int
     finished_s: float | None = None
     seq: int | None = None
-    resumed_by: int | None = None
 
     @property
     def running(self) -> bool:
@@ -218,7 +216,6 @@ class CallbackRecording:
     def __init__(self, **watched) -> None:
         self.runs: dict[str, list[CallbackRun]] = {name: [] for name in watched}
         self._watched = watched
-        self._coroutines: set[str] = set()  # the names of callbacks that can await
         self._calls: list[dict] = []
         self._answers: dict[object, CallbackRun] = {}  # the client's run that took each future
         for name, thing in watched.items():
@@ -230,8 +227,6 @@ class CallbackRecording:
     def watch(self, name: str, callback: Callable) -> Callable:
         """Return the callback, which is recorded under this name from now on."""
         runs = self.runs.setdefault(name, [])
-        if inspect.iscoroutinefunction(callback):
-            self._coroutines.add(name)
 
         def start(*arguments) -> CallbackRun:
             run = CallbackRun(time.monotonic(), threading.get_ident())
@@ -239,8 +234,6 @@ class CallbackRecording:
             return run
 
         def finish(run: CallbackRun) -> None:
-            if name in self._coroutines:
-                run.resumed_by = threading.get_ident()
             run.finished_s = time.monotonic()
 
         return _surround(callback, start, finish)
@@ -259,9 +252,8 @@ class CallbackRecording:
 
         @functools.wraps(call_async)
         def recorded_call_async(request):
-            waiting = getattr(waits, 'here', False)
-            made = {'client': name, 'caller': self._running(), 'waits': waiting}
-            made |= {'sent': time.monotonic(), 'future': None}
+            caller = self._running() if getattr(waits, 'here', False) else None
+            made = {'client': name, 'caller': caller, 'sent': time.monotonic(), 'future': None}
             self._calls.append(made)
             made['future'] = call_async(request)
             return made['future']
@@ -284,21 +276,6 @@ class CallbackRecording:
         runs = [run for runs in self.runs.values() for run in runs if run.running]
         own = (run for run in runs if run.thread == here)
         return max(own, key=lambda run: run.started_s, default=None)
-
-    def finished(self, name: str) -> int:
-        """Return how many runs have finished."""
-        return sum(not run.running for run in self.runs[name])
-
-    def inside(self, inner: str, outer: str) -> int:
-        """Return how many runs of `inner` started while a run of `outer` was going on."""
-        return sum(
-            any(
-                other.started_s <= run.started_s
-                and (other.running or run.started_s < other.finished_s)
-                for other in self.runs[outer]
-            )
-            for run in self.runs[inner]
-        )
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return for each name a table like that of `Recording`, one row a run, for a timeline.
@@ -328,20 +305,19 @@ class CallbackRecording:
         """Return when the first run of all started, and the names of the threads by their ids."""
         every = [run for runs in self.runs.values() for run in runs]
         every.sort(key=lambda run: run.started_s)
-        idents = [ident for run in every for ident in (run.thread, run.resumed_by) if ident]
-        names = {ident: f'thread {i}' for i, ident in enumerate(dict.fromkeys(idents), 1)}
+        idents = dict.fromkeys(run.thread for run in every)
+        names = {ident: f'thread {i}' for i, ident in enumerate(idents, 1)}
         return (every[0].started_s if every else 0.0), names
 
     def calls(self) -> pd.DataFrame:
         """Return one row for each request that a client which is watched has sent.
 
         Columns: `client` and `service` (names; the service is None if it is not watched),
-        `caller` and `run` (the callback that sent it, and which of its runs; None if none is
-        watched), `style` ('call', 'await' if a coroutine sent it, or 'send'), `sent_s` and
-        `answered_s` (seconds, as in `tables`; NaN if no answer was taken), `answer` (which of
-        the client's runs took it), `resumed_by` (the thread that finished the coroutine, or None).
+        `caller` and `run` (the callback that waits in `call`, and which of its runs; None if none
+        that is watched waits), `sent_s` and `answered_s` (seconds, as in `tables`; NaN if no answer
+        was taken), `answer` (which of the client's runs took it).
         """
-        zero, names = self._zero_and_threads()
+        zero, _ = self._zero_and_threads()
         services = {
             thing.srv_name: name
             for name, thing in self._watched.items()
@@ -352,20 +328,17 @@ class CallbackRecording:
         }
         rows = []
         for made in list(self._calls):
-            answer, run = self._answers.get(made['future']), made['caller']
-            caller, seq = place.get(run, (None, None))
-            awaits = caller in self._coroutines
+            answer = self._answers.get(made['future'])
+            caller, seq = place.get(made['caller'], (None, None))
             rows.append(
                 {
                     'client': made['client'],
                     'service': services.get(self._watched[made['client']].srv_name),
                     'caller': caller,
                     'run': seq,
-                    'style': 'call' if made['waits'] else 'await' if awaits else 'send',
                     'sent_s': made['sent'] - zero,
                     'answered_s': answer.started_s - zero if answer else math.nan,
                     'answer': place[answer][1] if answer else None,
-                    'resumed_by': names[run.resumed_by] if run and run.resumed_by else None,
                 }
             )
         return pd.DataFrame(rows, columns=CALL_COLUMNS)
@@ -374,7 +347,7 @@ class CallbackRecording:
         """Return for each name, in its row, what it is and its callback group.
 
         Columns: `kind` ('Timer', 'Service', 'Client', 'Subscription'), `group` (the first name that
-        is in the same group), `exclusive` (bool).
+        is in the same group), `exclusive` and `coroutine` (bool).
         """
         first: dict[int, str] = {}
         rows = {}
@@ -382,8 +355,10 @@ class CallbackRecording:
             group = thing.callback_group
             first.setdefault(id(group), name)
             exclusive = not isinstance(group, ReentrantCallbackGroup)
-            rows[name] = type(thing).__name__, first[id(group)], exclusive
-        return pd.DataFrame.from_dict(rows, 'index', columns=['kind', 'group', 'exclusive'])
+            coroutine = inspect.iscoroutinefunction(getattr(thing, 'callback', None))
+            rows[name] = type(thing).__name__, first[id(group)], exclusive, coroutine
+        columns = ['kind', 'group', 'exclusive', 'coroutine']
+        return pd.DataFrame.from_dict(rows, 'index', columns=columns)
 
 
 def _surround(callback: Callable, start: Callable, finish: Callable) -> Callable:

@@ -1,6 +1,5 @@
 """The robot, seen: its pictures in Python, its replay in a JavaScript engine, both in a kernel."""
 
-import base64
 import json
 import math
 import re
@@ -22,7 +21,7 @@ from helpers.robot.body import Body
 from helpers.robot.record import Command, Event, Scan, Step
 from helpers.robot.sensors import Sensors
 from helpers.robot.view import drive_by_hand, replay_drive, watch
-from helpers.robot.view.picture import Track
+from helpers.robot.view.picture import line
 from helpers.session import ros_session
 
 MOST_BYTES = 60_000
@@ -42,7 +41,6 @@ def record_of(shown, index=0):
 def script():
     """Return a function that looks at a drive as the page does, at these milliseconds."""
     context = quickjs.Context()
-    context.add_callable('atob', lambda text: base64.b64decode(text).decode('latin-1'))
     context.eval((FOLDER / 'drive.js').read_text())
     context.eval("""function looked(record, times) {
         const run = drive(record);
@@ -102,12 +100,11 @@ def test_the_page_shows_where_the_robot_was(script, long_drive):
 
 @given(st.lists(st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)), min_size=1, max_size=60))
 def test_a_track_passes_all_its_points(steps):
-    track, points, x, y = Track(), [], 0.0, 0.0
+    points, x, y = [], 0.0, 0.0
     for dx, dy in steps:
         x, y = x + dx, y + dy
         points.append((x, y))
-        track.add(x, y)
-    drawn = [tuple(map(float, point.split())) for point in track.line()[1:].split('L')]
+    drawn = [tuple(map(float, point.split())) for point in line(points)[1:].split('L')]
     assert math.dist(drawn[-1], points[-1]) < 0.01
     for point in points:
         assert (

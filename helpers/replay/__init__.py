@@ -24,7 +24,7 @@ from helpers.replay.script import attribute, javascript, script, style
 SCRIPT = 'model.js', 'walk.js', 'element.js', 'board.js', 'view.js'
 SCRIPT_OF_CALLS = 'circle.js', *SCRIPT
 SCRIPT_OF_DRIVES = 'element.js', 'view.js'
-KINDS = ARRIVE, TAKE, END, 'go', 'resume'  # as walk.js numbers them
+KINDS = ARRIVE, TAKE, END, 'go'  # as walk.js numbers them
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
 MAX_MESSAGES = 10_000
 SAFE = "!$'()*+,-./:;=?@_~ "  # may stand in the address of an image, in double quotes
@@ -77,10 +77,9 @@ class Replay:
 
     def __str__(self) -> str:
         """Return what is true each time: nbval compares it."""
-        return ' '.join(
-            f'{run.name}: {run.summary}' if run.name else f'Replay: {run.summary}'
-            for run in self.runs
-        )
+        if any(run.name for run in self.runs):
+            return ' '.join(f'{run.name}: {run.summary}' for run in self.runs)
+        return f'Replay: {" ".join(run.summary for run in self.runs)}'
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         starts, ends = zip(*(run.span_s for run in self.runs), strict=True)

@@ -11,7 +11,7 @@ from helpers._plumbing.values import check_count
 from helpers.recording import CallbackRecording
 from helpers.replay import Replay, fill_up
 from helpers.replay.events import ARRIVE, END, TAKE
-from helpers.replay.recorded import GO, RESUME, Callback, Move, count_of, run_of
+from helpers.replay.recorded import GO, Callback, Move, count_of, run_of
 from helpers.replay.script import javascript
 
 WORDS = {'Timer': 'tick', 'Service': 'request', 'Client': 'answer'}
@@ -23,16 +23,15 @@ def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
     """Return what a recording has seen until now, to step through.
 
     `threads` is how many the executor of all its callbacks has. The recording must watch timers,
-    services, clients: each with its own callback group. Call it while a callback hangs, or when
-    all have ended.
+    subscriptions, services, clients: each with its own callback group. Call it while a callback
+    hangs, or when all have ended. It shows what waits in `Client.call`.
 
-    Raises ValueError, with one sentence, if nothing ran, if a call gave up without an answer, or if
-    the runs of one callback called differently.
+    Raises ValueError, with one sentence, if nothing ran, if a callback is a coroutine, if a call
+    gave up without an answer, or if the runs of one callback called differently.
     """
     check_count('threads', threads)
     tables, calls, groups = recording.tables(), recording.calls(), recording.groups()
     found = {thread for table in tables.values() for thread in table['thread']}
-    found |= set(calls['resumed_by'].dropna())
     if not found:
         raise ValueError('No callback has run yet: there is nothing to step through.')
     thread_names = fill_up(found, threads)
@@ -53,24 +52,24 @@ def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
     return Replay((replace(run, summary=summary, after_s=HANGS_S if stuck else 0.0),))
 
 
-def _steps(name: str, calls: pd.DataFrame, tables: dict, groups: pd.DataFrame) -> list[dict] | None:
+def _steps(name: str, calls: pd.DataFrame, tables: dict, groups: pd.DataFrame) -> list[dict]:
     """Return what each run of a callback does, besides its work, as model.js reads it."""
-    if groups.loc[name, 'kind'] == 'Client':
-        return []
+    if groups.loc[name, 'coroutine']:
+        raise ValueError(f'{name} is a coroutine: a replay shows callbacks that wait in call().')
     index = list(groups.index).index
     own = calls[calls['caller'] == name]
     if own['service'].isna().any():
         raise ValueError(f'{name} asks a service that is not recorded: watch it, too.')
     seen = [
         [
-            {call.style: index(call.service), 'client': index(call.client)}
+            {'call': index(call.service), 'client': index(call.client)}
             for call in own[own['run'] == run].itertuples()
         ]
         for run in tables[name]['seq']
     ]
     if any(steps != seen[0] for steps in seen):
         raise ValueError(f'The runs of {name} called differently: record one run of it.')
-    for call in own[own['answered_s'].isna() & (own['style'] != 'send')].itertuples():
+    for call in own[own['answered_s'].isna()].itertuples():
         if tables[name]['finished_s'].notna()[call.run]:
             raise ValueError(
                 f'{name} ended without its answer: a replay shows calls that wait until it comes.'
@@ -89,24 +88,14 @@ def _moves(
         runs = enumerate(tables[call.service]['started_s'])
         later = ((call.service, run) for run, at in runs if at >= call.sent_s)
         asked.add(next((run for run in later if run not in asked), None))
-    awaits = {
-        (call.caller, call.run): call.resumed_by
-        for call in known[known['style'] == 'await'].itertuples()
-    }
-
+        thread = threads.index(tables[call.caller]['thread'][call.run])
+        yield Move(call.sent_s, GO, names.index(call.caller), thread)
     for name, table in tables.items():
         callback = names.index(name)
         for run in table.itertuples():
             thread = threads.index(run.thread)
-            key = name, run.seq
-            if key not in asked:
+            if (name, run.seq) not in asked:
                 yield Move(run.started_s, ARRIVE, callback, run.seq)
-            yield Move(run.started_s, TAKE, callback, thread, key)
+            yield Move(run.started_s, TAKE, callback, thread)
             if pd.notna(run.finished_s):
-                if key in awaits:
-                    thread = threads.index(awaits[key])
-                    yield Move(run.finished_s, RESUME, callback, thread, key)
                 yield Move(run.finished_s, END, callback, thread)
-    for call in known.itertuples():
-        thread = threads.index(tables[call.caller]['thread'][call.run])
-        yield Move(call.sent_s, GO, names.index(call.caller), thread)

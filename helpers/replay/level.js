@@ -1,8 +1,8 @@
 // A level as a page shows it: lists that can be read, buttons, keys. What may be tried is decided in
 // game.js, and a state is drawn by board.js. Nothing is global: a page may have many levels.
 
-// A level is {goal, options: [{name, values}], variants: [{setup, begun, code, lesson, rclpy}]}: one
-// variant for each combination of the options, the last option changing first.
+// A level is {goal, options: [{name, values}], variants: [{setup, begun, code, lesson, best,
+// rclpy}]}: one variant for each combination of the options, the last option changing first.
 function show(root, level) {
   const WORDS = {
     keep: count => (count ? `${count} lost` : 'none lost'),
@@ -49,7 +49,7 @@ function show(root, level) {
 
   function result() {
     const own = now.score(state);
-    const best = now.best();
+    const { best } = variant;
     const real = variant.rclpy === undefined ? '' : ` What the real rclpy did: ${words(variant.rclpy)}.`;
     return [
       `You: ${words(own)}. The best possible: ${words(best)}.${real}`,

@@ -12,7 +12,7 @@ from helpers.replay import Replay
 from helpers.replay.script import style
 from helpers.robot.floor import Pose
 from helpers.robot.robot import Robot
-from helpers.robot.view.picture import Track, described, picture
+from helpers.robot.view.picture import described, picture
 from helpers.robot.view.replay import bumps, place, replay_drive
 from helpers.robot.view.scans import ScanRecording
 from helpers.session import current_session
@@ -65,7 +65,6 @@ class LiveView:
 
     def __init__(self, robot: Robot, recording: ScanRecording | None) -> None:
         self._record, self._recording = robot.record, recording
-        self._track, self._passed = Track(), 0
         self._display = None
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name='robot view', daemon=True)
@@ -99,12 +98,9 @@ class LiveView:
         record = self._record
         poses, scans, commands = record.poses, record.scans, record.commands
         now = poses[-1]
-        for row in poses[self._passed : len(poses) : EVERY]:
-            self._track.add(row.x, row.y)
-            self._passed += EVERY
         svg = picture(
             record.floor,
-            self._track,
+            [row[1:3] for row in [*poses[::EVERY], now]],
             Pose(now.x, now.y, now.yaw),
             scans[-1].ranges if scans else None,
             [place(record, bump.t_s) for bump in bumps(record)],
