@@ -42,29 +42,6 @@ def record(shown, index=0):
 # The rules against `predict`
 
 
-@tries(260)
-@given(runs(40), st.booleans())
-@example((50, 200, 10, 1, 41), True)
-@example((50, 200, 10, 4, 41), False)
-@example((3, 0, 1, 4, 20), False)
-@example((1, 60, 1, 9, 30), True)
-def test_an_eager_executor_is_the_prediction(script, run, exclusive):
-    period, callback, depth, threads, messages = run
-    setup = {
-        'threads': [f'thread {number}' for number in range(1, threads + 1)],
-        'groups': [{'name': 'group', 'exclusive': exclusive}],
-        'callbacks': [{'name': 'topic', 'group': 0, 'depth': depth, 'does': [{'work': callback}]}],
-        'arrivals': [{'at': seq * period, 'callback': 0, 'seq': seq} for seq in range(messages)],
-    }
-    played = script.call('play', setup)
-    taken = [move['at'] for move in played['done'] if move['do'] == 'take']
-    lost = [out['seq'] for out in played['state']['lost']]
-    table = predict(period / 1000, callback / 1000, depth, 1 if exclusive else threads, messages)
-    assert [1000 * at for at in table['started_s'].dropna()] == pytest.approx(taken)
-    assert lost == table.loc[table['started_s'].isna(), 'seq'].tolist()
-    assert played['circle'] == []
-
-
 @tries(100)
 @given(runs(40), st.booleans())
 def test_a_prediction_is_a_walk(script, run, exclusive):
@@ -220,6 +197,11 @@ def test_only_a_lock_saves_every_update(script):
             'Message 0 holds group: a mutually exclusive group runs one callback at a time.',
         ),
         ([*ARRIVALS, TAKES[0]], {'do': 'go', 'thread': 0}, 'The callback has nothing more to do'),
+        (
+            ARRIVALS,
+            TAKES[0] | {'seq': 1},
+            'A queue gives its oldest first, and message 0 is older.',
+        ),
         ([ARRIVALS[0] | {'at': 2}], ARRIVALS[1] | {'at': 1}, 'Time does not run backwards'),
         (DUE, END | {'at': 2}, 'Not yet: message 1 comes first.'),
         (DUE, END | {'at': 1}, 'Message 0 is not done before 2 s.'),
