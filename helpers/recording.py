@@ -7,7 +7,6 @@ import inspect
 import math
 import threading
 import time
-from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -22,11 +21,9 @@ CALL_COLUMNS = ['client', 'service', 'caller', 'run', 'sent_s', 'answered_s', 'a
 def number_of(message) -> int:
     """Return the number at the end of `message.data`: 7 for `Hello World: 7`, or 7 itself.
 
-    The number of a picture with one pixel is the pixel. Raises ValueError if there is none.
+    Raises ValueError if there is none.
     """
     data = getattr(message, 'data', None)
-    if isinstance(data, array) and len(data) == 1:
-        data = data[0]
     if isinstance(data, int):
         return data
     word = data.rpartition(' ')[2] if isinstance(data, str) else ''
@@ -62,11 +59,8 @@ class Recording:
 
     Both stay plain rclpy objects. `parameters`, for example
     `period_s=0.05`, are what the run was made with: they are in `table().attrs`.
-
-    `Recording.latest` is the newest one, also if its cell was interrupted.
     """
 
-    latest: Recording | None = None
     number_of = staticmethod(number_of)
 
     def __init__(self, publisher, subscription, **parameters) -> None:
@@ -76,7 +70,6 @@ class Recording:
         self._finished: list[CallbackRun] = []  # the same runs, in the order in which they finished
         self._watch_publisher(publisher)
         self._watch_subscription(subscription)
-        Recording.latest = self
 
     def _watch_publisher(self, publisher) -> None:
         publish, clock, append = publisher.publish, time.monotonic, self._published.append

@@ -91,22 +91,10 @@ function show(root, level) {
     draw();
   }
 
-  function walk(by) {
-    const all = buttons();
-    const index = all.indexOf(document.activeElement);
-    all[index < 0 ? 0 : (index + by + all.length) % all.length]?.focus();
+  function leave() {
+    document.activeElement.blur();
+    root.parentElement.closest('[tabindex]')?.focus();
   }
-
-  const KEYS = {
-    ArrowRight: () => walk(1),
-    ArrowDown: () => walk(1),
-    ArrowLeft: () => walk(-1),
-    ArrowUp: () => walk(-1),
-    Escape: () => {
-      document.activeElement.blur();
-      root.parentElement.closest('[tabindex]')?.focus();
-    },
-  };
 
   function onKey(event) {
     const { key, target } = event;
@@ -116,10 +104,10 @@ function show(root, level) {
     event.stopPropagation();
     if (target.tagName === 'SELECT' && key !== 'Escape') return;
     const chosen = buttons()[+key - 1];
-    if (!chosen && !KEYS[key]) return;
+    if (!chosen && key !== 'Escape') return;
     event.preventDefault();
     if (chosen) chosen.click();
-    else KEYS[key]();
+    else leave();
   }
 
   wake(root, 'level');

@@ -23,18 +23,15 @@ NEWS_S = 3.0  # so long an event is shown
 
 
 def watch(
-    robot: Robot,
-    subscription: Subscription | None = None,
-    threads: int = 1,
-    name: str = '',
+    robot: Robot, subscription: Subscription | None = None, name: str = ''
 ) -> ScanRecording | None:
     """Show a robot while this cell runs, and its replay when the session closes.
 
     The replay is also there after an Interrupt, and alone where nobody watches, as under nbval.
 
     With a subscription to the robot's scans one sees, too, which scan its callback works on, how
-    old it is, and which ones wait. `threads` is how many its executor has. `name` is what the
-    replay calls the drive. Returns its recording.
+    old it is, and which ones wait. `name` is what the replay calls the drive. Returns its
+    recording.
 
     Raises TypeError for anything but a robot and a subscription, ValueError for one that does not
     hear the scans, RuntimeError where no session is open.
@@ -47,8 +44,8 @@ def watch(
 
     def end() -> None:
         try:
-            shown = replay_drive(robot.record, recording, threads, name)
-        except ValueError:  # interrupted where the recording does not add up
+            shown = replay_drive(robot.record, recording, name)
+        except ValueError:  # interrupted where it does not add up, or heard by several threads
             shown = replay_drive(robot.record, name=name)
         view.stop(shown)
 

@@ -119,15 +119,14 @@ class Drive:
 def replay_drive(
     record: DriveRecord,
     recording: ScanRecording | None = None,
-    threads: int = 1,
     name: str = '',
 ) -> Replay:
     """Return a drive to step through: the floor, and when `recording` is given, its queue beside.
 
     `record` is `robot.record`, `recording` what `watch` returned for the subscription that commands
-    the robot, `threads` how many its executor has. With the mouse, keys or Play one sees
-    what the robot saw, what it was told, and which scan it acted on. `name` is what this drive is
-    called in words, so that one tells it from others of the page.
+    the robot, in one thread. With the mouse, keys or Play one sees what the robot saw, what it was
+    told, and which scan it acted on. `name` is what this drive is called in words, so that one
+    tells it from others of the page.
 
     Raises TypeError for anything else, ValueError for a recording beside a drive in sim time, and
     what `helpers.replay.replay` raises.
@@ -147,7 +146,7 @@ def replay_drive(
         )
     table = recording.table()
     table[TIMES] += recording.started_s - record.started_s
-    (run,) = replay(table, recording.depth, threads, recording.group).runs
+    (run,) = replay(table, recording.depth).runs
     # How many messages there were differs from run to run.
     said = run.summary.partition(', ')[2]
     drive = Drive(record, summary, recording)
