@@ -11,11 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import pandas as pd
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.service import Service
 
 from helpers._plumbing.values import RUN_COLUMNS
-
-CALL_COLUMNS = ['client', 'service', 'caller', 'run', 'sent_s', 'answered_s', 'answer']
 
 
 def number_of(message) -> int:
@@ -52,6 +50,20 @@ class CallbackRun:
     def running(self) -> bool:
         """Whether it has not finished yet."""
         return self.finished_s is None
+
+
+@dataclass(slots=True)
+class Call:
+    """A request: the names of its client and its service, None if that is not watched.
+
+    `caller` is the run that waits in `Client.call`, None if none that is watched waits.
+    """
+
+    client: str
+    service: str | None
+    caller: CallbackRun | None
+    sent_s: float
+    future: object = None
 
 
 class Recording:
@@ -208,8 +220,8 @@ class CallbackRecording:
 
     def __init__(self, **watched) -> None:
         self.runs: dict[str, list[CallbackRun]] = {name: [] for name in watched}
-        self._watched = watched
-        self._calls: list[dict] = []
+        self.watched = watched
+        self.calls: list[Call] = []
         self._answers: dict[object, CallbackRun] = {}  # the client's run that took each future
         for name, thing in watched.items():
             if hasattr(thing, 'call_async'):
@@ -246,10 +258,11 @@ class CallbackRecording:
         @functools.wraps(call_async)
         def recorded_call_async(request):
             caller = self._running() if getattr(waits, 'here', False) else None
-            made = {'client': name, 'caller': caller, 'sent': time.monotonic(), 'future': None}
-            self._calls.append(made)
-            made['future'] = call_async(request)
-            return made['future']
+            services = (one for one in self.watched if _serves(self.watched[one], client))
+            made = Call(name, next(services, None), caller, time.monotonic())
+            self.calls.append(made)
+            made.future = call_async(request)
+            return made.future
 
         @functools.wraps(pending)
         def recorded_pending(sequence_number):
@@ -276,7 +289,7 @@ class CallbackRecording:
         `seq` counts from 0, the times are seconds since the first start of all, and a callback has
         `published_s` equal to `started_s`. The threads have the same names in all tables.
         """
-        zero, names = self._zero_and_threads()
+        zero, names = self.zero_and_threads()
         return {
             name: pd.DataFrame(
                 [
@@ -294,7 +307,7 @@ class CallbackRecording:
             for name, runs in self.runs.items()
         }
 
-    def _zero_and_threads(self) -> tuple[float, dict[int, str]]:
+    def zero_and_threads(self) -> tuple[float, dict[int, str]]:
         """Return when the first run of all started, and the names of the threads by their ids."""
         every = [run for runs in self.runs.values() for run in runs]
         every.sort(key=lambda run: run.started_s)
@@ -302,56 +315,13 @@ class CallbackRecording:
         names = {ident: f'thread {i}' for i, ident in enumerate(idents, 1)}
         return (every[0].started_s if every else 0.0), names
 
-    def calls(self) -> pd.DataFrame:
-        """Return one row for each request that a client which is watched has sent.
+    def answer(self, call: Call) -> CallbackRun | None:
+        """Return the run of the client that took the answer, None if none was taken."""
+        return self._answers.get(call.future)
 
-        Columns: `client` and `service` (names; the service is None if it is not watched),
-        `caller` and `run` (the callback that waits in `call`, and which of its runs; None if none
-        that is watched waits), `sent_s` and `answered_s` (seconds, as in `tables`; NaN if no answer
-        was taken), `answer` (which of the client's runs took it).
-        """
-        zero, _ = self._zero_and_threads()
-        services = {
-            thing.srv_name: name
-            for name, thing in self._watched.items()
-            if type(thing).__name__ == 'Service'
-        }
-        place = {
-            run: (name, seq) for name, runs in self.runs.items() for seq, run in enumerate(runs)
-        }
-        rows = []
-        for made in list(self._calls):
-            answer = self._answers.get(made['future'])
-            caller, seq = place.get(made['caller'], (None, None))
-            rows.append(
-                {
-                    'client': made['client'],
-                    'service': services.get(self._watched[made['client']].srv_name),
-                    'caller': caller,
-                    'run': seq,
-                    'sent_s': made['sent'] - zero,
-                    'answered_s': answer.started_s - zero if answer else math.nan,
-                    'answer': place[answer][1] if answer else None,
-                }
-            )
-        return pd.DataFrame(rows, columns=CALL_COLUMNS)
 
-    def groups(self) -> pd.DataFrame:
-        """Return for each name, in its row, what it is and its callback group.
-
-        Columns: `kind` ('Timer', 'Service', 'Client', 'Subscription'), `group` (the first name that
-        is in the same group), `exclusive` and `coroutine` (bool).
-        """
-        first: dict[int, str] = {}
-        rows = {}
-        for name, thing in self._watched.items():
-            group = thing.callback_group
-            first.setdefault(id(group), name)
-            exclusive = not isinstance(group, ReentrantCallbackGroup)
-            coroutine = inspect.iscoroutinefunction(getattr(thing, 'callback', None))
-            rows[name] = type(thing).__name__, first[id(group)], exclusive, coroutine
-        columns = ['kind', 'group', 'exclusive', 'coroutine']
-        return pd.DataFrame.from_dict(rows, 'index', columns=columns)
+def _serves(thing, client) -> bool:
+    return isinstance(thing, Service) and thing.srv_name == client.srv_name
 
 
 def _surround(callback: Callable, start: Callable, finish: Callable) -> Callable:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from helpers.replay import KINDS, Run
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
+
+from helpers.recording import CallbackRecording, CallbackRun
+from helpers.replay import KINDS, Run, fill_up
 from helpers.replay.events import ARRIVE, END, TAKE
 
 DEPTH = 10  # of services and clients, by default; a timer's tick is taken when it is recorded
@@ -14,22 +17,18 @@ SAME_TIME = [ARRIVE, TAKE, GO, END]
 
 
 class Callback(NamedTuple):
-    """A callback as model.js needs it: `word` names what waits for it, `does` are its steps.
-
-    `group` is the same for all callbacks of one group, None for one that is in no group.
-    """
+    """A callback as model.js needs it: `word` names what waits for it, `does` are its steps."""
 
     name: str
     word: str
-    group: object
-    exclusive: bool
+    group: CallbackGroup | None
     does: list[dict]
 
 
 class Move(NamedTuple):
-    """A move of model.js at a time in seconds: of a callback.
+    """A move of model.js: when (`time.monotonic`), which, and of which callback, by its place.
 
-    `number` is that of a message that arrives, else the place of the thread.
+    `number` is that of a message that arrives, else the thread's ident.
     """
 
     at_s: float
@@ -38,33 +37,54 @@ class Move(NamedTuple):
     number: int
 
 
+def moves_of(
+    run: CallbackRun, callback: int, seq: int, arrived_s: float | None = None
+) -> Iterator[Move]:
+    """Yield the moves that make a run. Without `arrived_s` its message comes by itself."""
+    if arrived_s is not None:
+        yield Move(arrived_s, ARRIVE, callback, seq)
+    yield Move(run.started_s, TAKE, callback, run.thread)
+    if not run.running:
+        yield Move(run.finished_s, END, callback, run.thread)
+
+
 def run_of(
-    threads: list[str], callbacks: Sequence[Callback], moves: Iterable[Move], time_label: str
+    recording: CallbackRecording,
+    threads: int,
+    callbacks: Sequence[Callback],
+    moves: Iterable[Move],
+    time_label: str,
 ) -> Run:
     """Return recorded callbacks as a run, which has no summary yet."""
-    members: dict[object, list[Callback]] = {}
+    zero, found = recording.zero_and_threads()
+    members: dict[CallbackGroup | None, list[str]] = {}
     for one in callbacks:
-        members.setdefault(one.group, []).append(one)
+        members.setdefault(one.group, []).append(one.name)
     groups = list(members)
     setup = {
-        'threads': threads,
+        'threads': fill_up(set(found.values()), threads),
         'groups': [
             {
-                'name': 'no group'
-                if group is None
-                else f'the group of {" and ".join(one.name for one in own)}',
-                'exclusive': own[0].exclusive,
+                'name': f'the group of {" and ".join(names)}' if group else 'no group',
+                'exclusive': isinstance(group, MutuallyExclusiveCallbackGroup),
             }
-            for group, own in members.items()
+            for group, names in members.items()
         ],
         'callbacks': [
             one._asdict() | {'group': groups.index(one.group), 'depth': DEPTH} for one in callbacks
         ],
     }
-    ordered = sorted(moves, key=lambda move: (move.at_s, SAME_TIME.index(move.do)))
+    place = {ident: setup['threads'].index(name) for ident, name in found.items()}
     in_short = [
-        [round(1e6 * at_s), KINDS.index(do), callback, number]
-        for at_s, do, callback, number in ordered
+        [
+            round(1e6 * (at_s - zero)),
+            KINDS.index(do),
+            callback,
+            number if do == ARRIVE else place[number],
+        ]
+        for at_s, do, callback, number in sorted(
+            moves, key=lambda move: (move.at_s, SAME_TIME.index(move.do))
+        )
     ]
     return Run('', '', False, setup, in_short, time_label)
 
