@@ -50,7 +50,7 @@ function show(root, level) {
   function result() {
     const own = now.score(state);
     const { best } = variant;
-    const real = variant.rclpy === undefined ? '' : ` What the real rclpy did: ${words(variant.rclpy)}.`;
+    const real = variant.rclpy === null ? '' : ` What the real rclpy did: ${words(variant.rclpy)}.`;
     return [
       `You: ${words(own)}. The best possible: ${words(best)}.${real}`,
       own > best ? 'Another order does better. Play again.' : variant.lesson,
@@ -112,7 +112,7 @@ function show(root, level) {
 
   wake(root, 'level');
   root.addEventListener('keydown', onKey);
-  root.querySelector('.level-static').replaceWith(
+  root.querySelector('.replay-static').replaceWith(
     element('div', { class: 'replay-controls' }, ...level.options.map(
       ({ name }, i) => element('label', {}, `${name} `, selects[i]))),
     code, says, ready, shown, element('div', { class: 'replay-controls' }, again));

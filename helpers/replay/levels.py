@@ -13,11 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from html import escape
 from itertools import product
 
 from helpers._plumbing.values import shown
-from helpers.replay.script import attribute, script, style
+from helpers.replay.script import played
 
 SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'element.js', 'board.js', 'level.js'
 ONE = 'SingleThreadedExecutor()'
@@ -63,21 +62,10 @@ class Level:
         """Return the level as a part of a page."""
         record = {
             'goal': self.goal,
-            'options': [
-                {'name': name, 'values': [str(value) for value in values]}
-                for name, values in self.options.items()
-            ],
-            'variants': [
-                {name: value for name, value in vars(one).items() if value is not None}
-                for one in self.variants().values()
-            ],
+            'options': [{'name': name, 'values': of} for name, of in self.options.items()],
+            'variants': [vars(one) for one in self.variants().values()],
         }
-        return (
-            f'<div class="replay level" data-level={attribute(record)}>'
-            f'{style("level.css")}<p>{escape(self.task)}</p>'
-            '<p class="level-static">To play it, run the cell, or trust the notebook.</p>'
-            f'<script>{script(*SCRIPT)}</script></div>'
-        )
+        return played('level', record, self.task, *SCRIPT)
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         return {'text/plain': str(self), 'text/html': self.html()}
