@@ -15,7 +15,6 @@ from helpers.robot.floor import Pose
 ANGLES = np.radians(np.arange(-90.0, 91.0))  # of the beams: right, ahead (number 90), left
 RANGE_MIN, RANGE_MAX = 0.1, 8.0  # m; the robot that touches a wall sees it at 0.11 m
 LASER_SIGMA = 0.01  # m
-ROWS_AT_ONCE = 64  # of noise
 EXACT = {'vx': 'vx', 'vyaw': 'vyaw', 'imu_yaw': 'yaw', 'imu_vyaw': 'vyaw', 'ax': 'ax', 'ay': 'ay'}
 EXACT |= {'gps_x': 'x', 'gps_y': 'y'}
 SIGMA = np.sqrt([VARIANCES['ax' if name == 'ay' else name] for name in EXACT])
@@ -34,7 +33,6 @@ class Sensors:
         self._imu_yaw, self._laser_yaw = mounting.get('imu_link', 0), mounting.get('base_scan', 0)
         self._noise = noise
         self._rng, self._laser_rng = np.random.default_rng(seed), np.random.default_rng([seed, 1])
-        self._rows = iter(())
         self._said: dict[str, float] = {}
         self.odometry = Pose(0.0, 0.0, 0.0)
 
@@ -46,7 +44,7 @@ class Sensors:
         turned = said(truth, imu_mounting=self._imu_yaw)
         if self._noise:
             values = turned
-            for name, error in zip(EXACT, self._errors(), strict=True):
+            for name, error in zip(EXACT, self._rng.normal(0, SIGMA).tolist(), strict=True):
                 values[name] += error
         else:
             values = {name: truth[of] for name, of in EXACT.items()}
@@ -56,14 +54,6 @@ class Sensors:
             self.odometry = arc(self.odometry, v, w, 1 / RATE_HZ)
         self._said = values
         return values
-
-    def _errors(self) -> list[float]:
-        row = next(self._rows, None)
-        if row is None:
-            rows = self._rng.normal(0, SIGMA, (ROWS_AT_ONCE, len(SIGMA)))
-            self._rows = iter(rows.tolist())
-            row = next(self._rows)
-        return row
 
     def scan(self, body: Body) -> np.ndarray:
         """Return the ranges (181,), float32. As REP 117 has it, too far is inf, too near -inf."""

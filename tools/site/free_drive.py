@@ -19,7 +19,7 @@ def record() -> dict:
 
 def html() -> str:
     """Return it as a part of a page."""
-    svg = picture(ROOMS, (), ROOMS.start)
+    svg = picture(ROOMS, [ROOMS.start[:2]], ROOMS.start)
     return (
         f'<div class="replay" data-drive={attribute(record())}>{style("drive.css")}'
         '<p>Click the floor, and drive with the arrow keys; or hold a button. Come to A, B and C '

@@ -20,7 +20,6 @@ from helpers.robot.sensors import ANGLES, RANGE_MAX
 WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor
 BEAMS = 61  # of a scan, in a picture
-APART_M = 0.03  # points of a path
 WALL_M = 0.15  # of an outer wall
 ROBOT, WAITING, LOST = LOOK['robot'], LOOK['waiting'], LOOK['lost']
 
@@ -42,6 +41,7 @@ def picture(
     scale = min((WIDTH - 2 * MARGIN) / (right - x), (HEIGHT - 2 * MARGIN) / (above - y))
     width, height = (scale * size + 2 * MARGIN for size in (right - x, above - y))
     r = max(RADIUS_M, SMALLEST / scale)  # on a large floor the robot is drawn larger than it is
+    way = 'L'.join(f'{x:.2f} {y:.2f}' for x, y in points)
     start = floor.start
     ring = f'M{start.x - r:.3f} {start.y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} 0'
     ring += f'a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
@@ -51,7 +51,7 @@ def picture(
         f'stroke="{ROBOT}" stroke-opacity=".6"/>',
         f'<path class="old" d="" fill="none" stroke="{WAITING}" '
         'stroke-width="2" stroke-dasharray="5 4"/>',
-        f'<path class="all" d="{line(points)}" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
+        f'<path class="all" d="M{way}" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
         f'<path class="driven" d="" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
         f'<path class="seconds" d="{dots(seconds)}" stroke="{ROBOT}" stroke-width="6.5" '
         'stroke-linecap="round"/>',
@@ -113,15 +113,6 @@ def _floor(floor: Floor, scale: float) -> str:
         f'<path d="{boxes("box")}" fill="{LOOK["ink"]}" fill-opacity=".35" stroke="{LOOK["ink"]}" '
         f'stroke-width="1.5"/>{names}'
     )
-
-
-def line(points: Iterable[tuple[float, float]]) -> str:
-    """Return a path through points, without those that are nearly at the one before."""
-    apart, last = [], None
-    for last in points:
-        if not apart or math.dist(apart[-1], last) >= APART_M:
-            apart.append(last)
-    return f'M{"L".join(f"{x:.2f} {y:.2f}" for x, y in [*apart, last])}' if apart else ''
 
 
 def dots(poses: Sequence[Pose]) -> str:
