@@ -131,18 +131,15 @@ class Recording:
         """When `table` has its second 0, in seconds of `time.monotonic`; NaN before that."""
         return min((at_s for _, at_s in self._published), default=float('nan'))
 
-    def now(self, depth: int) -> tuple[dict[int, float], dict[int, float]]:
+    def now(self, depth: int) -> tuple[dict[int, float], list[int]]:
         """Return which messages have a callback now, and which wait in a queue of this depth.
 
-        Both are sequence numbers, oldest first, each with how old the message is, in seconds.
+        Both are sequence numbers, oldest first; the former with how old the message is (s).
         """
         heard, published = self._heard[-64:], dict(self._published[-64 - depth :])
         newest, now_s = max((run.seq for run in heard), default=-1), time.monotonic()
-        runs = [run.seq for run in heard if run.running]
-        waits = [seq for seq in list(published)[-depth:] if seq > newest]
-        return tuple(
-            {seq: now_s - published.get(seq, now_s) for seq in seqs} for seqs in (runs, waits)
-        )
+        runs = {run.seq: now_s - published.get(run.seq, now_s) for run in heard if run.running}
+        return runs, [seq for seq in list(published)[-depth:] if seq > newest]
 
     def wait_until_complete(self, messages: int, timeout_s: float = 60.0) -> None:
         """Wait until `messages` messages are published and the subscription has worked them off.
