@@ -102,19 +102,14 @@ class LiveView:
             scans[-1].ranges if scans else None,
             [place(record, bump.t_s) for bump in bumps(record)],
         )
-        told = [f'{commands[-1].v:.2f} m/s, {commands[-1].w:.2f} rad/s'] if commands else []
-        rows = [
-            ('time', [f'{now.t_s:.1f} s']),
-            ('robot', [f'{now.v:.2f} m/s, {now.w:.2f} rad/s']),
-            ('told', told or ['nothing yet']),
-        ]
+        told = speeds(*commands[-1][1:]) if commands else 'nothing yet'
         news = record.events[-1:]
         said = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
-        body = ''.join(_row(name, *map(escape, words)) for name, words in rows)
         return (
             f'<div class="replay robot-live">{style("drive.css")}'
-            f'<div role="img" aria-label="{escape(described(record.floor))}">{svg}</div>{body}'
-            f'{self._queue()}<p class="replay-says">{escape(said)}</p></div>'
+            f'<div role="img" aria-label="{escape(described(record.floor))}">{svg}</div>'
+            f'{_row("time", f"{now.t_s:.1f} s")}{_row("robot", speeds(now.v, now.w))}'
+            f'{_row("told", told)}{self._queue()}<p class="replay-says">{escape(said)}</p></div>'
         )
 
     def _queue(self) -> str:
@@ -129,6 +124,11 @@ class LiveView:
         waiting = ''.join(f'<li><b>{seq}</b></li>' for seq in waits)
         busy = busy or ['<li class="replay-free">free</li>']
         return _row('callback', *busy) + _row('queue', waiting)
+
+
+def speeds(v: float, w: float) -> str:
+    """Return a speed (m/s) and a turning rate (rad/s) in words."""
+    return f'{v:.2f} m/s, {w:.2f} rad/s'
 
 
 def _row(name: str, *content: str) -> str:
