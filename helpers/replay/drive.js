@@ -37,7 +37,7 @@ function drive({ step, poses, commands, scans, view, events, bumps }) {
     const { x, y, yaw } = pose(ms);
     const hits = ranges.map((range, k) => {
       const angle = yaw + view * (k / (ranges.length - 1) - 0.5);
-      return `${(x + range * Math.cos(angle)).toFixed(2)} ${(y + range * Math.sin(angle)).toFixed(2)}`;
+      return [x + range / 100 * Math.cos(angle), y + range / 100 * Math.sin(angle)].map(at => at.toFixed(2)).join(' ');
     });
     return `M${x} ${y}L${hits.join('L')}z`;
   }

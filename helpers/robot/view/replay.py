@@ -68,7 +68,7 @@ class Drive:
         return f'{self.summary} {described(self.record_.floor)}'
 
     def record(self) -> dict:
-        """Return what drive.js needs: metres, radians, and whole milliseconds."""
+        """Return what drive.js needs: m and rad, and whole ms and cm (of ranges)."""
         step, poses = self.sampled()
         few = np.linspace(0, len(ANGLES) - 1, BEAMS).round().astype(int)
         return {
@@ -80,7 +80,7 @@ class Drive:
                 [
                     round(1000 * scan.t_s),
                     scan.seq,
-                    scan.ranges[few].clip(0, RANGE_MAX).astype(float).round(2).tolist(),
+                    (100 * scan.ranges[few].clip(0, RANGE_MAX)).round().astype(int).tolist(),
                 ]
                 for scan in thinned(self.record_.scans, SCANS)
             ],
