@@ -7,27 +7,21 @@ import inspect
 import math
 import threading
 import time
-from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import pandas as pd
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.service import Service
 
 from helpers._plumbing.values import RUN_COLUMNS
-
-CALL_COLUMNS = ['client', 'service', 'caller', 'run', 'style', 'sent_s', 'answered_s', 'answer']
-CALL_COLUMNS += ['resumed_by']
 
 
 def number_of(message) -> int:
     """Return the number at the end of `message.data`: 7 for `Hello World: 7`, or 7 itself.
 
-    The number of a picture with one pixel is the pixel. Raises ValueError if there is none.
+    Raises ValueError if there is none.
     """
     data = getattr(message, 'data', None)
-    if isinstance(data, array) and len(data) == 1:
-        data = data[0]
     if isinstance(data, int):
         return data
     word = data.rpartition(' ')[2] if isinstance(data, str) else ''
@@ -44,14 +38,13 @@ class CallbackRun:
     """One run of a callback: when it started (`time.monotonic`, in seconds), and in which thread.
 
     `finished_s` is None while it runs. `seq` is the number of its message, if that is recorded.
-    `resumed_by` is the thread that finished it, if it is a coroutine. Threads are their idents.
+    Threads are their idents.
     """
 
     started_s: float
     thread: int
     finished_s: float | None = None
     seq: int | None = None
-    resumed_by: int | None = None
 
     @property
     def running(self) -> bool:
@@ -59,16 +52,27 @@ class CallbackRun:
         return self.finished_s is None
 
 
+@dataclass(slots=True)
+class Call:
+    """A request: the names of its client and its service, None if that is not watched.
+
+    `caller` is the run that waits in `Client.call`, None if none that is watched waits.
+    """
+
+    client: str
+    service: str | None
+    caller: CallbackRun | None
+    sent_s: float
+    future: object = None
+
+
 class Recording:
     """Records the messages from one publisher to one subscription, from now on.
 
     Both stay plain rclpy objects. `parameters`, for example
     `period_s=0.05`, are what the run was made with: they are in `table().attrs`.
-
-    `Recording.latest` is the newest one, also if its cell was interrupted.
     """
 
-    latest: Recording | None = None
     number_of = staticmethod(number_of)
 
     def __init__(self, publisher, subscription, **parameters) -> None:
@@ -78,7 +82,6 @@ class Recording:
         self._finished: list[CallbackRun] = []  # the same runs, in the order in which they finished
         self._watch_publisher(publisher)
         self._watch_subscription(subscription)
-        Recording.latest = self
 
     def _watch_publisher(self, publisher) -> None:
         publish, clock, append = publisher.publish, time.monotonic, self._published.append
@@ -128,18 +131,15 @@ class Recording:
         """When `table` has its second 0, in seconds of `time.monotonic`; NaN before that."""
         return min((at_s for _, at_s in self._published), default=float('nan'))
 
-    def now(self, depth: int) -> tuple[dict[int, float], dict[int, float]]:
+    def now(self, depth: int) -> tuple[dict[int, float], list[int]]:
         """Return which messages have a callback now, and which wait in a queue of this depth.
 
-        Both are sequence numbers, oldest first, each with how old the message is, in seconds.
+        Both are sequence numbers, oldest first; the former with how old the message is (s).
         """
         heard, published = self._heard[-64:], dict(self._published[-64 - depth :])
         newest, now_s = max((run.seq for run in heard), default=-1), time.monotonic()
-        runs = [run.seq for run in heard if run.running]
-        waits = [seq for seq in list(published)[-depth:] if seq > newest]
-        return tuple(
-            {seq: now_s - published.get(seq, now_s) for seq in seqs} for seqs in (runs, waits)
-        )
+        runs = {run.seq: now_s - published.get(run.seq, now_s) for run in heard if run.running}
+        return runs, [seq for seq in list(published)[-depth:] if seq > newest]
 
     def wait_until_complete(self, messages: int, timeout_s: float = 60.0) -> None:
         """Wait until `messages` messages are published and the subscription has worked them off.
@@ -217,9 +217,8 @@ class CallbackRecording:
 
     def __init__(self, **watched) -> None:
         self.runs: dict[str, list[CallbackRun]] = {name: [] for name in watched}
-        self._watched = watched
-        self._coroutines: set[str] = set()  # the names of callbacks that can await
-        self._calls: list[dict] = []
+        self.watched = watched
+        self.calls: list[Call] = []
         self._answers: dict[object, CallbackRun] = {}  # the client's run that took each future
         for name, thing in watched.items():
             if hasattr(thing, 'call_async'):
@@ -230,8 +229,6 @@ class CallbackRecording:
     def watch(self, name: str, callback: Callable) -> Callable:
         """Return the callback, which is recorded under this name from now on."""
         runs = self.runs.setdefault(name, [])
-        if inspect.iscoroutinefunction(callback):
-            self._coroutines.add(name)
 
         def start(*arguments) -> CallbackRun:
             run = CallbackRun(time.monotonic(), threading.get_ident())
@@ -239,8 +236,6 @@ class CallbackRecording:
             return run
 
         def finish(run: CallbackRun) -> None:
-            if name in self._coroutines:
-                run.resumed_by = threading.get_ident()
             run.finished_s = time.monotonic()
 
         return _surround(callback, start, finish)
@@ -259,12 +254,12 @@ class CallbackRecording:
 
         @functools.wraps(call_async)
         def recorded_call_async(request):
-            waiting = getattr(waits, 'here', False)
-            made = {'client': name, 'caller': self._running(), 'waits': waiting}
-            made |= {'sent': time.monotonic(), 'future': None}
-            self._calls.append(made)
-            made['future'] = call_async(request)
-            return made['future']
+            caller = self._running() if getattr(waits, 'here', False) else None
+            services = (one for one in self.watched if _serves(self.watched[one], client))
+            made = Call(name, next(services, None), caller, time.monotonic())
+            self.calls.append(made)
+            made.future = call_async(request)
+            return made.future
 
         @functools.wraps(pending)
         def recorded_pending(sequence_number):
@@ -285,28 +280,13 @@ class CallbackRecording:
         own = (run for run in runs if run.thread == here)
         return max(own, key=lambda run: run.started_s, default=None)
 
-    def finished(self, name: str) -> int:
-        """Return how many runs have finished."""
-        return sum(not run.running for run in self.runs[name])
-
-    def inside(self, inner: str, outer: str) -> int:
-        """Return how many runs of `inner` started while a run of `outer` was going on."""
-        return sum(
-            any(
-                other.started_s <= run.started_s
-                and (other.running or run.started_s < other.finished_s)
-                for other in self.runs[outer]
-            )
-            for run in self.runs[inner]
-        )
-
     def tables(self) -> dict[str, pd.DataFrame]:
         """Return for each name a table like that of `Recording`, one row a run, for a timeline.
 
         `seq` counts from 0, the times are seconds since the first start of all, and a callback has
         `published_s` equal to `started_s`. The threads have the same names in all tables.
         """
-        zero, names = self._zero_and_threads()
+        zero, names = self.zero_and_threads()
         return {
             name: pd.DataFrame(
                 [
@@ -324,66 +304,21 @@ class CallbackRecording:
             for name, runs in self.runs.items()
         }
 
-    def _zero_and_threads(self) -> tuple[float, dict[int, str]]:
+    def zero_and_threads(self) -> tuple[float, dict[int, str]]:
         """Return when the first run of all started, and the names of the threads by their ids."""
         every = [run for runs in self.runs.values() for run in runs]
         every.sort(key=lambda run: run.started_s)
-        idents = [ident for run in every for ident in (run.thread, run.resumed_by) if ident]
-        names = {ident: f'thread {i}' for i, ident in enumerate(dict.fromkeys(idents), 1)}
+        idents = dict.fromkeys(run.thread for run in every)
+        names = {ident: f'thread {i}' for i, ident in enumerate(idents, 1)}
         return (every[0].started_s if every else 0.0), names
 
-    def calls(self) -> pd.DataFrame:
-        """Return one row for each request that a client which is watched has sent.
+    def answer(self, call: Call) -> CallbackRun | None:
+        """Return the run of the client that took the answer, None if none was taken."""
+        return self._answers.get(call.future)
 
-        Columns: `client` and `service` (names; the service is None if it is not watched),
-        `caller` and `run` (the callback that sent it, and which of its runs; None if none is
-        watched), `style` ('call', 'await' if a coroutine sent it, or 'send'), `sent_s` and
-        `answered_s` (seconds, as in `tables`; NaN if no answer was taken), `answer` (which of
-        the client's runs took it), `resumed_by` (the thread that finished the coroutine, or None).
-        """
-        zero, names = self._zero_and_threads()
-        services = {
-            thing.srv_name: name
-            for name, thing in self._watched.items()
-            if type(thing).__name__ == 'Service'
-        }
-        place = {
-            run: (name, seq) for name, runs in self.runs.items() for seq, run in enumerate(runs)
-        }
-        rows = []
-        for made in list(self._calls):
-            answer, run = self._answers.get(made['future']), made['caller']
-            caller, seq = place.get(run, (None, None))
-            awaits = caller in self._coroutines
-            rows.append(
-                {
-                    'client': made['client'],
-                    'service': services.get(self._watched[made['client']].srv_name),
-                    'caller': caller,
-                    'run': seq,
-                    'style': 'call' if made['waits'] else 'await' if awaits else 'send',
-                    'sent_s': made['sent'] - zero,
-                    'answered_s': answer.started_s - zero if answer else math.nan,
-                    'answer': place[answer][1] if answer else None,
-                    'resumed_by': names[run.resumed_by] if run and run.resumed_by else None,
-                }
-            )
-        return pd.DataFrame(rows, columns=CALL_COLUMNS)
 
-    def groups(self) -> pd.DataFrame:
-        """Return for each name, in its row, what it is and its callback group.
-
-        Columns: `kind` ('Timer', 'Service', 'Client', 'Subscription'), `group` (the first name that
-        is in the same group), `exclusive` (bool).
-        """
-        first: dict[int, str] = {}
-        rows = {}
-        for name, thing in self._watched.items():
-            group = thing.callback_group
-            first.setdefault(id(group), name)
-            exclusive = not isinstance(group, ReentrantCallbackGroup)
-            rows[name] = type(thing).__name__, first[id(group)], exclusive
-        return pd.DataFrame.from_dict(rows, 'index', columns=['kind', 'group', 'exclusive'])
+def _serves(thing, client) -> bool:
+    return isinstance(thing, Service) and thing.srv_name == client.srv_name
 
 
 def _surround(callback: Callable, start: Callable, finish: Callable) -> Callable:

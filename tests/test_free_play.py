@@ -1,9 +1,10 @@
 """Free play: its predictions, in a JavaScript engine, are those of `predict`."""
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from support.javascript import Script
+from support.runs import tries
 
 from helpers.queue_model import predict
 
@@ -22,7 +23,7 @@ def script():
     return Script('walk.js', 'stories.js', 'free.js', glue=GLUE)
 
 
-@settings(max_examples=100)
+@tries(260)
 @given(numbers)
 @example((5, 20, 10, 1, True))
 @example((5, 20, 10, 4, False))

@@ -1,6 +1,5 @@
 """The robot, seen: its pictures in Python, its replay in a JavaScript engine, both in a kernel."""
 
-import base64
 import json
 import math
 import re
@@ -9,20 +8,17 @@ from html import unescape
 import pytest
 import quickjs
 from geometry_msgs.msg import Twist
-from hypothesis import given
-from hypothesis import strategies as st
 from jupyter_client.manager import run_kernel
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, LaserScan
 from support.javascript import FOLDER
 
-from helpers.robot import CORRIDOR, EMPTY, ROOMS, DriveRecord, Pose, Robot
+from helpers.robot import CORRIDOR, EMPTY, ROOMS, Pose, Robot
 from helpers.robot.body import Body
-from helpers.robot.record import Command, Event, Scan, Step
+from helpers.robot.record import Command, DriveRecord, Event, Scan, Step
 from helpers.robot.sensors import Sensors
 from helpers.robot.view import drive_by_hand, replay_drive, watch
-from helpers.robot.view.picture import Track
 from helpers.session import ros_session
 
 MOST_BYTES = 60_000
@@ -42,7 +38,6 @@ def record_of(shown, index=0):
 def script():
     """Return a function that looks at a drive as the page does, at these milliseconds."""
     context = quickjs.Context()
-    context.add_callable('atob', lambda text: base64.b64decode(text).decode('latin-1'))
     context.eval((FOLDER / 'drive.js').read_text())
     context.eval("""function looked(record, times) {
         const run = drive(record);
@@ -62,7 +57,7 @@ def script():
 def long_drive():
     """Return the record of three minutes, from wall to wall."""
     body, record = Body(ROOMS), DriveRecord(ROOMS)
-    sensors = Sensors(0, True, None)
+    sensors = Sensors(0, True)
     for step in range(9000):
         before = body.bumps
         command = Command(
@@ -98,31 +93,6 @@ def test_the_page_shows_where_the_robot_was(script, long_drive):
         # Ten poses a second are kept: at 1 m/s a wall is noticed 5 cm too early or too late.
         assert math.dist((row.x, row.y), (at['x'], at['y'])) < 0.06
         assert abs(math.remainder(row.yaw - at['yaw'], math.tau)) < 0.05
-
-
-@given(st.lists(st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)), min_size=1, max_size=60))
-def test_a_track_passes_all_its_points(steps):
-    track, points, x, y = Track(), [], 0.0, 0.0
-    for dx, dy in steps:
-        x, y = x + dx, y + dy
-        points.append((x, y))
-        track.add(x, y)
-    drawn = [tuple(map(float, point.split())) for point in track.line()[1:].split('L')]
-    assert math.dist(drawn[-1], points[-1]) < 0.01
-    for point in points:
-        assert (
-            min(_distance(point, *pair) for pair in zip([drawn[0], *drawn], drawn, strict=False))
-            < 0.02
-        )
-
-
-def _distance(point, a, b):
-    """Return how far a point is from the line between two others."""
-    (px, py), (ax, ay), (bx, by) = point, a, b
-    length = (bx - ax) ** 2 + (by - ay) ** 2
-    part = ((px - ax) * (bx - ax) + (py - ay) * (by - ay)) / length if length else 0.0
-    part = min(max(part, 0.0), 1.0)
-    return math.dist(point, (ax + part * (bx - ax), ay + part * (by - ay)))
 
 
 # Beside the queue

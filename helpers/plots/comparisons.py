@@ -48,7 +48,7 @@ def sweep(results: pd.DataFrame, limit: float, limit_label: str, title: str) -> 
     return figure
 
 
-def bars(values: pd.Series, xlabel: str, title: str = '') -> Axes:
+def bars(values: pd.Series, xlabel: str) -> Axes:
     """Draw one horizontal bar a row of `values`, from the top, each with its value."""
     ax = new_axes(height=1.3 + 0.6 * len(values))
     names = values.index.astype(str)
@@ -57,6 +57,6 @@ def bars(values: pd.Series, xlabel: str, title: str = '') -> Axes:
     ax.bar_label(drawn, texts, padding=5, fontsize=NORMAL)
     ax.invert_yaxis()
     ax.margins(x=0.12)
-    label_axes(ax, title, xlabel, '', grid='x')
+    label_axes(ax, '', xlabel, '', grid='x')
     describe(ax, f'One horizontal bar, with its value, for each of: {in_words(names)}.')
     return ax

@@ -117,7 +117,6 @@ def gate(
     covariance: np.ndarray,
     sigmas: float,
     taken: Sequence[str],
-    title: str = 'What the gate takes',
 ) -> Axes:
     """Draw innovations of fixes by name (x, y in m), and the ellipse of a gate of so many sigmas.
 
@@ -134,7 +133,7 @@ def gate(
             crosses(ax, [x], [y], '')
         ax.annotate(name, (x, y), (8, 6), textcoords='offset points', fontsize=LARGE)
     ax.set_aspect('equal', 'datalim')
-    label_axes(ax, title, 'innovation in x (m)', 'innovation in y (m)', [])
+    label_axes(ax, 'What the gate takes', 'innovation in x (m)', 'innovation in y (m)')
     left = [name for name in innovations if name not in taken]
     describe(
         ax,
@@ -148,7 +147,6 @@ def scans(
     walls: Sequence[Sequence[float]],
     pose: tuple[float, float, float],
     points: Mapping[str, tuple[np.ndarray, np.ndarray]],
-    title: str = 'What the lidar sees, on the map',
 ) -> Axes:
     """Draw walls (x0, y0, x1, y1 and more, in m), and what a robot sees from a pose among them.
 
@@ -167,7 +165,7 @@ def scans(
         seen_y = y + ahead * math.sin(yaw) + left * math.cos(yaw)
         handles += ax.plot(seen_x, seen_y, **look)
     ax.set_aspect('equal', 'datalim')
-    label_axes(ax, title, 'x (m)', 'y (m)', handles)
+    label_axes(ax, 'What the lidar sees, on the map', 'x (m)', 'y (m)', handles)
     describe(ax, f'Walls from above, and points for each of: {in_words(points)}.')
     return ax
 

@@ -24,7 +24,6 @@ from helpers._plumbing.alt_text import describe
 from helpers._plumbing.values import check_table, natural
 from helpers.plots.style import (
     DPI,
-    GROUP_HATCHES,
     HEARD,
     INK,
     LOST,
@@ -32,9 +31,7 @@ from helpers.plots.style import (
     SMALL,
     WAITING,
     WIDE,
-    check_looks,
     crosses,
-    in_words,
     label_axes,
     new_axes,
     say,
@@ -49,7 +46,7 @@ TIME_LABEL = 'time since the first publish (s)'
 def sequence_gaps(
     table: pd.DataFrame,
     title: str | None = None,
-    depth: int | None = None,
+    depth: int = 10,
     ax: Axes | None = None,
 ) -> Axes:
     """Draw what was published and what was heard: sequence number over time.
@@ -57,9 +54,9 @@ def sequence_gaps(
     A small dot is a message at the time it was published, a large dot the start of its callback.
     The line from the small dot to the large one is the time that the message waited.
 
-    A cross is a message that was lost. With `depth`, that of the subscription's KEEP_LAST queue, it
-    is at the time when the message was pushed out, and a dotted line joins it with the message that
-    did it, the `depth`-th newer one. Without, it is at the time of publishing.
+    A cross is a message that was lost, at the time when it was pushed out. A dotted line joins it
+    with the message that did it, the `depth`-th newer one; `depth` is that of the subscription's
+    KEEP_LAST queue. One that was not pushed out has its cross where it was published.
 
     Draws into `ax`, or into a new figure. Raises TypeError or ValueError for a bad table.
     """
@@ -72,7 +69,7 @@ def sequence_gaps(
 
 
 def before_and_after(
-    before: pd.DataFrame, after: pd.DataFrame, labels: tuple[str, str], depth: int | None = None
+    before: pd.DataFrame, after: pd.DataFrame, labels: tuple[str, str], depth: int = 10
 ) -> Figure:
     """Draw the sequence gaps of two runs beside each other, on the same axes.
 
@@ -91,9 +88,7 @@ def before_and_after(
     return figure
 
 
-def _draw_gaps(
-    ax: Axes, table: pd.DataFrame, title: str, depth: int | None, scale: float = 1.0
-) -> None:
+def _draw_gaps(ax: Axes, table: pd.DataFrame, title: str, depth: int, scale: float = 1.0) -> None:
     """Draw the marks and what surrounds them. `scale` is the area of a mark."""
     heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
     scale *= min(1.0, max(0.2, 60 / len(table)))  # many marks must be smaller to stay apart
@@ -101,12 +96,10 @@ def _draw_gaps(
     ax.hlines(heard.seq, heard.published_s, heard.started_s, **waits)
     ax.margins(x=0.04, y=0.09)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
-    lost_at = lost.published_s
-    if depth:
-        lost_at = _pushed_out(table, depth)[lost.index].fillna(lost.published_s)
-        ax.hlines(lost.seq, lost.published_s, lost_at, **waits)
-        dotted = {'color': LOST, 'lw': 0.9, 'ls': ':', 'zorder': 1}
-        ax.vlines(lost_at, lost.seq, table.seq.shift(-depth)[lost.index], **dotted)
+    lost_at = _pushed_out(table, depth)[lost.index].fillna(lost.published_s)
+    ax.hlines(lost.seq, lost.published_s, lost_at, **waits)
+    dotted = {'color': LOST, 'lw': 0.9, 'ls': ':', 'zorder': 1}
+    ax.vlines(lost_at, lost.seq, table.seq.shift(-depth)[lost.index], **dotted)
     small = {'s': 14 * scale, 'color': WAITING, 'zorder': 2, 'label': f'published {len(table)}'}
     large = {'s': 52 * scale, 'color': HEARD, 'zorder': 3, 'label': f'heard {len(heard)}'}
     handles = [
@@ -176,43 +169,35 @@ def timeline(
 ) -> Axes:
     """Draw one lane a thread and one bar a callback, with its sequence number if it fits.
 
-    `table` is one table, or one for each callback group: `{'group name': table, ...}`. Then each
-    group has a hatch of its own. With `depth`, that of the subscription's KEEP_LAST queue, thin
-    bars below show the messages while they wait, and a cross ends those that were pushed out.
-    Draws into `ax`, or into a new figure.
+    `table` is a table, or a table with the name of its callback group: `{'reentrant': table}`. With
+    `depth`, that of the subscription's KEEP_LAST queue, thin bars below show the messages while
+    they wait, and a cross ends those that were pushed out. Draws into `ax`, or into a new figure.
 
-    Raises TypeError or ValueError for a bad table, and for no or too many groups.
+    Raises TypeError or ValueError for a bad table.
     """
-    groups = table if isinstance(table, Mapping) else {'callbacks': table}
-    check_looks('callback groups', groups, len(GROUP_HATCHES))
-    groups = {str(name): check_table(one) for name, one in groups.items()}
-    bars = pd.concat([t[t.started_s.notna()].assign(group=name) for name, t in groups.items()])
+    [(group, table)] = table.items() if isinstance(table, Mapping) else [('', table)]
+    table = check_table(table)
+    bars = table[table.started_s.notna()].copy()
     # A callback that had not finished when the recording ended runs to the end of the picture.
     bars['finished_s'] = bars.finished_s.fillna(bars[['started_s', 'finished_s']].max().max())
     threads = sorted(bars.thread.unique(), key=natural)
     bars['lane'] = bars.thread.map({thread: lane for lane, thread in enumerate(threads)})
 
     ax = ax or new_axes()
-    bar = {'facecolor': HEARD, 'edgecolor': '#ffffffa0', 'lw': 0.8}
-    looks = {
-        name: {**bar, 'hatch': hatch, 'label': name}
-        for name, hatch in zip(groups, GROUP_HATCHES, strict=False)
-    }
-    for name, look in looks.items():
-        own = bars[bars.group == name]
-        ax.barh(own.lane, own.finished_s - own.started_s, left=own.started_s, height=0.72, **look)
+    look = {'facecolor': HEARD, 'edgecolor': '#ffffffa0', 'lw': 0.8, 'label': group}
+    ax.barh(bars.lane, bars.finished_s - bars.started_s, left=bars.started_s, height=0.72, **look)
     ax.set_yticks(range(len(threads)), threads)
     bottom = max(len(threads), 1) - 0.5
     waiting = ''
     if depth:
-        bottom, waiting = _draw_waiting(ax, pd.concat(groups.values()), depth, bottom)
+        bottom, waiting = _draw_waiting(ax, table, depth, bottom)
     ax.set_ylim(bottom, -0.5)  # the first thread on top
     # Axes that share their time show the longest run of all.
     last_s = max(one.dataLim.x1 for one in ax.get_shared_x_axes().get_siblings(ax))
     ax.set_xlim(0, 1.02 * last_s if math.isfinite(last_s) else 1)
-    handles = [Patch(**look) for look in looks.values()] if isinstance(table, Mapping) else None
+    handles = [Patch(**look)] if group else None
     label_axes(ax, title, TIME_LABEL, 'thread', handles, grid='x')
-    named = f' The hatches stand for: {in_words(groups)}.' if handles else ''
+    named = f' The hatches stand for: {group}.' if group else ''
     describe(
         ax,
         'One lane for each thread that ran a callback, one bar for each callback, with its '
@@ -304,15 +289,11 @@ def queue_length(table: pd.DataFrame, depth: int, ax: Axes | None = None) -> Axe
     return ax
 
 
-def latency(
-    table: pd.DataFrame,
-    period_s: float | None = None,
-    title: str = 'How long each message waited for its callback',
-) -> Axes:
+def latency(table: pd.DataFrame, period_s: float) -> Axes:
     """Draw for each heard message the time from publishing to the start of its callback, in ms.
 
-    With `period_s`, the publisher's period in seconds, a second axis on the right counts in
-    periods. Crosses at the bottom are lost messages, which have no latency.
+    A second axis on the right counts in periods of the publisher, `period_s` seconds. Crosses at
+    the bottom are lost messages, which have no latency.
 
     Raises TypeError or ValueError for a bad table.
     """
@@ -329,22 +310,19 @@ def latency(
         label = f'{_unheard(table)} {len(lost)}'
         handles.append(crosses(ax, lost.published_s, below, label))
     ax.set_ylim(-0.09 * highest, 1.1 * highest)
-    label_axes(
-        ax, title, 'time of publishing, since the first publish (s)', 'latency (ms)', handles
-    )
-    periods = ''
-    if period_s:
-        periods = ' The axis on the right counts it in periods of the publisher.'
-        period_ms = 1000 * period_s
-        there_and_back = (lambda ms: ms / period_ms, lambda periods: periods * period_ms)
-        right = ax.secondary_yaxis('right', functions=there_and_back)
-        right.set_ylabel('latency (periods)', fontsize=NORMAL)
-        right.tick_params(labelsize=SMALL)
-        right.spines['right'].set_visible(True)
+    title = 'How long each message waited for its callback'
+    below = 'time of publishing, since the first publish (s)'
+    label_axes(ax, title, below, 'latency (ms)', handles)
+    period_ms = 1000 * period_s
+    there_and_back = (lambda ms: ms / period_ms, lambda periods: periods * period_ms)
+    right = ax.secondary_yaxis('right', functions=there_and_back)
+    right.set_ylabel('latency (periods)', fontsize=NORMAL)
+    right.tick_params(labelsize=SMALL)
+    right.spines['right'].set_visible(True)
     describe(
         ax,
-        'One dot for each message that was heard: how long it waited.'
-        f'{periods} {_loss_in_words(table, "crosses at the bottom")}',
+        'One dot for each message that was heard: how long it waited. The axis on the right counts '
+        f'it in periods of the publisher. {_loss_in_words(table, "crosses at the bottom")}',
     )
     if heard.empty:
         say(ax, 'no message was heard')
@@ -356,11 +334,11 @@ def _loss(table: pd.DataFrame) -> str:
     return f'{lost} of {len(table)} lost' if lost else 'none lost'
 
 
-def _gaps_in_words(table: pd.DataFrame, depth: int | None) -> str:
-    marks = 'crosses'
-    if depth:
-        marks = 'a cross is when one was pushed out, and a dotted line leads to the message that '
-        marks += f'did it, {depth} numbers later'
+def _gaps_in_words(table: pd.DataFrame, depth: int) -> str:
+    marks = (
+        'a cross is when one was pushed out, and a dotted line leads to the message that did it, '
+        f'{depth} numbers later'
+    )
     return (
         f'{len(table)} messages. A small dot is a message when it was published, a large dot the '
         f'start of its callback. {_loss_in_words(table, marks)}'

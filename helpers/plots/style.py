@@ -17,7 +17,6 @@ from helpers._plumbing.look import LOOK
 HEARD, LOST, WAITING, ROBOT, INK, PALE = (
     LOOK[name] for name in ('heard', 'lost', 'waiting', 'robot', 'ink', 'line')
 )
-GROUP_HATCHES = ('', '//', '..', '\\\\', 'xx')  # one for each callback group
 # One look for each of several lines: all differ in colour, and in how they are dashed.
 LINE_LOOKS = (
     {'color': ROBOT, 'ls': '-'},

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from html import escape
-from itertools import chain
 from urllib.parse import quote
 
 import pandas as pd
@@ -21,10 +20,7 @@ from helpers._plumbing.values import check_count, check_table, natural, shown
 from helpers.replay.events import ARRIVE, END, TAKE, events
 from helpers.replay.script import attribute, javascript, script, style
 
-SCRIPT = 'model.js', 'walk.js', 'element.js', 'board.js', 'view.js'
-SCRIPT_OF_CALLS = 'circle.js', *SCRIPT
-SCRIPT_OF_DRIVES = 'element.js', 'view.js'
-KINDS = ARRIVE, TAKE, END, 'go', 'resume'  # as walk.js numbers them
+KINDS = ARRIVE, TAKE, END, 'go'  # as walk.js numbers them
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
 MAX_MESSAGES = 10_000
 SAFE = "!$'()*+,-./:;=?@_~ "  # may stand in the address of an image, in double quotes
@@ -77,10 +73,9 @@ class Replay:
 
     def __str__(self) -> str:
         """Return what is true each time: nbval compares it."""
-        return ' '.join(
-            f'{run.name}: {run.summary}' if run.name else f'Replay: {run.summary}'
-            for run in self.runs
-        )
+        if any(run.name for run in self.runs):
+            return ' '.join(f'{run.name}: {run.summary}' for run in self.runs)
+        return f'Replay: {" ".join(run.summary for run in self.runs)}'
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         starts, ends = zip(*(run.span_s for run in self.runs), strict=True)
@@ -92,16 +87,15 @@ class Replay:
             figure(run, next(drawn) if run.setup else run.picture()) for run in self.runs
         )
         drives = len(of_queues) < len(self.runs)
-        names = ('drive.js',) if drives else ()
-        if not of_queues:
-            names += SCRIPT_OF_DRIVES
-        else:
-            names += SCRIPT_OF_CALLS if any(has_calls(run.setup) for run in of_queues) else SCRIPT
+        callbacks = [one for run in of_queues for one in run.setup['callbacks']]
+        names = ('model.js', 'walk.js', 'board.js') if of_queues else ()
+        names += ('circle.js',) if any('does' in one for one in callbacks) else ()
+        names += ('drive.js',) if drives else ()
         record = {'span': span_s, 'runs': [run.record() for run in self.runs]}
         html = (
             f'<div class="replay" data-record={attribute(record)}>'
             f'{style("drive.css") if drives else style()}<p>{escape(str(self))}</p>{figures}'
-            f'<script>{script(*names)}</script></div>'
+            f'<script>{script(*names, "element.js", "view.js")}</script></div>'
         )
         return {'text/plain': str(self), 'text/html': html}
 
@@ -178,9 +172,3 @@ def fill_up(found: set[str], threads: int) -> list[str]:
     more = (f'thread {number}' for number in range(1, 2 * threads + 1))
     free = [name for name in more if name not in found]
     return sorted([*found, *free[: threads - len(found)]], key=natural)
-
-
-def has_calls(setup: dict) -> bool:
-    """Return whether a callback of a setup of model.js asks a service."""
-    steps = chain(*(callback.get('does', []) for callback in setup['callbacks']))
-    return any('client' in step for step in steps)

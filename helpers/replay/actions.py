@@ -7,14 +7,10 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-import pandas as pd
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-
 from helpers._plumbing.values import check_count
 from helpers.recording import CallbackRecording
-from helpers.replay import Replay, fill_up
-from helpers.replay.events import ARRIVE, END, TAKE
-from helpers.replay.recorded import GO, Callback, Move, count_of, run_of
+from helpers.replay import Replay
+from helpers.replay.recorded import GO, Callback, Move, count_of, moves_of, run_of
 
 REQUESTS = {'goal': 'send_goal', 'cancel': 'cancel_goal'}  # in `Waitable.execute`, and the service
 SAYS = 'publish_feedback', 'succeed', 'canceled', 'abort'  # methods of a goal handle
@@ -70,10 +66,9 @@ def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) 
     Raises ValueError, with one sentence, unless one job and one cancel have run.
     """
     check_count('threads', threads)
-    tables, runs = recording.tables(), recording.runs
+    runs = recording.runs
     if any(len(runs[one]) != 1 for one in ('execute_callback', 'cancel_goal')):
         raise ValueError('A replay shows one job and its cancel: record the run of one goal.')
-    names = fill_up({one for table in tables.values() for one in table['thread']}, threads)
     late = runs['cancel_goal'][0].started_s > runs['execute_callback'][0].finished_s
     taken = 'is taken when the job has ended' if late else 'is taken while the job runs'
     does = {
@@ -82,35 +77,25 @@ def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) 
     }
     callbacks = [
         Callback(
-            name,
-            'job' if name == 'execute_callback' else 'request',
-            group,
-            isinstance(group, MutuallyExclusiveCallbackGroup),
-            does.get(name, []),
+            name, 'job' if name == 'execute_callback' else 'request', group, does.get(name, [])
         )
         for name, group in recording.group_of.items()
     ]
-    run = run_of(names, callbacks, _moves(recording, names, cancelled_s), TIME_LABEL)
+    run = run_of(recording, threads, callbacks, _moves(recording, cancelled_s), TIME_LABEL)
     return Replay((replace(run, summary=f'{count_of(threads)} The cancel {taken}.'),))
 
 
-def _moves(recording: ActionRecording, threads: list[str], cancelled_s: float) -> Iterator[Move]:
+def _moves(recording: ActionRecording, cancelled_s: float) -> Iterator[Move]:
     """Yield the moves of model.js that make the recorded run."""
-    names, goal = list(recording.group_of), recording.runs['send_goal'][0]
-    zero = goal.started_s
-    for name, table in recording.tables().items():
-        callback = names.index(name)
-        for run in table.itertuples():
-            thread = threads.index(run.thread)
-            arrived_s = run.started_s
+    goal_s = recording.runs['send_goal'][0].finished_s
+    for callback, name in enumerate(recording.group_of):
+        for seq, run in enumerate(recording.runs[name]):
+            arrived_s, steps_s = run.started_s, []
             if name == 'execute_callback':  # the request for the goal has made it
-                arrived_s = min(arrived_s, goal.finished_s - zero)
-                for at_s, _ in recording.said:
-                    yield Move(at_s - zero, GO, callback, thread)
-            if name == 'cancel_goal':
-                arrived_s = cancelled_s - zero
-                yield Move(run.started_s, GO, callback, thread)
-            yield Move(arrived_s, ARRIVE, callback, run.seq)
-            yield Move(run.started_s, TAKE, callback, thread)
-            if pd.notna(run.finished_s):
-                yield Move(run.finished_s, END, callback, thread)
+                arrived_s = min(arrived_s, goal_s)
+                steps_s = [at_s for at_s, _ in recording.said]
+            elif name == 'cancel_goal':
+                arrived_s, steps_s = cancelled_s, [run.started_s]
+            yield from moves_of(run, callback, seq, arrived_s)
+            for at_s in steps_s:
+                yield Move(at_s, GO, callback, run.thread)

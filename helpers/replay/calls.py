@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator
 from dataclasses import replace
 
-import pandas as pd
-
 from helpers._plumbing.values import check_count
-from helpers.recording import CallbackRecording
-from helpers.replay import Replay, fill_up
-from helpers.replay.events import ARRIVE, END, TAKE
-from helpers.replay.recorded import GO, RESUME, Callback, Move, count_of, run_of
+from helpers.recording import Call, CallbackRecording
+from helpers.replay import Replay
+from helpers.replay.recorded import GO, Callback, Move, count_of, moves_of, run_of
 from helpers.replay.script import javascript
 
 WORDS = {'Timer': 'tick', 'Service': 'request', 'Client': 'answer'}
@@ -23,90 +21,61 @@ def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
     """Return what a recording has seen until now, to step through.
 
     `threads` is how many the executor of all its callbacks has. The recording must watch timers,
-    services, clients: each with its own callback group. Call it while a callback hangs, or when
-    all have ended.
+    subscriptions, services, clients: each with its own callback group. Call it while a callback
+    hangs, or when all have ended. It shows what waits in `Client.call`.
 
-    Raises ValueError, with one sentence, if nothing ran, if a call gave up without an answer, or if
-    the runs of one callback called differently.
+    Raises ValueError, with one sentence, if nothing ran, if a callback is a coroutine, if a call
+    gave up without an answer, or if the runs of one callback called differently.
     """
     check_count('threads', threads)
-    tables, calls, groups = recording.tables(), recording.calls(), recording.groups()
-    found = {thread for table in tables.values() for thread in table['thread']}
-    found |= set(calls['resumed_by'].dropna())
-    if not found:
+    if not any(recording.runs.values()):
         raise ValueError('No callback has run yet: there is nothing to step through.')
-    thread_names = fill_up(found, threads)
     callbacks = [
         Callback(
             name,
-            WORDS.get(row.kind, 'message'),
-            row.group,
-            row.exclusive,
-            _steps(name, calls, tables, groups),
+            WORDS.get(type(thing).__name__, 'message'),
+            thing.callback_group,
+            _steps(recording, name),
         )
-        for name, row in groups.iterrows()
+        for name, thing in recording.watched.items()
     ]
-    moves = _moves(tables, calls, list(groups.index), thread_names)
-    run = run_of(thread_names, callbacks, moves, TIME_LABEL)
+    run = run_of(recording, threads, callbacks, _moves(recording), TIME_LABEL)
     stuck = javascript('stuck', run.record())
     summary = ' '.join([count_of(threads), *(stuck or ['Nobody waits for ever.'])])
     return Replay((replace(run, summary=summary, after_s=HANGS_S if stuck else 0.0),))
 
 
-def _steps(name: str, calls: pd.DataFrame, tables: dict, groups: pd.DataFrame) -> list[dict] | None:
+def _steps(recording: CallbackRecording, name: str) -> list[dict]:
     """Return what each run of a callback does, besides its work, as model.js reads it."""
-    if groups.loc[name, 'kind'] == 'Client':
-        return []
-    index = list(groups.index).index
-    own = calls[calls['caller'] == name]
-    if own['service'].isna().any():
-        raise ValueError(f'{name} asks a service that is not recorded: watch it, too.')
-    seen = [
-        [
-            {call.style: index(call.service), 'client': index(call.client)}
-            for call in own[own['run'] == run].itertuples()
-        ]
-        for run in tables[name]['seq']
-    ]
-    if any(steps != seen[0] for steps in seen):
-        raise ValueError(f'The runs of {name} called differently: record one run of it.')
-    for call in own[own['answered_s'].isna() & (own['style'] != 'send')].itertuples():
-        if tables[name]['finished_s'].notna()[call.run]:
+    if inspect.iscoroutinefunction(getattr(recording.watched[name], 'callback', None)):
+        raise ValueError(f'{name} is a coroutine: a replay shows callbacks that wait in call().')
+    index = list(recording.watched).index
+    seen = []
+    for run in recording.runs[name]:
+        own = [call for call in recording.calls if call.caller is run]
+        if not all(call.service for call in own):
+            raise ValueError(f'{name} asks a service that is not recorded: watch it, too.')
+        if not run.running and not all(map(recording.answer, own)):
             raise ValueError(
                 f'{name} ended without its answer: a replay shows calls that wait until it comes.'
             )
+        seen.append([{'call': index(call.service), 'client': index(call.client)} for call in own])
+    if any(steps != seen[0] for steps in seen):
+        raise ValueError(f'The runs of {name} called differently: record one run of it.')
     return seen[0] if seen else []
 
 
-def _moves(
-    tables: dict, calls: pd.DataFrame, names: list[str], threads: list[str]
-) -> Iterator[Move]:
+def _moves(recording: CallbackRecording) -> Iterator[Move]:
     """Yield the moves of model.js that make the recorded run."""
-    known = calls[calls['caller'].notna()]
+    runs = recording.runs
+    calls: list[Call] = [call for call in recording.calls if call.caller]
     # In the model, requests and answers of known callers come by themselves.
-    asked = {(call.client, call.answer) for call in known.itertuples()}
-    for call in known.itertuples():
-        runs = enumerate(tables[call.service]['started_s'])
-        later = ((call.service, run) for run, at in runs if at >= call.sent_s)
+    asked = {recording.answer(call) for call in calls}
+    for call in calls:
+        later = (run for run in runs[call.service] if run.started_s >= call.sent_s)
         asked.add(next((run for run in later if run not in asked), None))
-    awaits = {
-        (call.caller, call.run): call.resumed_by
-        for call in known[known['style'] == 'await'].itertuples()
-    }
-
-    for name, table in tables.items():
-        callback = names.index(name)
-        for run in table.itertuples():
-            thread = threads.index(run.thread)
-            key = name, run.seq
-            if key not in asked:
-                yield Move(run.started_s, ARRIVE, callback, run.seq)
-            yield Move(run.started_s, TAKE, callback, thread, key)
-            if pd.notna(run.finished_s):
-                if key in awaits:
-                    thread = threads.index(awaits[key])
-                    yield Move(run.finished_s, RESUME, callback, thread, key)
-                yield Move(run.finished_s, END, callback, thread)
-    for call in known.itertuples():
-        thread = threads.index(tables[call.caller]['thread'][call.run])
-        yield Move(call.sent_s, GO, names.index(call.caller), thread)
+        callback = next(i for i, own in enumerate(runs.values()) if call.caller in own)
+        yield Move(call.sent_s, GO, callback, call.caller.thread)
+    for callback, own in enumerate(runs.values()):
+        for seq, run in enumerate(own):
+            yield from moves_of(run, callback, seq, None if run in asked else run.started_s)

@@ -1,37 +1,31 @@
 // The drive of a robot: one more run under the slider of view.js, with a floor instead of lists.
 
 // Return what walk.js returns of a run: times, seek, scan. And `told`, which steps say something.
-function drive(record) {
-  const { unit, step, commands, events } = record;
-  const numbers = (text, Kind) => new Kind(Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer);
-  const poses = numbers(record.poses, Int16Array); // five numbers each: x, y, yaw, v, w
-  const scans = numbers(record.scans, Uint8Array);
-  const beams = scans.length / record.scanned.length;
-  const turn = w => (w ? ` and ${(w / 1000).toFixed(2)} rad/s` : '');
-  const speed = ([, v, w]) => `${(v / 1000).toFixed(2)} m/s${turn(w)}`;
+function drive({ step, poses, commands, scans, view, events, bumps }) {
+  const turn = w => (w ? ` and ${w.toFixed(2)} rad/s` : '');
+  const speed = ([, v, w]) => `${v.toFixed(2)} m/s${turn(w)}`;
   const told = one => (one[1] || one[2] ? `The robot is told to drive ${speed(one)}.` : 'The robot is told to stop.');
   const seconds = age => Math.max(age / 1000, 0).toFixed(2);
   const because = ([, , , seq, age]) => (seq < 0
     ? '' : ` The callback of message ${seq} says so, which is ${seconds(age)} s old.`);
   const isNew = (one, i) => !i || one[1] !== commands[i - 1][1] || one[2] !== commands[i - 1][2];
   const steps = [
-    ...Array.from({ length: poses.length / 5 }, (_, i) => [1000 * i * step, '']),
+    ...poses.map((_, i) => [1000 * i * step, '']),
     ...commands.map((one, i) => [one[0], isNew(one, i) ? told(one) + because(one) : '']),
     ...events,
   ].sort(([one], [other]) => one - other);
   let text = '';
   const says = steps.map(([, said]) => (text = said || text));
 
+  // Return where the last pose is that was reached at a time: a number with a fraction.
+  const reached = ms => Math.min(Math.max(ms / (1000 * step), 0), poses.length - 1);
+
   // Between two poses it is on a straight line.
   function pose(ms) {
-    const last = poses.length / 5 - 1;
-    const exact = Math.min(Math.max(ms / (1000 * step), 0), last);
-    const i = Math.min(Math.floor(exact), Math.max(last - 1, 0));
-    const part = last ? exact - i : 0;
-    const value = k => poses[5 * i + k] + part * ((poses[5 * (i + 1) + k] ?? 0) - poses[5 * i + k]);
-    const from = poses[5 * i + 2] / 1e4;
-    const turn = Math.atan2(...['sin', 'cos'].map(f => Math[f]((poses[5 * i + 7] ?? 0) / 1e4 - from)));
-    return { x: value(0) * unit, y: value(1) * unit, yaw: from + part * turn, v: value(3) / 1000, w: value(4) / 1000 };
+    const i = Math.floor(reached(ms));
+    const [from, to] = [poses[i], poses[i + 1] ?? poses[i]];
+    const [x, y, yaw, v, w] = from.map((value, k) => value + (reached(ms) - i) * (to[k] - value));
+    return { x, y, yaw, v, w };
   }
 
   const latest = (rows, ms) => rows.findLast(([at]) => at <= ms);
@@ -39,12 +33,11 @@ function drive(record) {
   // The path around what the laser saw, from where it was.
   function fan(scan) {
     if (!scan) return '';
-    const { x, y, yaw } = pose(scan[0]);
-    const i = record.scanned.indexOf(scan);
-    const hits = Array.from({ length: beams }, (_, k) => {
-      const angle = yaw + record.view * (k / (beams - 1) - 0.5);
-      const range = scans[i * beams + k] * record.range;
-      return `${(x + range * Math.cos(angle)).toFixed(2)} ${(y + range * Math.sin(angle)).toFixed(2)}`;
+    const [ms, , ranges] = scan;
+    const { x, y, yaw } = pose(ms);
+    const hits = ranges.map((range, k) => {
+      const angle = yaw + view * (k / (ranges.length - 1) - 0.5);
+      return [x + range / 100 * Math.cos(angle), y + range / 100 * Math.sin(angle)].map(at => at.toFixed(2)).join(' ');
     });
     return `M${x} ${y}L${hits.join('L')}z`;
   }
@@ -52,11 +45,10 @@ function drive(record) {
   // All that is seen at a time.
   function look(ms) {
     const command = latest(commands, ms);
-    const taken = command && command[3] >= 0 ? record.scanned.findLast(([, seq]) => seq <= command[3]) : undefined;
-    const now = latest(record.scanned, ms);
-    const till = Math.min(Math.floor(ms / (1000 * step)), poses.length / 5 - 1);
+    const taken = command && command[3] >= 0 ? scans.findLast(([, seq]) => seq <= command[3]) : undefined;
+    const now = latest(scans, ms);
     return {
-      ...pose(ms), command, till, fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]),
+      ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]),
       told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}, ${seconds(command[4])} s old`) : 'nothing yet',
     };
   }
@@ -64,9 +56,9 @@ function drive(record) {
   return {
     times: steps.map(([ms]) => 1000 * ms),
     told: steps.map(([, said]) => said !== ''),
-    points: Array.from({ length: poses.length / 5 }, (_, i) => `${(poses[5 * i] * unit).toFixed(2)} ${(poses[5 * i + 1] * unit).toFixed(2)}`),
+    points: poses.map(([x, y]) => `${x} ${y}`),
     says: to => says[to - 1] ?? '',
-    scan: () => record.bumps.map(at => steps.findLastIndex(([ms]) => ms <= at) + 1),
+    scan: () => bumps.map(at => steps.findLastIndex(([ms]) => ms <= at) + 1),
     look,
   };
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from helpers.replay.script import DRAWN, attribute, script, style
+from helpers.replay.script import DRAWN, played
 
 SCRIPT = *DRAWN, 'free.js', 'element.js', 'sliders.js'
 SAYS = (
@@ -26,10 +26,5 @@ class FreePlay:
         return SAYS
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
-        html = (
-            f'<div class="replay free" data-free={attribute(vars(self))}>'
-            f'{style("free.css")}<p>{SAYS}</p>'
-            '<p class="free-static">To play, run the cell, or trust the notebook.</p>'
-            f'<script>{script(*SCRIPT)}</script></div>'
-        )
+        html = played('free', vars(self), SAYS, *SCRIPT)
         return {'text/plain': SAYS, 'text/html': html}

@@ -83,22 +83,5 @@ function game({ setup, goal, begun = [] }) {
 
   const isOver = state => choices(state).every(({ move }) => refusal(state, move));
 
-  // The lowest score that any order of choices reaches: all are tried.
-  function best() {
-    const seen = new Set();
-    let least = Infinity;
-    function visit(state) {
-      const key = JSON.stringify(state);
-      if (seen.has(key) || (goal === 'keep' && score(state) >= least)) return;
-      seen.add(key);
-      const allowed = choices(state).filter(({ move }) => !refusal(state, move));
-      if (!allowed.length) least = Math.min(least, score(state));
-      // A thread that takes at once is tried first: that is often the best.
-      allowed.reverse().forEach(({ move }) => visit(choose(state, move).state));
-    }
-    visit(start());
-    return least;
-  }
-
-  return { start, choices, refusal, choose, isOver, score, best };
+  return { start, choices, refusal, choose, isOver, score };
 }

@@ -1,8 +1,8 @@
 // A level as a page shows it: lists that can be read, buttons, keys. What may be tried is decided in
 // game.js, and a state is drawn by board.js. Nothing is global: a page may have many levels.
 
-// A level is {goal, options: [{name, values}], variants: [{setup, begun, code, lesson, rclpy}]}: one
-// variant for each combination of the options, the last option changing first.
+// A level is {goal, options: [{name, values}], variants: [{setup, begun, code, lesson, best,
+// rclpy}]}: one variant for each combination of the options, the last option changing first.
 function show(root, level) {
   const WORDS = {
     keep: count => (count ? `${count} lost` : 'none lost'),
@@ -49,8 +49,8 @@ function show(root, level) {
 
   function result() {
     const own = now.score(state);
-    const best = now.best();
-    const real = variant.rclpy === undefined ? '' : ` What the real rclpy did: ${words(variant.rclpy)}.`;
+    const { best } = variant;
+    const real = variant.rclpy === null ? '' : ` What the real rclpy did: ${words(variant.rclpy)}.`;
     return [
       `You: ${words(own)}. The best possible: ${words(best)}.${real}`,
       own > best ? 'Another order does better. Play again.' : variant.lesson,
@@ -91,22 +91,10 @@ function show(root, level) {
     draw();
   }
 
-  function walk(by) {
-    const all = buttons();
-    const index = all.indexOf(document.activeElement);
-    all[index < 0 ? 0 : (index + by + all.length) % all.length]?.focus();
+  function leave() {
+    document.activeElement.blur();
+    root.parentElement.closest('[tabindex]')?.focus();
   }
-
-  const KEYS = {
-    ArrowRight: () => walk(1),
-    ArrowDown: () => walk(1),
-    ArrowLeft: () => walk(-1),
-    ArrowUp: () => walk(-1),
-    Escape: () => {
-      document.activeElement.blur();
-      root.parentElement.closest('[tabindex]')?.focus();
-    },
-  };
 
   function onKey(event) {
     const { key, target } = event;
@@ -116,15 +104,15 @@ function show(root, level) {
     event.stopPropagation();
     if (target.tagName === 'SELECT' && key !== 'Escape') return;
     const chosen = buttons()[+key - 1];
-    if (!chosen && !KEYS[key]) return;
+    if (!chosen && key !== 'Escape') return;
     event.preventDefault();
     if (chosen) chosen.click();
-    else KEYS[key]();
+    else leave();
   }
 
   wake(root, 'level');
   root.addEventListener('keydown', onKey);
-  root.querySelector('.level-static').replaceWith(
+  root.querySelector('.replay-static').replaceWith(
     element('div', { class: 'replay-controls' }, ...level.options.map(
       ({ name }, i) => element('label', {}, `${name} `, selects[i]))),
     code, says, ready, shown, element('div', { class: 'replay-controls' }, again));

@@ -4,20 +4,19 @@ A level is an output of a cell, as a replay is: a script that needs neither a ke
 network. If a page does not run it, the task stays as a text. What may happen is decided in
 model.js, what may be tried and how well it went in game.js; level.js shows it.
 
-What rclpy did is a fact of a real run: `rclpy` of a variant is how many messages were lost, how
-many callbacks never ended, or how many places were visited. tests/test_levels.py makes each of
-these runs again.
+`best` of a variant is the best that any order of choices reaches, and `rclpy` what the real rclpy
+did: how many messages were lost, how many callbacks never ended, or how many places were visited.
+tests/test_levels.py tries all orders, and plays each as rclpy does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from html import escape
 from itertools import product
 
 from helpers._plumbing.values import shown
-from helpers.replay.script import attribute, script, style
+from helpers.replay.script import played
 
 SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'element.js', 'board.js', 'level.js'
 ONE = 'SingleThreadedExecutor()'
@@ -31,6 +30,7 @@ class Variant:
     """
 
     setup: dict
+    best: int
     lesson: str
     code: str = ''
     rclpy: int | None = None
@@ -62,21 +62,10 @@ class Level:
         """Return the level as a part of a page."""
         record = {
             'goal': self.goal,
-            'options': [
-                {'name': name, 'values': [str(value) for value in values]}
-                for name, values in self.options.items()
-            ],
-            'variants': [
-                {name: value for name, value in vars(one).items() if value is not None}
-                for one in self.variants().values()
-            ],
+            'options': [{'name': name, 'values': of} for name, of in self.options.items()],
+            'variants': [vars(one) for one in self.variants().values()],
         }
-        return (
-            f'<div class="replay level" data-level={attribute(record)}>'
-            f'{style("level.css")}<p>{escape(self.task)}</p>'
-            '<p class="level-static">To play it, run the cell, or trust the notebook.</p>'
-            f'<script>{script(*SCRIPT)}</script></div>'
-        )
+        return played('level', record, self.task, *SCRIPT)
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         return {'text/plain': str(self), 'text/html': self.html()}
@@ -115,6 +104,7 @@ def _save() -> Variant:
             ],
             'arrivals': _arrivals(0, [0, 1, 2, 3, 4, 5]),
         },
+        2,
         'You made no mistake: no order saves them all. Pictures come faster than one at a time '
         'can be looked at, and only two can wait. Lesson 02 shows why, and lesson 03 what helps.',
         rclpy=2,
@@ -129,6 +119,7 @@ def _depth(depth: int) -> Variant:
             'callbacks': [{'name': 'topic', 'group': 0, 'depth': depth, 'does': [{'work': 3.5}]}],
             'arrivals': _arrivals(0, [0, 1, 2, 3, 4, 5]),
         },
+        {1: 3, 2: 2, 4: 0}[depth],
         {
             1: 'Only one can wait, so each new message pushes out the one before it.',
             2: 'Two can wait: one more than with depth 1 is heard, and later. Try depth 4.',
@@ -154,6 +145,7 @@ def _starve() -> Variant:
                 key=lambda arrival: arrival['at'],
             ),
         },
+        1,
         "No order saves them all. While the camera's callback runs, messages of the IMU push each "
         'other out; while the camera waits, a picture is pushed out. With one thread somebody has '
         'to wait, and rclpy does not know whom you would choose.',
@@ -180,6 +172,7 @@ def _threads_and_groups(threads: int, group: str) -> Variant:
             'callbacks': [{'name': 'topic', 'group': 0, 'depth': 1, 'does': [{'work': 1.9}]}],
             'arrivals': _arrivals(0, [0, 1, 2, 3, 4, 5]),
         },
+        0 if threads == 2 and reentrant else 2,
         lessons[group][threads],
         f'executor = {_executor(threads)}\n'
         f'group = {group.title().replace(" ", "")}CallbackGroup()\n'
@@ -200,6 +193,7 @@ def _counter(lock: str) -> Variant:
             'callbacks': [{'name': 'topic', 'group': 0, 'depth': 2, 'does': steps}],
             'arrivals': _arrivals(0, [0, 0]),
         },
+        2 if lock == 'with' else 1,
         'No order loses one: whoever has the lock reads and writes before anybody else reads.'
         if lock == 'with'
         else 'Two callbacks ran, and the count is 1: both read 0, and both wrote 1. One update is '
@@ -240,6 +234,7 @@ def _deadlock(threads: int, groups: str) -> Variant:
             ],
             'arrivals': _arrivals(0, [0]),
         },
+        0 if answered else 1,
         lesson,
         '\n'.join(code),
         0 if answered else 1,
@@ -282,6 +277,7 @@ def _cancel(threads: int, job: str) -> Variant:
             ],
             'arrivals': _arrivals(0, [0]) + _arrivals(1, [1.5]),
         },
+        2 if threads == 2 and looks else 3,
         lesson,
         f'executor = {_executor(threads)}\n\n'
         f'for place in range(3):\n{look if looks else ""}    self.visit(place)',

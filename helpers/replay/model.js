@@ -14,8 +14,6 @@
 //                {says: text}         is seen in the sentence, and nothing else
 //                {set: name}          from now on, a work with `unless` of this name does not begin
 //                {call: callback, client: callback}     waits, and holds thread and group
-//                {await: callback, client: callback}    waits, gives the thread back, not the group
-//                {send: callback, client: callback}     goes on; the client takes the answer
 //              Without `does` it is one work without a number.
 //   arrivals   [{at, callback, seq}] in their order, if a schedule says what arrives and when
 // Callbacks, threads and groups are named by their index. Times are seconds.
@@ -26,7 +24,6 @@
 //                                   may say which one is meant
 //   {do: 'go', thread}              the callback on the thread does its next step
 //   {do: 'end', thread}             the callback ends, and an answer goes to the client
-//   {do: 'resume', run, thread}     a thread goes on with a callback whose awaited answer has come
 
 function queueModel() {
   const WORDS = ['No', 'One', 'Two', 'Three', 'Four', 'Five', 'Six', 'Seven', 'Eight', 'Nine', 'Ten'];
@@ -43,14 +40,13 @@ function queueModel() {
 
   // States
 
-  // runs: of threads[i] the run that it has, or null. asleep: runs that await and have no thread.
-  // lost: {callback, seq, by}. locks: name -> id of the run that holds it. values: name -> number.
+  // runs: of threads[i] the run that it has, or null. lost: {callback, seq, by}. locks: name -> id of
+  // the run that holds it. values: name -> number.
   function start(setup) {
     return {
       now: 0,
       queues: setup.callbacks.map(() => []),
       runs: setup.threads.map(() => null),
-      asleep: [],
       lost: [],
       locks: {},
       values: {},
@@ -59,20 +55,8 @@ function queueModel() {
     };
   }
 
-  function copy(state) {
-    return {
-      ...state,
-      queues: state.queues.map(queue => queue.slice()),
-      runs: state.runs.map(run => run && { ...run }),
-      asleep: state.asleep.map(run => ({ ...run })),
-      lost: state.lost.slice(),
-      locks: { ...state.locks },
-      values: { ...state.values },
-    };
-  }
-
   // All runs that have begun and not ended: they hold their groups.
-  const going = state => state.runs.filter(Boolean).concat(state.asleep);
+  const going = state => state.runs.filter(Boolean);
 
   // Who is in a group that lets one in at a time.
   function holderOf(setup, state, group) {
@@ -88,19 +72,11 @@ function queueModel() {
   // Return why no thread takes the oldest of a queue: '' if a thread may take it at once.
   function cause(setup, state, callback) {
     if (!setup.threads.length) return 'no executor';
-    if (!state.runs.includes(null)) {
-      if (state.runs.every(run => run.waits === 'answer')) return 'answer';
-      return state.runs.every(run => blocked(setup, state, run)) ? 'lock' : 'thread busy';
-    }
+    if (!state.runs.includes(null))
+      return state.runs.every(run => run.waits) ? 'answer' : 'thread busy';
     const held = holder(setup, state, callback);
     if (!held) return '';
-    if (held.waits) return 'answer';
-    return blocked(setup, state, held) ? 'lock' : 'group busy';
-  }
-
-  function blocked(setup, state, run) {
-    const { lock } = step(setup, run) ?? {};
-    return lock !== undefined && state.locks[lock] !== undefined;
+    return held.waits ? 'answer' : 'group busy';
   }
 
   // Moves
@@ -115,14 +91,6 @@ function queueModel() {
         return `${capital(named(setup, move))} arrives. ${push(setup, state, move)}`;
       case 'take':
         return take(setup, state, move);
-      case 'resume': {
-        const index = state.asleep.findIndex(({ id }) => id === move.run);
-        const [run] = state.asleep.splice(index, 1);
-        run.waits = '';
-        state.runs[move.thread] = run;
-        nextStep(setup, state, run);
-        return `${capital(setup.threads[move.thread])} goes on with ${named(setup, run)}.`;
-      }
       case 'go':
         return go(setup, state, move.thread);
       case 'end':
@@ -148,14 +116,13 @@ function queueModel() {
       'thread busy': `It waits: ${setup.threads.length > 1 ? 'every thread' : setup.threads[0]} is busy.`,
       'group busy': 'It waits: a thread is free, but its group is busy.',
       answer: 'It waits for a callback that waits for an answer.',
-      lock: 'It waits for a callback that waits for a lock.',
     };
     return says || why[cause(setup, state, callback)];
   }
 
   function take(setup, state, { callback, thread }) {
     const { seq, from } = state.queues[callback].shift();
-    const run = { id: state.started, callback, seq, from, thread, step: -1, waits: '' };
+    const run = { id: state.started, callback, seq, from, thread, step: -1, waits: false };
     state.started += 1;
     state.runs[thread] = run;
     nextStep(setup, state, run);
@@ -217,21 +184,11 @@ function queueModel() {
   }
 
   function ask(setup, state, run, now) {
-    const service = now.call ?? now.await ?? now.send;
-    const who = `${capital(named(setup, run))} asks ${setup.callbacks[service].name}`;
-    push(setup, state, { callback: service, seq: run.seq, from: { run: run.id, client: now.client } });
-    if (now.send !== undefined) {
-      nextStep(setup, state, run);
-      return `${who} and does not wait.`;
-    }
-    run.waits = 'answer';
-    const asked = `${who} and waits`;
-    const { exclusive } = groupOf(setup, run.callback);
-    if (now.call !== undefined)
-      return `${asked}: its thread ${exclusive ? 'and its group wait' : 'waits'} with it.`;
-    state.runs[run.thread] = null;
-    state.asleep.push(run);
-    return `${asked}: its thread is free again${exclusive ? ', its group is not' : ''}.`;
+    push(setup, state, { callback: now.call, seq: run.seq, from: { run: run.id, client: now.client } });
+    run.waits = true;
+    const holds = groupOf(setup, run.callback).exclusive ? 'and its group wait' : 'waits';
+    return `${capital(named(setup, run))} asks ${setup.callbacks[now.call].name} and waits: `
+      + `its thread ${holds} with it.`;
   }
 
   function end(setup, state, thread) {
@@ -245,15 +202,11 @@ function queueModel() {
       return `${ends} Its answer waits for ${setup.callbacks[from.client].name}.`;
     }
     const asker = from && runOf(state, from.run);
-    if (asker?.waits !== 'answer') return ends;
-    if (state.asleep.includes(asker)) {
-      asker.waits = 'thread';
-      return `${ends} ${capital(named(setup, asker))} has its answer, and needs a thread.`;
-    }
-    asker.waits = '';
+    if (!asker?.waits) return ends;
+    asker.waits = false;
     nextStep(setup, state, asker);
     return `${ends} ${capital(named(setup, asker))} has its answer.`;
   }
 
-  return { start, copy, cause, advance, named, capital, step, stepsOf, going, holderOf, holder, groupOf, blocked, runOf };
+  return { start, cause, advance, named, capital, step, stepsOf, going, holderOf, holder, groupOf, runOf };
 }

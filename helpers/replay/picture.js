@@ -10,12 +10,10 @@ const WAITS = {
   'group busy': ['6 2', 'waits, group busy'],
   'no executor': ['2 2', 'waits, no executor'],
   answer: ['4 2', 'waits, for one that waits'],
-  lock: ['2 4', 'waits, for a lock'],
 };
 const RUNS = {
   '': ['', 'callback runs'],
   answer: ['2 2', 'callback waits for an answer'],
-  lock: ['1 3', 'callback waits for a lock'],
 };
 const CROSS = 'm-3-3l6 6m0-6l-6 6';
 

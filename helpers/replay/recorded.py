@@ -2,95 +2,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
-from helpers.replay import KINDS, Run
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
+
+from helpers.recording import CallbackRecording, CallbackRun
+from helpers.replay import KINDS, Run, fill_up
 from helpers.replay.events import ARRIVE, END, TAKE
 
 DEPTH = 10  # of services and clients, by default; a timer's tick is taken when it is recorded
-GO, RESUME = 'go', 'resume'
-SAME_TIME = [ARRIVE, TAKE, GO, RESUME, END]
+GO = 'go'
+SAME_TIME = [ARRIVE, TAKE, GO, END]
 
 
-@dataclass(frozen=True)
-class Callback:
-    """A callback as model.js needs it: `word` names what waits for it, `does` are its steps.
-
-    `group` is the same for all callbacks of one group, None for one that is in no group.
-    """
+class Callback(NamedTuple):
+    """A callback as model.js needs it: `word` names what waits for it, `does` are its steps."""
 
     name: str
     word: str
-    group: Hashable | None
-    exclusive: bool
-    does: list[dict] = field(default_factory=list)
+    group: CallbackGroup | None
+    does: list[dict]
 
 
-@dataclass(frozen=True)
-class Move:
-    """A move of model.js at a time in seconds: of a callback, on a thread.
+class Move(NamedTuple):
+    """A move of model.js: when (`time.monotonic`), which, and of which callback, by its place.
 
-    `number` is that of a message that arrives, else the place of the thread. `run` names the run
-    of the callback, if a later move may resume it.
+    `number` is that of a message that arrives, else the thread's ident.
     """
 
     at_s: float
     do: str
     callback: int
     number: int
-    run: tuple[str, int] | None = None
+
+
+def moves_of(
+    run: CallbackRun, callback: int, seq: int, arrived_s: float | None = None
+) -> Iterator[Move]:
+    """Yield the moves that make a run. Without `arrived_s` its message comes by itself."""
+    if arrived_s is not None:
+        yield Move(arrived_s, ARRIVE, callback, seq)
+    yield Move(run.started_s, TAKE, callback, run.thread)
+    if not run.running:
+        yield Move(run.finished_s, END, callback, run.thread)
 
 
 def run_of(
-    threads: list[str],
+    recording: CallbackRecording,
+    threads: int,
     callbacks: Sequence[Callback],
     moves: Iterable[Move],
     time_label: str,
 ) -> Run:
     """Return recorded callbacks as a run, which has no summary yet."""
-    members: dict[Hashable | None, list[Callback]] = {}
+    zero, found = recording.zero_and_threads()
+    members: dict[CallbackGroup | None, list[str]] = {}
     for one in callbacks:
-        members.setdefault(one.group, []).append(one)
+        members.setdefault(one.group, []).append(one.name)
     groups = list(members)
     setup = {
-        'threads': threads,
+        'threads': fill_up(set(found.values()), threads),
         'groups': [
             {
-                'name': 'no group'
-                if group is None
-                else f'the group of {" and ".join(one.name for one in own)}',
-                'exclusive': own[0].exclusive,
+                'name': f'the group of {" and ".join(names)}' if group else 'no group',
+                'exclusive': isinstance(group, MutuallyExclusiveCallbackGroup),
             }
-            for group, own in members.items()
+            for group, names in members.items()
         ],
         'callbacks': [
-            {
-                'name': one.name,
-                'word': one.word,
-                'group': groups.index(one.group),
-                'depth': DEPTH,
-                'does': one.does,
-            }
-            for one in callbacks
+            one._asdict() | {'group': groups.index(one.group), 'depth': DEPTH} for one in callbacks
         ],
     }
-    return Run('', '', False, setup, _in_order(moves), time_label)
-
-
-def _in_order(moves: Iterable[Move]) -> list[list[int]]:
-    """Return the moves as walk.js reads them. It names a run that is resumed by its number."""
-    moves = sorted(moves, key=lambda move: (move.at_s, SAME_TIME.index(move.do)))
-    runs = [move.run for move in moves if move.do == TAKE]
-    return [
+    place = {ident: setup['threads'].index(name) for ident, name in found.items()}
+    in_short = [
         [
-            round(1e6 * move.at_s),
-            KINDS.index(move.do),
-            runs.index(move.run) if move.do == RESUME else move.callback,
-            move.number,
+            round(1e6 * (at_s - zero)),
+            KINDS.index(do),
+            callback,
+            number if do == ARRIVE else place[number],
         ]
-        for move in moves
+        for at_s, do, callback, number in sorted(
+            moves, key=lambda move: (move.at_s, SAME_TIME.index(move.do))
+        )
     ]
+    return Run('', '', False, setup, in_short, time_label)
 
 
 def count_of(threads: int) -> str:

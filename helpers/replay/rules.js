@@ -35,14 +35,10 @@ function refereed(model) {
     const thread = setup.threads[move.thread];
     if (thread === undefined) return 'There is no such thread.';
     const run = state.runs[move.thread];
-    if (move.do === 'take' || move.do === 'resume') {
+    if (move.do === 'take') {
       if (run)
         return `${capital(thread)} is busy with ${named(setup, run)}: `
           + 'it runs one callback at a time.';
-      if (move.do === 'resume') {
-        const asleep = state.asleep.find(({ id }) => id === move.run);
-        return asleep?.waits === 'thread' ? '' : 'Its answer has not come.';
-      }
       const [oldest] = state.queues[move.callback];
       if (!oldest) return 'Nothing waits there.';
       if (oldest.seq !== (move.seq ?? oldest.seq))
@@ -54,7 +50,7 @@ function refereed(model) {
       return '';
     }
     if (!run) return `${capital(thread)} runs nothing.`;
-    if (run.waits === 'answer') return `${capital(named(setup, run))} waits for an answer.`;
+    if (run.waits) return `${capital(named(setup, run))} waits for an answer.`;
     const now = step(setup, run);
     if (run.until !== undefined && at < run.until)
       return `${capital(named(setup, run))} is not done before ${run.until} s.`;
@@ -72,7 +68,6 @@ function refereed(model) {
     const found = due(setup, state).slice(0, 1);
     setup.threads.forEach((_, thread) => {
       setup.callbacks.forEach((_, callback) => found.push({ do: 'take', callback, thread }));
-      state.asleep.forEach(({ id }) => found.push({ do: 'resume', run: id, thread }));
       if (state.runs[thread]?.until === undefined)
         found.push({ do: 'go', thread }, { do: 'end', thread });
     });
@@ -92,7 +87,7 @@ function refereed(model) {
 
   // The same, and the state that came in stays as it was.
   function apply(setup, state, move) {
-    const after = model.copy(state);
+    const after = JSON.parse(JSON.stringify(state));
     const says = advance(setup, after, move);
     return { state: after, says };
   }

@@ -3,6 +3,7 @@
 import json
 import re
 from functools import cache
+from html import escape
 from pathlib import Path
 
 # Not from `quickjs`: importing that starts a thread, which stays in the kernel.
@@ -38,6 +39,19 @@ def script(*names: str) -> str:
 def style(*names: str) -> str:
     """Return the look that all share, and files of this folder, as an element of HTML."""
     return f'<style>{short(LOOK_CSS)}{"".join(map(source, ("style.css", *names)))}</style>'
+
+
+def played(kind: str, record: dict, says: str, *names: str) -> str:
+    """Return a game of this kind as a part of a page: what it says, and the files that make it one.
+
+    `record` is what their script gets.
+    """
+    return (
+        f'<div class="replay {kind}" data-{kind}={attribute(record)}>'
+        f'{style(f"{kind}.css")}<p>{escape(says)}</p>'
+        '<p class="replay-static">To play it, run the cell, or trust the notebook.</p>'
+        f'<script>{script(*names)}</script></div>'
+    )
 
 
 def javascript(function: str, *arguments) -> list | dict:

@@ -36,7 +36,7 @@ function show(root, values) {
   wake(root, 'free play');
   root.removeAttribute('tabindex');
   root.addEventListener('keydown', event => event.stopPropagation());
-  root.querySelector('.free-static').replaceWith(
+  root.querySelector('.replay-static').replaceWith(
     element('div', { class: 'replay-controls' }, ...sliders.map(({ node }) => node),
       element('label', {}, 'group ', group)),
     says, drawn);

@@ -29,8 +29,7 @@ function stories(record, most) {
     const going = model.going(state);
     going.filter(of).forEach(it => {
       of(it).left ??= state.now;
-      const blocked = model.blocked(setup, state, it) ? 'lock' : '';
-      because(of(it).runs, state.now, it.waits === 'answer' ? 'answer' : blocked);
+      because(of(it).runs, state.now, it.waits ? 'answer' : '');
     });
     found.forEach(story => {
       const goes = going.some(it => of(it) === story);

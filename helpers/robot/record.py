@@ -47,9 +47,6 @@ class Event(NamedTuple):
     text: str
 
 
-ROWS = {'poses': Step, 'commands': Command, 'scans': Scan, 'events': Event}
-
-
 @dataclass
 class DriveRecord:
     """The drive of a robot so far. The lists grow while it drives, and can be read meanwhile.
@@ -66,10 +63,5 @@ class DriveRecord:
     events: list[Event] = field(default_factory=list)
 
     def table(self, name: str) -> pd.DataFrame:
-        """Return one of the lists as a table, a row for each entry.
-
-        Raises ValueError for another name.
-        """
-        if name not in ROWS:
-            raise ValueError(f'A drive has the tables {", ".join(ROWS)}, not {name!r}.')
-        return pd.DataFrame(list(getattr(self, name)), columns=list(ROWS[name].__annotations__))
+        """Return one of the lists, such as 'poses', as a table with a row for each entry."""
+        return pd.DataFrame(getattr(self, name))

@@ -76,7 +76,6 @@ const after = (setup, moves) =>
   moves.reduce((was, move) => model.apply(setup, was.state, move), { state: model.start(setup) });
 const refusal = (setup, moves, move) => model.refusal(setup, after(setup, moves).state, move);
 const last = (setup, moves) => after(setup, moves).says;
-const cause = (setup, moves) => model.cause(setup, after(setup, moves).state, 0);
 """
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from helpers.replay.script import attribute, source, style
 from helpers.robot import body
 from helpers.robot.floor import ROOMS
-from helpers.robot.view.picture import Track, described, picture
+from helpers.robot.view.picture import described, picture
 
 SCRIPT = Path(__file__).with_suffix('.js')
 
@@ -19,7 +19,7 @@ def record() -> dict:
 
 def html() -> str:
     """Return it as a part of a page."""
-    svg = picture(ROOMS, Track(), ROOMS.start)
+    svg = picture(ROOMS, [ROOMS.start[:2]], ROOMS.start)
     return (
         f'<div class="replay" data-drive={attribute(record())}>{style("drive.css")}'
         '<p>Click the floor, and drive with the arrow keys; or hold a button. Come to A, B and C '

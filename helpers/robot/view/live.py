@@ -12,7 +12,7 @@ from helpers.replay import Replay
 from helpers.replay.script import style
 from helpers.robot.floor import Pose
 from helpers.robot.robot import Robot
-from helpers.robot.view.picture import Track, described, picture
+from helpers.robot.view.picture import described, picture
 from helpers.robot.view.replay import bumps, place, replay_drive
 from helpers.robot.view.scans import ScanRecording
 from helpers.session import current_session
@@ -23,18 +23,15 @@ NEWS_S = 3.0  # so long an event is shown
 
 
 def watch(
-    robot: Robot,
-    subscription: Subscription | None = None,
-    threads: int = 1,
-    name: str = '',
+    robot: Robot, subscription: Subscription | None = None, name: str = ''
 ) -> ScanRecording | None:
     """Show a robot while this cell runs, and its replay when the session closes.
 
     The replay is also there after an Interrupt, and alone where nobody watches, as under nbval.
 
     With a subscription to the robot's scans one sees, too, which scan its callback works on, how
-    old it is, and which ones wait. `threads` is how many its executor has. `name` is what the
-    replay calls the drive. Returns its recording.
+    old it is, and which ones wait. `name` is what the replay calls the drive. Returns its
+    recording.
 
     Raises TypeError for anything but a robot and a subscription, ValueError for one that does not
     hear the scans, RuntimeError where no session is open.
@@ -47,8 +44,8 @@ def watch(
 
     def end() -> None:
         try:
-            shown = replay_drive(robot.record, recording, threads, name)
-        except ValueError:  # interrupted where the recording does not add up
+            shown = replay_drive(robot.record, recording, name)
+        except ValueError:  # interrupted where it does not add up, or heard by several threads
             shown = replay_drive(robot.record, name=name)
         view.stop(shown)
 
@@ -65,7 +62,6 @@ class LiveView:
 
     def __init__(self, robot: Robot, recording: ScanRecording | None) -> None:
         self._record, self._recording = robot.record, recording
-        self._track, self._passed = Track(), 0
         self._display = None
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name='robot view', daemon=True)
@@ -99,29 +95,21 @@ class LiveView:
         record = self._record
         poses, scans, commands = record.poses, record.scans, record.commands
         now = poses[-1]
-        for row in poses[self._passed : len(poses) : EVERY]:
-            self._track.add(row.x, row.y)
-            self._passed += EVERY
         svg = picture(
             record.floor,
-            self._track,
+            [row[1:3] for row in [*poses[::EVERY], now]],
             Pose(now.x, now.y, now.yaw),
             scans[-1].ranges if scans else None,
             [place(record, bump.t_s) for bump in bumps(record)],
         )
-        told = [f'{commands[-1].v:.2f} m/s, {commands[-1].w:.2f} rad/s'] if commands else []
-        rows = [
-            ('time', [f'{now.t_s:.1f} s']),
-            ('robot', [f'{now.v:.2f} m/s, {now.w:.2f} rad/s']),
-            ('told', told or ['nothing yet']),
-        ]
+        told = speeds(*commands[-1][1:]) if commands else 'nothing yet'
         news = record.events[-1:]
         said = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
-        body = ''.join(_row(name, *map(escape, words)) for name, words in rows)
         return (
             f'<div class="replay robot-live">{style("drive.css")}'
-            f'<div role="img" aria-label="{escape(described(record.floor))}">{svg}</div>{body}'
-            f'{self._queue()}<p class="replay-says">{escape(said)}</p></div>'
+            f'<div role="img" aria-label="{escape(described(record.floor))}">{svg}</div>'
+            f'{_row("time", f"{now.t_s:.1f} s")}{_row("robot", speeds(now.v, now.w))}'
+            f'{_row("told", told)}{self._queue()}<p class="replay-says">{escape(said)}</p></div>'
         )
 
     def _queue(self) -> str:
@@ -136,6 +124,11 @@ class LiveView:
         waiting = ''.join(f'<li><b>{seq}</b></li>' for seq in waits)
         busy = busy or ['<li class="replay-free">free</li>']
         return _row('callback', *busy) + _row('queue', waiting)
+
+
+def speeds(v: float, w: float) -> str:
+    """Return a speed (m/s) and a turning rate (rad/s) in words."""
+    return f'{v:.2f} m/s, {w:.2f} rad/s'
 
 
 def _row(name: str, *content: str) -> str:

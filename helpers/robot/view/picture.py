@@ -7,7 +7,7 @@ picture, as drive.js does, computes no pixels. Ink is `currentColor`, right in l
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 
 import numpy as np
@@ -20,20 +20,19 @@ from helpers.robot.sensors import ANGLES, RANGE_MAX
 WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor
 BEAMS = 61  # of a scan, in a picture
-APART_M = 0.03  # points of a path
 WALL_M = 0.15  # of an outer wall
 ROBOT, WAITING, LOST = LOOK['robot'], LOOK['waiting'], LOOK['lost']
 
 
 def picture(
     floor: Floor,
-    track: Track,
+    points: Iterable[tuple[float, float]],
     pose: Pose,
     ranges: np.ndarray | None = None,
     bumps: Sequence[Pose] = (),
     seconds: Sequence[Pose] = (),
 ) -> str:
-    """Return the SVG: the floor, the path, the robot at `pose` with its laser.
+    """Return the SVG: the floor, the path through `points`, the robot at `pose` with its laser.
 
     `ranges` is a scan around `pose`, in metres. `seconds` are the places that get a dot, `bumps`
     those where it hit something.
@@ -42,6 +41,7 @@ def picture(
     scale = min((WIDTH - 2 * MARGIN) / (right - x), (HEIGHT - 2 * MARGIN) / (above - y))
     width, height = (scale * size + 2 * MARGIN for size in (right - x, above - y))
     r = max(RADIUS_M, SMALLEST / scale)  # on a large floor the robot is drawn larger than it is
+    way = 'L'.join(f'{x:.2f} {y:.2f}' for x, y in points)
     start = floor.start
     ring = f'M{start.x - r:.3f} {start.y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} 0'
     ring += f'a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
@@ -51,7 +51,7 @@ def picture(
         f'stroke="{ROBOT}" stroke-opacity=".6"/>',
         f'<path class="old" d="" fill="none" stroke="{WAITING}" '
         'stroke-width="2" stroke-dasharray="5 4"/>',
-        f'<path class="all" d="{track.line()}" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
+        f'<path class="all" d="M{way}" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
         f'<path class="driven" d="" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
         f'<path class="seconds" d="{dots(seconds)}" stroke="{ROBOT}" stroke-width="6.5" '
         'stroke-linecap="round"/>',
@@ -115,26 +115,6 @@ def _floor(floor: Floor, scale: float) -> str:
     )
 
 
-class Track:
-    """A path through points that are apart."""
-
-    def __init__(self) -> None:
-        self._points: list[tuple[float, float]] = []
-        self._last: tuple[float, float] | None = None
-
-    def add(self, x: float, y: float) -> None:
-        """Go on to a point."""
-        self._last = x, y
-        if not self._points or math.dist(self._points[-1], self._last) >= APART_M:
-            self._points.append(self._last)
-
-    def line(self) -> str:
-        """Return the path as SVG has it."""
-        if not self._points:
-            return ''
-        return f'M{"L".join(f"{x:.2f} {y:.2f}" for x, y in [*self._points, self._last])}'
-
-
 def dots(poses: Sequence[Pose]) -> str:
     """Return a path of dots."""
     return ''.join(f'M{x:.2f} {y:.2f}h0' for x, y, *_ in poses)
@@ -154,7 +134,7 @@ def fan(pose: Pose, ranges: np.ndarray | None) -> str:
     if ranges is None or not len(ranges):
         return ''
     beams = np.linspace(0, len(ranges) - 1, BEAMS).round().astype(int)
-    few = np.nan_to_num(ranges[beams], nan=0.0, posinf=RANGE_MAX)
+    few = ranges[beams].clip(0, RANGE_MAX)
     angles = pose.yaw + ANGLES[beams]
     xs, ys = pose.x + few * np.cos(angles), pose.y + few * np.sin(angles)
     hits = 'L'.join(f'{x:.2f} {y:.2f}' for x, y in zip(xs.tolist(), ys.tolist(), strict=True))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from bisect import bisect_right
 from collections import deque
@@ -13,15 +12,14 @@ import numpy as np
 from helpers.replay import Replay, replay
 from helpers.robot.floor import Pose
 from helpers.robot.record import DriveRecord, Event
-from helpers.robot.sensors import ANGLES
-from helpers.robot.view.picture import Track, described, picture
+from helpers.robot.sensors import ANGLES, RANGE_MAX
+from helpers.robot.view.picture import described, picture
 from helpers.robot.view.scans import ScanRecording
 
 # What a notebook keeps of a drive, at most: so it stays below 60 kB.
 POSES, SCANS, COMMANDS, EVENTS = 400, 60, 150, 50
 EVERY_S = 0.1  # a pose
 BEAMS = 46  # of a scan
-FURTHEST = 255  # of a range: it saw nothing
 TIMES = ['published_s', 'started_s', 'finished_s']
 TIME_LABEL = "time since the robot's start (s)"
 
@@ -48,20 +46,16 @@ class Drive:
         count = min(math.ceil(end / EVERY_S), POSES) + 1
         columns = (*rows.T[1:3], np.unwrap(rows[:, 3]), *rows.T[4:6])
         times = np.linspace(0, end, count)
-        return end / max(count - 1, 1), np.stack(
-            [np.interp(times, rows[:, 0], column) for column in columns], axis=1
-        )
+        poses = np.stack([np.interp(times, rows[:, 0], column) for column in columns], axis=1)
+        return end / max(count - 1, 1), poses.round(3)
 
     def picture(self) -> str:
         """Return the floor as an SVG at the end of the drive."""
         _, end = self.span_s
         scans = self.record_.scans
-        track = Track()
-        for x, y, *_ in self.sampled()[1].tolist():
-            track.add(x, y)
         return picture(
             self.record_.floor,
-            track,
+            self.sampled()[1][:, :2].tolist(),
             place(self.record_, end),
             scans[-1].ranges if scans else None,
             [place(self.record_, bump.t_s) for bump in bumps(self.record_)],
@@ -74,28 +68,22 @@ class Drive:
         return f'{self.summary} {described(self.record_.floor)}'
 
     def record(self) -> dict:
-        """Return what drive.js needs: whole milliseconds, mm/s and mrad/s."""
-        floor, step = self.record_.floor, self.sampled()
-        unit = max(1.0, *floor.size_m) / 20_000  # metres; a robot may leave an open floor
-        scale = np.array([1 / unit, 1 / unit, 1e4, 1e3, 1e3])
-        poses = step[1].copy()
-        poses[:, 2] = np.arctan2(np.sin(poses[:, 2]), np.cos(poses[:, 2]))
-        poses = np.clip((poses * scale).round(), -32_000, 32_000)
-        scans = thinned(self.record_.scans, SCANS)
+        """Return what drive.js needs: m and rad, and whole ms and cm (of ranges)."""
+        step, poses = self.sampled()
         few = np.linspace(0, len(ANGLES) - 1, BEAMS).round().astype(int)
-        ranges = np.array([scan.ranges[few] for scan in scans], float).reshape(-1, BEAMS)
-        furthest = np.max(ranges, initial=1.0, where=np.isfinite(ranges))
-        quantum = furthest / (FURTHEST - 1)
-        ranges = np.nan_to_num(ranges / quantum, nan=0, posinf=FURTHEST).round().clip(0, FURTHEST)
         return {
             'name': self.name,
-            'unit': unit,
-            'step': round(step[0], 4),
-            'poses': packed(poses, '<i2'),
+            'step': round(step, 4),
+            'poses': poses.tolist(),
             'view': round(float(ANGLES[-1] - ANGLES[0]), 4),
-            'range': round(quantum, 4),
-            'scanned': [[round(1000 * scan.t_s), scan.seq] for scan in scans],
-            'scans': packed(ranges, 'u1'),
+            'scans': [
+                [
+                    round(1000 * scan.t_s),
+                    scan.seq,
+                    (100 * scan.ranges[few].clip(0, RANGE_MAX)).round().astype(int).tolist(),
+                ]
+                for scan in thinned(self.record_.scans, SCANS)
+            ],
             'commands': self.commands(),
             'events': [
                 [round(1000 * event.t_s), event.text] for event in self.record_.events[:EVENTS]
@@ -103,7 +91,7 @@ class Drive:
             'bumps': [round(1000 * bump.t_s) for bump in bumps(self.record_)],
         }
 
-    def commands(self) -> list[list[int]]:
+    def commands(self) -> list[list[float]]:
         """Return of each command [when, speed, turning, message, its age]; -1 is no message.
 
         The message is that whose callback sent it. Commands arrive in the order in which they are
@@ -120,7 +108,7 @@ class Drive:
                 *_, seq = sent.popleft()
                 if seq >= 0:
                     message = seq, round(1000 * (command.t_s - self.record_.scans[seq].t_s))
-            told = round(1000 * command.v), round(1000 * command.w)
+            told = round(command.v, 3), round(command.w, 3)
             found.append(((told != before), [round(1000 * command.t_s), *told, *message]))
             before = told
         if len(found) > COMMANDS:
@@ -131,15 +119,14 @@ class Drive:
 def replay_drive(
     record: DriveRecord,
     recording: ScanRecording | None = None,
-    threads: int = 1,
     name: str = '',
 ) -> Replay:
     """Return a drive to step through: the floor, and when `recording` is given, its queue beside.
 
     `record` is `robot.record`, `recording` what `watch` returned for the subscription that commands
-    the robot, `threads` how many its executor has. With the mouse, keys or Play one sees
-    what the robot saw, what it was told, and which scan it acted on. `name` is what this drive is
-    called in words, so that one tells it from others of the page.
+    the robot, in one thread. With the mouse, keys or Play one sees what the robot saw, what it was
+    told, and which scan it acted on. `name` is what this drive is called in words, so that one
+    tells it from others of the page.
 
     Raises TypeError for anything else, ValueError for a recording beside a drive in sim time, and
     what `helpers.replay.replay` raises.
@@ -152,30 +139,21 @@ def replay_drive(
     called = f'{name}: ' if name else ''
     summary = f'{called}A drive on the floor {record.floor.name}. The robot {end}.'
     if recording is None:
-        return DriveReplay((Drive(record, summary),))
+        return Replay((Drive(record, summary),))
     if record.started_s is None:
         raise ValueError(
             'In sim time a drive and a recording share no clock: replay the drive alone.'
         )
     table = recording.table()
     table[TIMES] += recording.started_s - record.started_s
-    (run,) = replay(table, recording.depth, threads, recording.group).runs
+    (run,) = replay(table, recording.depth).runs
     # How many messages there were differs from run to run.
     said = run.summary.partition(', ')[2]
     drive = Drive(record, summary, recording)
     after_s = drive.span_s[1] - run.moves[-1][0] / 1e6
     said = called + said[0].upper() + said[1:]
     run = replace(run, summary=said, time_label=TIME_LABEL, after_s=after_s)
-    return DriveReplay((drive, run))
-
-
-@dataclass(frozen=True)
-class DriveReplay(Replay):
-    """A drive, and the queue of its messages."""
-
-    def __str__(self) -> str:
-        """Return what is true each time: nbval compares it."""
-        return f'Replay: {" ".join(run.summary for run in self.runs)}'
+    return Replay((drive, run))
 
 
 def place(record: DriveRecord, t_s: float) -> Pose:
@@ -194,8 +172,3 @@ def thinned(rows: list, most: int) -> list:
     if len(rows) <= most:
         return list(rows)
     return [rows[index] for index in np.linspace(0, len(rows) - 1, most).round().astype(int)]
-
-
-def packed(numbers: np.ndarray, kind: str) -> str:
-    """Return numbers as base64, two bytes or one each."""
-    return base64.b64encode(numbers.astype(kind).tobytes()).decode()

@@ -6,13 +6,11 @@ import functools
 import threading
 import time
 
-from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 from rclpy.time import Time
 
 from helpers.recording import Recording
-from helpers.replay import EXCLUSIVE, REENTRANT
 from helpers.robot.robot import Robot
 from helpers.session import find
 
@@ -20,7 +18,7 @@ from helpers.session import find
 class ScanRecording(Recording):
     """A `Recording` of the robot's scans, from now on. Their numbers are those of `robot.record`.
 
-    `depth` and `group` are those of the subscription, as `helpers.replay.replay` wants them.
+    `depth` is that of the subscription.
 
     Raises TypeError for anything but a robot and a subscription, ValueError for another topic.
     """
@@ -38,8 +36,6 @@ class ScanRecording(Recording):
                 f'This subscription hears {subscription.topic_name}: give one that hears {topic}.'
             )
         self.depth = subscription.qos_profile.depth
-        reentrant = isinstance(subscription.callback_group, ReentrantCallbackGroup)
-        self.group = REENTRANT if reentrant else EXCLUSIVE
         self._scans = robot.record.scans
         super().__init__(topics[topic], subscription)
         # Of each command of this node: when it was sent, its speeds, and the scan of its callback.
