@@ -8,14 +8,13 @@ own names, because they need ROS.
 """
 
 from helpers.fusion.drives import simulate
-from helpers.fusion.evaluation import covariances, errors, rmse
+from helpers.fusion.evaluation import errors, rmse
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter
 from helpers.fusion.tables import (
     SENSORS,
     VARIANCES,
     fuse,
     fuse_with_innovations,
-    innovations,
 )
 
 __all__ = [
@@ -23,11 +22,9 @@ __all__ = [
     'STATE',
     'VARIANCES',
     'ExtendedKalmanFilter',
-    'covariances',
     'errors',
     'fuse',
     'fuse_with_innovations',
-    'innovations',
     'rmse',
     'simulate',
 ]

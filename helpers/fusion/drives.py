@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from helpers.fusion import settings
 from helpers.fusion.filter import STATE
 from helpers.fusion.tables import VARIANCES
 
@@ -22,7 +21,6 @@ TURN_SCALE = 1.05
 TURN_BIAS = 0.012  # rad/s
 GYRO_BIAS = 0.002  # rad/s
 SLIP_SPEED = 0.5  # m/s, what the wheels say too much while they slip
-GPS_JUMP_M = 20.0
 
 
 class Drive(NamedTuple):
@@ -38,49 +36,34 @@ def simulate(
     *,
     slip: tuple[float, float] | None = None,
     slip_speed: float = SLIP_SPEED,
-    gps_outliers: int = 0,
-    gps_gap: tuple[float, float] | None = None,
     imu_mounting: float = 0.0,
-    variances: Mapping[str, float] | None = None,
 ) -> Drive:
     """Drive a unicycle for some seconds, and return what its sensors say and what is true.
 
     The robot starts at 0, 0 towards x, speeds up for two seconds, then swings between forwards and
     backwards, and turns left and right: the path of the drives in tests/data. Wheels and IMU speak
-    50 times a second, GPS once. The noise of each column is white and normal with VARIANCES, of
-    which `variances` replaces some. So GPS is off by sigma = 0.5 m along each axis, 0.71 m in the
-    plane; the errors of a real GPS last for minutes. The seed decides the noise and the outliers,
-    nothing else.
+    50 times a second, GPS once. The noise of each column is white and normal with VARIANCES. So GPS
+    is off by sigma = 0.5 m along each axis, 0.71 m in the plane; the errors of a real GPS last for
+    minutes. The seed decides the noise, nothing else.
 
     Not all is noise: the wheels report 4 % too much speed, 5 % too much turning and 0.012 rad/s
     besides, the gyro 0.002 rad/s too much. While the wheels slip (`slip`: from, to in s) they
     report `slip_speed` m/s more than the robot moves. The IMU is mounted turned by `imu_mounting`
-    rad, and reports in its own frame. `gps_outliers` of the fixes, never the first, jump 20 m away.
-    There is no fix during `gps_gap` (from, to in s).
+    rad, and reports in its own frame.
 
     Returns `Drive(measurements, truth)`. The measurements have the columns that `fuse` reads, and
     `ay`, the IMU's other acceleration (m/s^2), which a turned IMU needs; there is no gravity in
     them. The truth has `t` and the columns of STATE, with the centripetal acceleration as `ay`.
-
-    Raises ValueError or TypeError for variances that cannot be used, and ValueError for more
-    outliers than fixes.
     """
-    variances = settings.variances('variances', variances, VARIANCES)
     t = np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
-    fix = (np.arange(len(t)) % GPS_EVERY == 0) & ~_during(gps_gap, t)
-    later = np.flatnonzero(fix)[1:]
     truth = _path(t)
     rng = np.random.default_rng(seed)
     measurements = pd.DataFrame(said(truth, slip_speed * _during(slip, t), imu_mounting))
-    sigma = np.sqrt([variances['ax' if name == 'ay' else name] for name in measurements])
+    sigma = np.sqrt([VARIANCES['ax' if name == 'ay' else name] for name in measurements])
     measurements += rng.normal(0, sigma, measurements.shape)
     measurements['imu_yaw'] = _angle(measurements['imu_yaw'])
     measurements.insert(0, 't', t)
-    direction = rng.uniform(-math.pi, math.pi, gps_outliers)
-    measurements.loc[rng.choice(later, gps_outliers, replace=False), ['gps_x', 'gps_y']] += (
-        GPS_JUMP_M * np.column_stack([np.cos(direction), np.sin(direction)])
-    )
-    measurements.loc[~fix, ['gps_x', 'gps_y']] = np.nan
+    measurements.loc[np.arange(len(t)) % GPS_EVERY > 0, ['gps_x', 'gps_y']] = np.nan
     return Drive(measurements, truth)
 
 

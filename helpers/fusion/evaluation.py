@@ -3,22 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 
-from helpers.fusion.tables import POSE, columns_of, covariance_column
-
-
-def covariances(estimate: pd.DataFrame, names: Sequence[str] = ('x', 'y')) -> np.ndarray:
-    """Return the covariance of `names`, parts of the pose, in each row of what `fuse` returned.
-
-    The shape is (rows, k, k).
-    """
-    columns = columns_of(estimate, {covariance_column(a, b) for a in names for b in names})
-    matrix = [[columns[covariance_column(a, b)] for b in names] for a in names]
-    return np.array(matrix).transpose(2, 0, 1)
+from helpers.fusion.tables import POSE, columns_of
 
 
 def errors(estimate: pd.DataFrame, truth: pd.DataFrame) -> pd.DataFrame:

@@ -52,7 +52,6 @@ def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
 
     The options, each a dict:
     - `process_noise`: replaces some of PROCESS_NOISE, {'x': 0.002, 'y': 0.002};
-    - `variances`: replaces some of VARIANCES, {'vx': 0.25};
     - `config`: the parts of the state that a sensor measures, if not all that it can,
       {'odom': ('vx', 'vy')};
     - `gate`: the Mahalanobis distance at which a message of a sensor is kept out, {'gps': 3.0}. The
@@ -60,7 +59,7 @@ def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
 
     Returns a table with a row for each time: `t`, `x`, `y`, `yaw`, `vx`, `vy`, `vyaw`, and the
     covariance of the pose: `var_x`, `cov_x_y`, `cov_x_yaw`, `var_y`, `cov_y_yaw`, `var_yaw` (NaN
-    before the first message). `covariances` makes matrices of them.
+    before the first message).
 
     Raises ValueError or TypeError, with a sentence that says what to change, for a table or an
     option that cannot be used.
@@ -68,30 +67,17 @@ def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
     return _estimates(_run(measurements, sensors, options))
 
 
-def innovations(
-    measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
-) -> pd.DataFrame:
-    """Return how each message of `fuse`, with the same arguments, differed from the expected.
-
-    One row for each number measured: `t`, `sensor`, `variable` (its name in STATE), `innovation`
-    (measured minus expected), `sigma` (the standard deviation that the filter expects of it), and
-    of the whole message `nis`, `dof` (how many numbers it measured) and `accepted`.
-    """
-    return _innovations(_run(measurements, sensors, options))
-
-
 def fuse_with_innovations(
     measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
 ) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Return what `fuse` and what `innovations` return, from one run of the filter."""
+    """Return what `fuse` returns, and how each message differed from the expected.
+
+    That table has a row for each number measured: `t`, `sensor`, `variable` (its name in STATE),
+    `innovation` (measured minus expected), `sigma` (the standard deviation that the filter expects
+    of it), and of the whole message `nis`, `dof` (how many numbers it measured) and `accepted`.
+    """
     steps = _run(measurements, sensors, options)
     return _estimates(steps), _innovations(steps)
-
-
-def covariance_column(a: str, b: str) -> str:
-    """Return the column of `fuse` with the covariance of two parts of the pose."""
-    first, second = sorted((a, b), key=POSE.index)
-    return f'var_{a}' if a == b else f'cov_{first}_{second}'
 
 
 def columns_of(table: pd.DataFrame, names: Iterable[str]) -> dict[str, np.ndarray]:
@@ -114,8 +100,9 @@ def _estimates(steps: list[_Step]) -> pd.DataFrame:
     times, states, matrices, _ = zip(*steps, strict=True)
     columns = {'t': times} | dict(zip(STATE[:6], np.array(states).T, strict=True))
     matrices = np.array(matrices)
-    for a, b in combinations_with_replacement(POSE, 2):
-        columns[covariance_column(a, b)] = matrices[:, POSE.index(a), POSE.index(b)]
+    for i, j in combinations_with_replacement(range(len(POSE)), 2):
+        name = f'var_{POSE[i]}' if i == j else f'cov_{POSE[i]}_{POSE[j]}'
+        columns[name] = matrices[:, i, j]
     return pd.DataFrame(columns)
 
 
@@ -131,9 +118,8 @@ def _innovations(steps: list[_Step]) -> pd.DataFrame:
 
 def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -> list[_Step]:
     """Feed the rows to a filter. A message of which one number is NaN is left out."""
-    settings.chosen('options', options, ('process_noise', 'variances', 'config', 'gate'))
+    settings.chosen('options', options, ('process_noise', 'config', 'gate'))
     ekf = ExtendedKalmanFilter(options.get('process_noise'))
-    variances = settings.variances('variances', options.get('variances'), VARIANCES)
     gates = settings.chosen('gate', options.get('gate'), SENSORS)
     gates = {sensor: settings.positive(f'gate[{sensor!r}]', gates[sensor]) for sensor in gates}
     messages = _messages(sensors, options.get('config'))
@@ -141,7 +127,7 @@ def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -
     prepared = []
     for sensor, parts in messages:
         values = np.column_stack([table[column] for column in parts.values()])
-        noise = np.diag([variances[column] for column in parts.values()])
+        noise = np.diag([VARIANCES[column] for column in parts.values()])
         said = ~np.isnan(values).any(axis=1)
         prepared.append((sensor, tuple(parts), part_of_state(tuple(parts)), noise, values, said))
     steps = []

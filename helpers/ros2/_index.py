@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,33 +18,40 @@ INDEX = 'share/ament_index/resource_index'
 KINDS = 'msg', 'srv', 'action'
 
 
-def prefixes() -> list[Path]:
+def prefixes(environment: Mapping[str, str] = os.environ) -> list[Path]:
     """Return where packages are installed. The first one that has a package wins."""
-    named = [Path(p) for p in os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if p]
+    named = [Path(p) for p in environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep) if p]
     return [p for p in dict.fromkeys([*named, Path(sys.prefix)]) if (p / INDEX).is_dir()]
 
 
-def packages(resource: str = 'packages') -> dict[str, Path]:
+def packages(
+    resource: str = 'packages', environment: Mapping[str, str] = os.environ
+) -> dict[str, Path]:
     """Return the packages that have a resource in the index, each with its prefix."""
     found: dict[str, Path] = {}
-    for prefix in prefixes():
+    for prefix in prefixes(environment):
         for file in sorted((prefix / INDEX / resource).glob('[!.]*')):
             found.setdefault(file.name, prefix)
     return found
 
 
-def prefix_of(package: str, missing: str = "Package '{}' not found") -> Path:
+def prefix_of(
+    package: str,
+    missing: str = "Package '{}' not found",
+    environment: Mapping[str, str] = os.environ,
+) -> Path:
     """Return the prefix of a package. Raises CommandError if there is none."""
     try:
-        return packages()[package]
+        return packages(environment=environment)[package]
     except KeyError:
         raise CommandError(missing.format(package)) from None
 
 
-def executables(package: str) -> list[Path]:
+def executables(package: str, environment: Mapping[str, str] = os.environ) -> list[Path]:
     """Return the executables of a package. Raises CommandError if there is no such package."""
     found = []
-    for folder, folders, files in os.walk(prefix_of(package) / 'lib' / package):
+    prefix = prefix_of(package, environment=environment)
+    for folder, folders, files in os.walk(prefix / 'lib' / package):
         folders[:] = sorted(name for name in folders if not name.startswith('.'))
         found += [Path(folder, name) for name in sorted(files)]
     return [file for file in found if os.access(file, os.X_OK)]

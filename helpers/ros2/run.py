@@ -8,15 +8,18 @@ import shlex
 import signal
 import subprocess
 import sys
+from collections.abc import Mapping
 
 from helpers.ros2 import _index
 from helpers.ros2._commands import CommandError, command, option
 from helpers.ros2._graph import join_domain
 
 
-def command_of(package: str, executable: str) -> list[str]:
+def command_of(
+    package: str, executable: str, environment: Mapping[str, str] = os.environ
+) -> list[str]:
     """Return the command of an executable. Raises CommandError as `ros2 run` does."""
-    found = [file for file in _index.executables(package) if file.name == executable]
+    found = [file for file in _index.executables(package, environment) if file.name == executable]
     if not found:
         raise CommandError('No executable found')
     if len(found) > 1:

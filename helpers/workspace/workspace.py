@@ -14,6 +14,8 @@ from pathlib import Path, PurePosixPath
 from helpers._plumbing.build_tools import build_environment, build_tools, from_wheels
 from helpers._plumbing.interrupts import uninterrupted
 from helpers._plumbing.progress_bar import ProgressBar
+from helpers.ros2._commands import CommandError
+from helpers.ros2.run import command_of
 from helpers.session import graph_environment
 from helpers.workspace.build_output import BuildResult, read_result, without_folders
 from helpers.workspace.folders import claim
@@ -123,9 +125,7 @@ class Workspace:
 
     # --- Build ---
 
-    def build(
-        self, *packages: str, symlink_install: bool = False, cmake_args: Sequence[str] = ()
-    ) -> BuildResult:
+    def build(self, *packages: str, symlink_install: bool = False) -> BuildResult:
         """Run `colcon build` on all packages in `src`, or with `--packages-select` on these.
 
         A build that fails is a result, not an exception: print it. Raises RuntimeError if this
@@ -149,7 +149,7 @@ class Workspace:
         settings += ['console_direct+', 'desktop_notification-', 'status-']
         # Without the first, CMake takes the newest Python on the PATH.
         python = [f'-DPython3_EXECUTABLE={sys.executable}', f'-DCMAKE_MODULE_PATH={CMAKE_MODULES}']
-        settings += ['--cmake-args', *python, *cmake_args]
+        settings += ['--cmake-args', *python]
         total = len(packages) or len(list(self.path.glob('src/**/package.xml'))) or 1
         output = self._colcon([*command[1:], *settings], total)
         return read_result(self.path, ' '.join(command), packages, output)
@@ -211,23 +211,21 @@ class Workspace:
 
     # --- Run ---
 
-    def run(self, package: str, executable: str, *arguments: str, sourced: bool = True) -> Process:
+    def run(self, package: str, executable: str, *arguments: str) -> Process:
         """Start an executable as `ros2 run` does, and return the running process.
 
-        It has the sourced environment (`sourced=False` leaves that out), and the domain id and
-        discovery range of the open session, or of this kernel's next one. It ends with its `with`
-        block, with `stop()`, when the same is run again, when a cell is interrupted, and with the
-        kernel. If there is no such package or executable, it has printed what `ros2 run` prints,
-        and has ended with 1.
+        It has the sourced environment, and the domain id and discovery range of the open session,
+        or of this kernel's next one. It ends with its `with` block, with `stop()`, when the same is
+        run again, when a cell is interrupted, and with the kernel. If there is no such package or
+        executable, it has printed what `ros2 run` prints, and has ended with 1.
         """
-        environment = self.environment() if sourced else build_environment()
-        environment |= self._environment_of_nodes()
+        environment = self.environment() | self._environment_of_nodes()
         key = (package, executable, *arguments)
         if key in self._processes:
             self._processes[key].stop()
         try:
-            command, found = _command(package, executable, environment), True
-        except LookupError as error:
+            command, found = command_of(package, executable, environment), True
+        except CommandError as error:
             command, found = ['/bin/sh', '-c', 'echo "$0"; exit 1', str(error)], False
         process = Process(executable, [*command, *arguments], environment, self.path)
         self._processes[key] = process
@@ -321,23 +319,6 @@ def _packages_done(lines: Sequence[str]) -> float:
         elif made := re.match(r'\[ *(\d+)%\]', line):
             part = CONFIGURE_SHARE + (1 - CONFIGURE_SHARE) * int(made[1]) / 100
     return done + part
-
-
-def _command(package: str, executable: str, environment: dict[str, str]) -> list[str]:
-    """Return the command of an executable. Raises LookupError with what `ros2 run` says."""
-    for prefix in environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep):
-        marker = Path(prefix) / 'share/ament_index/resource_index/packages' / package
-        if not prefix or not marker.is_file():
-            continue
-        file = Path(prefix) / 'lib' / package / executable
-        if not file.is_file() or not os.access(file, os.X_OK):
-            raise LookupError('No executable found')
-        with file.open('rb') as opened:
-            first_line = opened.readline()
-        # The first line of a script cannot name an interpreter whose path has a space.
-        named = first_line.startswith(b'#!') and os.fsencode(sys.executable) in first_line
-        return [sys.executable, str(file)] if named and ' ' in sys.executable else [str(file)]
-    raise LookupError(f"Package '{package}' not found")
 
 
 # --- In a notebook -------------------------------------------------------------------------------
