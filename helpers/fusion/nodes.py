@@ -72,9 +72,8 @@ class EkfNode(_Configured):
     transform from `world_frame` to what is below it.
 
     By the names of the inputs, such as `odom0`: `parts` are those of the state that it may use,
-    `used` counts the measurements that were used, `first_used_s` is when the first one was, and
-    `kept_out` has the times of those that the gate kept out (s). `initial` are the variances that
-    the files give it at the start.
+    `used` counts the measurements that were used, and `first_used_s` is when the first one was.
+    `initial` are the variances that the files give it at the start.
     """
 
     def __init__(self, name: str, *files: str | os.PathLike) -> None:
@@ -90,7 +89,6 @@ class EkfNode(_Configured):
         self.parts: dict[str, list[str]] = {}
         self.used: dict[str, int] = {}
         self.first_used_s: dict[str, float] = {}
-        self.kept_out: dict[str, list[float]] = {}
         self._parents: dict[str, tuple[str, float]] = {}  # each frame's parent, and its yaw in it
         self._in_odom = 0.0, 0.0, 0.0
         latched = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -118,7 +116,7 @@ class EkfNode(_Configured):
             raise ValueError(f'{key}_config needs 15 values, true or false, not {len(config)}.')
         parts = [name for name, on in zip(PARTS, config, strict=True) if on]
         self.parts[key] = parts
-        self.used[key], self.kept_out[key] = 0, []
+        self.used[key] = 0
         gate = self.given.get(f'{key}_pose_rejection_threshold')
         self.hear(kind, self.given[key], lambda message: callback(key, parts, gate, message))
 
@@ -168,8 +166,6 @@ class EkfNode(_Configured):
             if innovation is None or innovation.accepted:
                 self.used[key] += 1
                 self.first_used_s.setdefault(key, t)
-            else:
-                self.kept_out[key].append(t)
 
     def _yaw_in_base(self, frame: str) -> float | None:
         """Return by how much a frame is turned in the robot's, or None if nobody says so."""
@@ -279,7 +275,6 @@ class Localized(NamedTuple):
     parts: dict[str, dict[str, list[str]]]
     used: dict[str, dict[str, int]]
     first_used_s: dict[str, dict[str, float]]
-    kept_out: dict[str, dict[str, list[float]]]
     initial: dict[str, dict[str, float]]
 
 
@@ -311,12 +306,8 @@ def localize(
         robot = Robot(EMPTY, start=Pose(*start), seed=1, sim_time=True, mounting=mounting)
         filters = [EkfNode(name, *files) for name in heard]
         listener, executor = Node('listener'), SingleThreadedExecutor()
-        for node in (
-            *filters,
-            NavSatNode('navsat_transform', *files),
-            make_broadcaster(),
-            listener,
-        ):
+        navsat = NavSatNode('navsat_transform', *files)
+        for node in (*filters, navsat, make_broadcaster(), listener):
             executor.add_node(node)
         latched = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         listener.create_subscription(TFMessage, '/tf_static', note('/tf_static'), latched)

@@ -97,11 +97,6 @@ class Process:
         """Whether it has not ended yet."""
         return self._process.poll() is None
 
-    def print_output(self, first: int | None = None) -> None:
-        """Print what it has printed so far, or only the first lines of it."""
-        for line in self.lines[:first]:
-            print(line)
-
     def wait_for(self, text: str, timeout_s: float = 20.0) -> str:
         """Wait until a line contains `text`, and return this line.
 
