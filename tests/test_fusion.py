@@ -203,9 +203,11 @@ def test_config_leaves_parts_out():
     assert lone['vx'].abs().max() == 0
 
 
-def test_a_gate_of_one_sensor():
+def test_variances_and_gates_by_sensor():
     measurements, _ = simulate(0, seconds=20)
     measurements.loc[range(150, 950, 150), 'gps_x'] += 20
+    deaf = fuse(measurements, variances={'gps_x': 1e12, 'gps_y': 1e12})
+    assert np.allclose(deaf, fuse(measurements, ODOM_IMU), rtol=0, atol=1e-6)
     assert innovations(measurements)['accepted'].all()
     rows = innovations(measurements, gate={'gps': 3.0})
     assert rows.loc[rows['sensor'] != 'gps', 'accepted'].all()
@@ -286,8 +288,8 @@ def refused(said, call, *arguments, **options):
         ({'measurements': table(vx='fast')}, 'The column vx must hold numbers.'),
         ({'measurements': table(t=[0, 1, 1, 2, 3])}, 'The times must increase from row to row'),
         ({'sensors': 'odom'}, "sensors must be a list of some of odom, imu, gps, not 'odom'."),
-        ({'gates': 3.0}, "options can name process_noise, config, gate, not 'gates'."),
-        ({'gate': {'gps': 0}}, "gate['gps'] must be a positive number, not 0."),
+        ({'gates': 3.0}, "options can name process_noise, variances, config, gate, not 'gates'."),
+        ({'variances': {'vx': 0}}, "variances['vx'] must be a positive number, not 0."),
         ({'process_noise': {'x': -1}}, "process_noise['x'] must be a number, zero or more, not -1"),
         ({'config': {'odom': ['yaw']}}, "config['odom'] must be a list of some of vx, vy, vyaw, "),
         ({'gate': 3.0}, 'gate must be a dict, not 3.0.'),

@@ -123,21 +123,23 @@ def test_at_its_range_is_a_wall_and_before_it_none(place, yaw):
 
 
 def test_the_beams_go_from_right_to_left():
-    scan = Sensors(0, False).scan(Body(CORRIDOR))
+    scan = Sensors(0, False, None).scan(Body(CORRIDOR))
     assert scan[[0, 90, 180]] == pytest.approx([0.75, 3.25, 0.75])
-    nothing = Sensors(0, True).scan(Body(EMPTY))
+    nothing = Sensors(0, True, None).scan(Body(EMPTY))
     assert nothing.dtype == np.float32
     assert np.isposinf(nothing).all()
 
 
-def test_errors_of_its_sensors_are_those_of_simulate():
-    body, sensors, exact = Body(EMPTY), Sensors(7, True), Sensors(7, False)
+@pytest.mark.parametrize('slip', [None, (0.5, 1.0)])
+def test_errors_of_its_sensors_are_those_of_simulate(slip):
+    body, sensors, exact = Body(EMPTY), Sensors(7, True, slip), Sensors(7, False, None)
     rows = []
     for _ in range(101):
         x, y, yaw = body.pose
         assert list(exact.read(body).values())[:3] == [body.v, body.w, yaw]
         truth = {'x': x, 'y': y, 'yaw': yaw, 'vx': body.v, 'vyaw': body.w, 'ax': body.ax}
-        without = said(truth | {'ay': body.v * body.w})
+        slipping = 0.5 if slip and slip[0] <= body.t_s < slip[1] else 0.0
+        without = said(truth | {'ay': body.v * body.w}, slipping)
         rows.append(np.subtract(list(sensors.read(body).values()), list(without.values())))
         drive(body, 0.5, 0.3, seconds=1 / RATE_HZ)
     measured, true = simulate(7, 2.0)
@@ -151,12 +153,12 @@ def test_errors_of_its_sensors_are_those_of_simulate():
 
 
 def test_each_character_is_a_square_of_the_floor():
-    floor = Floor.from_text('####\n#vA#\n#o #\n####')
-    assert floor.size_m == (2, 2)
-    assert floor.start == (0.75, 1.25, -math.pi / 2)
-    assert floor.places == {'A': (1.25, 1.25)}
-    assert floor.clearance(0.75, 0.75) == floor.clearance(0.25, 0.25) == 0
-    assert floor.clearance(1.25, 0.75) == pytest.approx(0.25)
+    floor = Floor.from_text('####\n#vA#\n#o #\n####', cell_m=1.0)
+    assert floor.size_m == (4, 4)
+    assert floor.start == (1.5, 2.5, -math.pi / 2)
+    assert floor.places == {'A': (2.5, 2.5)}
+    assert floor.clearance(1.5, 1.5) == floor.clearance(0.5, 0.5) == 0
+    assert floor.clearance(2.5, 1.5) == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,8 @@
 
 import contextlib
 import math
-import os
 import signal
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pymap3d
@@ -23,12 +20,11 @@ from support.processes import running, traces
 from support.waits import wait_for
 
 from helpers.fusion.messages import yaw_of
-from helpers.robot import CORRIDOR, EMPTY, ROOMS, Pose, Robot
+from helpers.robot import CORRIDOR, EMPTY, ROOMS, Pose, Robot, start_robot
 from helpers.robot.body import MAX_ACCELERATION, RADIUS_M, Body
 from helpers.robot.messages import DATUM, SKY
 from helpers.robot.robot import TOPICS
-from helpers.session import graph_environment, ros_session
-from helpers.workspace.processes import Process
+from helpers.session import ros_session
 
 
 class Wanderer(Node):
@@ -196,19 +192,18 @@ def test_the_brake_is_a_law(depth, hits):
 # --- Its life
 
 
-def test_a_robot_in_another_process_is_heard_and_ends(tmp_path):
-    command = [sys.executable, '-m', 'helpers.robot', '--floor', 'corridor']
-    command += ['--ros-args', '-r', '__ns:=/far']
+def test_a_robot_in_another_process_is_heard_and_ends():
     with ros_session() as session:
-        environment = {**os.environ, **graph_environment(), 'PYTHONPATH': str(Path.cwd())}
         node = Node('listener')
         heard = []
         node.create_subscription(LaserScan, '/far/scan', heard.append, 10)
         spin(session, node)
-        with Process('robot', command, environment, tmp_path) as process:
+        with start_robot('corridor', '--ros-args', '-r', '__ns:=/far') as process:
             session.wait_until(lambda: heard, LIMIT_S)
             assert heard[0].header.frame_id == 'far/base_scan'
         assert process.wait() == 0
+        with pytest.raises(RuntimeError, match='No such file.*nowhere.txt'):
+            start_robot('nowhere.txt')
 
 
 def test_an_interrupt_ends_the_robot():

@@ -14,9 +14,9 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu, LaserScan
 from support.javascript import FOLDER
 
-from helpers.robot import CORRIDOR, EMPTY, ROOMS, Pose, Robot
+from helpers.robot import CORRIDOR, EMPTY, ROOMS, DriveRecord, Pose, Robot
 from helpers.robot.body import Body
-from helpers.robot.record import Command, DriveRecord, Event, Scan, Step
+from helpers.robot.record import Command, Event, Scan, Step
 from helpers.robot.sensors import Sensors
 from helpers.robot.view import drive_by_hand, replay_drive, watch
 from helpers.session import ros_session
@@ -57,7 +57,7 @@ def script():
 def long_drive():
     """Return the record of three minutes, from wall to wall."""
     body, record = Body(ROOMS), DriveRecord(ROOMS)
-    sensors = Sensors(0, True)
+    sensors = Sensors(0, True, None)
     for step in range(9000):
         before = body.bumps
         command = Command(

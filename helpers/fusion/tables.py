@@ -52,6 +52,7 @@ def fuse(measurements: pd.DataFrame, sensors: Iterable[str] = SENSORS, **options
 
     The options, each a dict:
     - `process_noise`: replaces some of PROCESS_NOISE, {'x': 0.002, 'y': 0.002};
+    - `variances`: replaces some of VARIANCES, {'vx': 0.25};
     - `config`: the parts of the state that a sensor measures, if not all that it can,
       {'odom': ('vx', 'vy')};
     - `gate`: the Mahalanobis distance at which a message of a sensor is kept out, {'gps': 3.0}. The
@@ -118,8 +119,9 @@ def _innovations(steps: list[_Step]) -> pd.DataFrame:
 
 def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -> list[_Step]:
     """Feed the rows to a filter. A message of which one number is NaN is left out."""
-    settings.chosen('options', options, ('process_noise', 'config', 'gate'))
+    settings.chosen('options', options, ('process_noise', 'variances', 'config', 'gate'))
     ekf = ExtendedKalmanFilter(options.get('process_noise'))
+    variances = settings.variances('variances', options.get('variances'), VARIANCES)
     gates = settings.chosen('gate', options.get('gate'), SENSORS)
     gates = {sensor: settings.positive(f'gate[{sensor!r}]', gates[sensor]) for sensor in gates}
     messages = _messages(sensors, options.get('config'))
@@ -127,7 +129,7 @@ def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -
     prepared = []
     for sensor, parts in messages:
         values = np.column_stack([table[column] for column in parts.values()])
-        noise = np.diag([VARIANCES[column] for column in parts.values()])
+        noise = np.diag([variances[column] for column in parts.values()])
         said = ~np.isnan(values).any(axis=1)
         prepared.append((sensor, tuple(parts), part_of_state(tuple(parts)), noise, values, said))
     steps = []

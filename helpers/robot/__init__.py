@@ -16,14 +16,19 @@ robots drive through each other; it is faster (1 m/s), it looks at the front hal
 Twist, where newer TurtleBots want TwistStamped.
 """
 
-from helpers.robot.floor import CORRIDOR, EMPTY, ROOMS, Floor, Pose
+from helpers.robot.floor import CORRIDOR, EMPTY, FLOORS, ROOMS, Floor, Pose
+from helpers.robot.process import start_robot
+from helpers.robot.record import DriveRecord
 from helpers.robot.robot import Robot
 
 __all__ = [
     'CORRIDOR',
     'EMPTY',
+    'FLOORS',
     'ROOMS',
+    'DriveRecord',
     'Floor',
     'Pose',
     'Robot',
+    'start_robot',
 ]

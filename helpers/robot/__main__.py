@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.utilities import remove_ros_args
 
-from helpers.robot.floor import FLOORS
-from helpers.robot.robot import Robot
+from helpers.robot import FLOORS, Floor, Robot
 
 
 def main() -> None:
     """Drive until Ctrl+C."""
     parser = argparse.ArgumentParser(prog='python -m helpers.robot', description=__doc__)
-    parser.add_argument('--floor', default='empty', choices=FLOORS)
+    parser.add_argument('--floor', default='empty', help=f'{", ".join(FLOORS)}, or a text file')
+    parser.add_argument('--seed', type=int, default=0, help='decides the errors of the sensors')
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
+    try:
+        floor = FLOORS.get(options.floor) or Floor.from_text(Path(options.floor).read_text())
+    except (OSError, ValueError) as error:
+        parser.error(str(error))
     rclpy.init(args=sys.argv)
     try:
-        robot = Robot(FLOORS[options.floor], spin=False)
-        print(f'The robot drives on the floor {options.floor}.', flush=True)
+        robot = Robot(floor, seed=options.seed, spin=False)
+        print(f'The robot drives on the floor {floor.name}.', flush=True)
         rclpy.spin(robot)
+    except ValueError as error:
+        parser.error(str(error))
     except (KeyboardInterrupt, ExternalShutdownException):
         pass  # the end that was asked for
     finally:

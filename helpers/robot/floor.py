@@ -13,7 +13,7 @@ import numpy as np
 
 HEADINGS = {'>': 0.0, '^': math.pi / 2, '<': math.pi, 'v': -math.pi / 2}
 WALL, BOX, FREE = '#', 'o', ' '
-CELL_M, BOX_SIZE_M = 0.5, 0.3
+BOX_SIZE_M = 0.3
 
 
 class Block(NamedTuple):
@@ -53,8 +53,8 @@ class Floor:
     places: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @classmethod
-    def from_text(cls, text: str, name: str = 'floor') -> Floor:
-        """Return the floor of a text, one character a square of 0.5 m.
+    def from_text(cls, text: str, cell_m: float = 0.5, name: str = 'floor') -> Floor:
+        """Return the floor of a text, one character a square of `cell_m` metres.
 
         `#` is a wall, `o` a box of 0.3 m in the middle of its square, a space is free, and one of
         `>`, `<`, `^`, `v` is where the robot starts and looks. Any other letter or digit is a place
@@ -63,6 +63,8 @@ class Floor:
         Raises ValueError, with a sentence that says what to change, for anything else, and where
         the robot cannot leave its square or cannot come to a place.
         """
+        if not (math.isfinite(cell_m) and cell_m >= 0.3):
+            raise ValueError(f'A square of a floor has 0.3 m or more, for the robot, not {cell_m}.')
         rows = _rows(text)
         marks = {
             (column, row): mark
@@ -73,19 +75,23 @@ class Floor:
         start = next(square for square, mark in marks.items() if mark in HEADINGS)
 
         def middle(square: tuple[int, int]) -> tuple[float, float]:
-            return (square[0] + 0.5) * CELL_M, (square[1] + 0.5) * CELL_M
+            return (square[0] + 0.5) * cell_m, (square[1] + 0.5) * cell_m
 
         half = BOX_SIZE_M / 2
         boxes = [middle(square) for square, mark in marks.items() if mark == BOX]
         return cls(
             walls=(
-                *_walls(rows),
+                *_walls(rows, cell_m),
                 *(Block(x - half, y - half, x + half, y + half, 'box') for x, y in boxes),
             ),
-            size_m=(len(rows[0]) * CELL_M, len(rows) * CELL_M),
+            size_m=(len(rows[0]) * cell_m, len(rows) * cell_m),
             start=Pose(*middle(start), HEADINGS[marks[start]]),
             name=name,
-            places={mark: middle(square) for square, mark in marks.items() if _is_place(mark)},
+            places={
+                mark: middle(square)
+                for square, mark in marks.items()
+                if mark.isalnum() and mark not in (BOX, *HEADINGS)
+            },
         )
 
     def clearance(self, x: float, y: float) -> float:
@@ -132,14 +138,10 @@ def _rows(text: str) -> list[str]:
     return rows
 
 
-def _is_place(mark: str) -> bool:
-    return mark.isalnum() and mark not in (BOX, *HEADINGS)
-
-
 def _check(marks: dict[tuple[int, int], str]) -> None:
     """Raise ValueError for marks that make no floor."""
     for mark in marks.values():
-        if mark not in (WALL, BOX, FREE, *HEADINGS) and not _is_place(mark):
+        if mark not in (WALL, BOX, FREE, *HEADINGS) and not mark.isalnum():
             raise ValueError(
                 f'{mark!r} means nothing on a floor: use # for a wall, o for a box, a space, one '
                 'of > < ^ v for the start, and a letter or digit for a place.'
@@ -150,11 +152,12 @@ def _check(marks: dict[tuple[int, int], str]) -> None:
             f'This floor has {len(starts) or "no"} start{"s" * (len(starts) > 1)}: write one of '
             '> < ^ v where the robot starts, once.'
         )
+    places = [mark for mark in marks.values() if mark.isalnum() and mark not in (BOX, *HEADINGS)]
     reached = _reached(marks, starts[0])
     if len(reached) == 1:
         raise ValueError('The robot cannot leave its start: leave a square beside it free.')
     away = sorted(
-        mark for square, mark in marks.items() if _is_place(mark) and square not in reached
+        mark for square, mark in marks.items() if mark in places and square not in reached
     )
     if away:
         raise ValueError(f'No way leads from the start to {away[0]}: leave a door in the walls.')
@@ -172,14 +175,14 @@ def _reached(marks: dict[tuple[int, int], str], start: tuple[int, int]) -> set[t
     return reached
 
 
-def _walls(rows: list[str]) -> list[Block]:
+def _walls(rows: list[str], cell_m: float) -> list[Block]:
     """Return the walls. Squares side by side are one, and so are equal walls of two rows."""
     begun: dict[tuple[int, int, int], int] = {}  # left, right and upper edge: lower edge
     for y, row in enumerate(reversed(rows)):
         for run in re.finditer('#+', row):
             begun[*run.span(), y + 1] = begun.pop((*run.span(), y), y)
     return [
-        Block(x0 * CELL_M, y0 * CELL_M, x1 * CELL_M, y1 * CELL_M)
+        Block(x0 * cell_m, y0 * cell_m, x1 * cell_m, y1 * cell_m)
         for (x0, x1, y1), y0 in begun.items()
     ]
 

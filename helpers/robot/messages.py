@@ -17,7 +17,7 @@ from helpers.robot.floor import Floor, Pose
 from helpers.robot.sensors import ANGLES, RANGE_MAX, RANGE_MIN
 
 DATUM = 10.7769, 106.7009, 0.0  # where x, y = 0, 0 is: degrees north and east, m. As in lesson 16
-FULL_V, EMPTY_V, LASTS_S = 12.6, 11.0, 2.5 * 3600  # as the battery of a Waffle
+FULL_V, EMPTY_V, CAPACITY_AH, LASTS_S = 12.6, 11.0, 1.8, 2.5 * 3600  # as the battery of a Waffle
 # Nothing but the wheels says where the robot is, so a filter takes their speeds alone.
 POSE_COVARIANCE = np.diag([1.0, 1.0, 0.1])
 TWIST_COVARIANCE = np.diag([VARIANCES[name] for name in ('vx', 'vy', 'vyaw')])
@@ -82,10 +82,11 @@ def battery(header: Header, t_s: float) -> BatteryState:
     left = max(0.0, 1 - t_s / LASTS_S)
     message = BatteryState(header=header, present=True, percentage=left)
     message.voltage = EMPTY_V + left * (FULL_V - EMPTY_V)
-    # The message asks for NaN in what is not measured.
-    message.charge = message.current = message.capacity = message.temperature = math.nan
-    message.design_capacity = math.nan
+    message.charge, message.current = CAPACITY_AH * left, -CAPACITY_AH * 3600 / LASTS_S
+    message.capacity = message.design_capacity = CAPACITY_AH
+    message.temperature = math.nan  # not measured
     message.power_supply_status = BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
+    message.power_supply_technology = BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO
     return message
 
 

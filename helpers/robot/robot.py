@@ -53,9 +53,9 @@ class Robot(Node):
     It hears `cmd_vel`, and publishes `odom`, `imu/data`, `gps/fix`, `scan`, `battery_state`,
     `camera/image_raw` and `bumper`. Its executor and its thread are its own, so a slow node of
     yours does not slow it; the session ends them. `start` replaces the start of the floor. The
-    `seed` decides the errors of the sensors; with `noise=False` they have none. `mounting` says
-    which sensors are turned, and by which yaw (rad): `{'imu_link': 0.3, 'base_scan': -0.5}`; their
-    messages are in their own frames, as they are.
+    `seed` decides the errors of the sensors; with `noise=False` they have none. The wheels slip
+    during `slip` (from, to in s). `mounting` says which sensors are turned, and by which yaw (rad):
+    `{'imu_link': 0.3, 'base_scan': -0.5}`; their messages are in their own frames, as they are.
 
     With `sim_time=True` time passes in `run` alone, as fast as the program, and `/clock` says it.
     With `spin=False` whoever makes it spins it, and no session is needed.
@@ -78,6 +78,7 @@ class Robot(Node):
         start: Pose | None = None,
         seed: int = 0,
         noise: bool = True,
+        slip: tuple[float, float] | None = None,
         mounting: Mapping[str, float] | None = None,
         sim_time: bool = False,
         spin: bool = True,
@@ -85,7 +86,7 @@ class Robot(Node):
         if not isinstance(floor, Floor):
             raise TypeError(f'A robot needs a floor, such as CORRIDOR, not {floor!r}.')
         self._body = Body(floor, start)
-        self._sensors = Sensors(seed, noise, mounting)
+        self._sensors = Sensors(seed, noise, slip, mounting)
         if spin:
             session = current_session()
             check_names(name, namespace.strip('/'))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
 
-from helpers.fusion.drives import said
+from helpers.fusion.drives import SLIP_SPEED, said
 from helpers.fusion.settings import chosen
 from helpers.fusion.tables import VARIANCES
 from helpers.robot.body import RATE_HZ, Body, arc
@@ -23,15 +24,21 @@ SIGMA = np.sqrt([VARIANCES['ax' if name == 'ay' else name] for name in EXACT])
 class Sensors:
     """The sensors. The seed decides their errors: those of step k are those of row k of `simulate`.
 
-    Without noise, the sensors have no errors at all. `mounting` says by which yaw (rad) the frames
-    `imu_link` and `base_scan` are turned on the robot. `odometry` is where the wheels think that
-    the robot is, from its start.
+    `slip` (from, to in s) is when the wheels slip, as in `simulate`. Without noise, the sensors
+    have no errors at all. `mounting` says by which yaw (rad) the frames `imu_link` and `base_scan`
+    are turned on the robot. `odometry` is where the wheels think that the robot is, from its start.
     """
 
-    def __init__(self, seed: int, noise: bool, mounting: Mapping[str, float] | None = None) -> None:
+    def __init__(
+        self,
+        seed: int,
+        noise: bool,
+        slip: tuple[float, float] | None,
+        mounting: Mapping[str, float] | None = None,
+    ) -> None:
         mounting = chosen('mounting', mounting, ('imu_link', 'base_scan'))
         self._imu_yaw, self._laser_yaw = mounting.get('imu_link', 0), mounting.get('base_scan', 0)
-        self._noise = noise
+        self._noise, self._slip = noise, slip or (math.inf, math.inf)
         self._rng, self._laser_rng = np.random.default_rng(seed), np.random.default_rng([seed, 1])
         self._said: dict[str, float] = {}
         self.odometry = Pose(0.0, 0.0, 0.0)
@@ -41,13 +48,14 @@ class Sensors:
         x, y, yaw = body.pose
         truth = {'x': x, 'y': y, 'yaw': yaw, 'vx': body.v, 'vyaw': body.w, 'ax': body.ax}
         truth['ay'] = body.v * body.w
-        turned = said(truth, imu_mounting=self._imu_yaw)
         if self._noise:
-            values = turned
+            slipping = SLIP_SPEED * (self._slip[0] <= body.t_s < self._slip[1])
+            values = said(truth, slipping, self._imu_yaw)
             for name, error in zip(EXACT, self._rng.normal(0, SIGMA).tolist(), strict=True):
                 values[name] += error
         else:
             values = {name: truth[of] for name, of in EXACT.items()}
+            turned = said(truth, imu_mounting=self._imu_yaw)
             values |= {name: turned[name] for name in ('imu_yaw', 'ax', 'ay')}
         if self._said:  # as the body moves: with the means over the step
             v, w = ((values[name] + self._said[name]) / 2 for name in ('vx', 'vyaw'))
