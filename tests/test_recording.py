@@ -1,5 +1,6 @@
 """A recording says what happened."""
 
+import re
 import time
 from types import SimpleNamespace
 
@@ -43,7 +44,6 @@ def test_table(callback):
         recording.wait_until_complete(6, LIMIT_S)
     table = recording.table()
     check_table(table)
-    assert list(table.columns) == RUN_COLUMNS
     assert table['seq'].tolist() == list(range(6))
     assert [table[name].dtype for name in ('seq', *TIMES)] == [int, float, float, float]
     assert table['published_s'][0] == 0.0
@@ -72,10 +72,10 @@ def test_lost_messages():
         gate.open()
         recording.wait_until_complete(5, LIMIT_S)
     table = recording.table()
-    lost = [0, 2, 3]
-    assert table.index[table['started_s'].isna()].tolist() == lost
-    assert table.index[table['finished_s'].isna()].tolist() == lost
-    assert [table['thread'][seq] for seq in lost] == [None] * 3
+    lost = table[table['started_s'].isna()]
+    assert lost['seq'].tolist() == [0, 2, 3]
+    assert lost['finished_s'].isna().all()
+    assert lost['thread'].tolist() == [None] * 3
     assert table['published_s'].notna().all()
 
 
@@ -120,22 +120,25 @@ def test_wait_for_callbacks_that_still_run():
 # Without ROS: a publisher and a subscription that do nothing
 
 
-class Publisher:
-    def publish(self, msg):
-        pass
+def recorded(published, heard):
+    """Return the recording of these messages."""
+    publisher = SimpleNamespace(publish=lambda msg: None)
+    recording = Recording(publisher, subscription := Subscription())
+    for message in published:
+        publisher.publish(msg=message)
+    for message in heard:
+        subscription.callback(message)
+    return recording
 
 
 class Subscription(SimpleNamespace):
-    def __init__(self, callback=lambda message: None):
-        super().__init__(callback=callback)
+    def __init__(self):
+        super().__init__(callback=lambda message: None)
 
 
 def test_takes_that_overtake_are_sorted():
-    recording = Recording(publisher := Publisher(), subscription := Subscription())
-    for number in (3, 1, 2):
-        publisher.publish(msg=Int64(data=number))
-    for number in (2, 3):
-        subscription.callback(Int64(data=number))
+    one, two, three = (Int64(data=number) for number in (1, 2, 3))
+    recording = recorded([three, one, two], [two, three])
     table = recording.table()
     assert table['seq'].tolist() == [1, 2, 3]
     assert table['published_s'].tolist()[2] == 0.0
@@ -143,28 +146,20 @@ def test_takes_that_overtake_are_sorted():
 
 
 def test_a_picture_of_one_pixel_is_its_number():
-    recording = Recording(publisher := Publisher(), subscription := Subscription())
-    for number in (0, 255):
-        publisher.publish(Image(data=[number]))
-    subscription.callback(Image(data=[255]))
-    table = recording.table()
+    table = recorded([Image(data=[0]), Image(data=[255])], [Image(data=[255])]).table()
     assert table['seq'].tolist() == [0, 255]
     assert table['started_s'].notna().tolist() == [False, True]
 
 
 @pytest.mark.parametrize('message', [String(data='Hello World'), Imu(), Image(data=[1, 2])])
 def test_message_without_a_number(message):
-    recording = Recording(publisher := Publisher(), Subscription())
     with pytest.raises(ValueError, match='A recording needs messages whose data ends with their'):
-        publisher.publish(message)
-    assert recording.published == 0
+        recorded([message], [])
 
 
 @pytest.mark.parametrize('what', ['published', 'heard'])
 def test_same_number_twice(what):
-    recording = Recording(publisher := Publisher(), subscription := Subscription())
-    for _ in range(2):
-        (publisher.publish if what == 'published' else subscription.callback)(Int64(data=7))
+    recording = recorded(**{'published': [], 'heard': [], what: 2 * [Int64(data=7)]})
     with pytest.raises(ValueError, match=f'^The number 7 was {what} twice: give every message'):
         recording.table()
 
@@ -183,20 +178,14 @@ GOOD = pd.DataFrame(
         (None, TypeError, 'The table must be a DataFrame, not NoneType.'),
         (GOOD.drop(columns=['seq']), ValueError, 'The table lacks the column(s) seq.'),
         (GOOD.assign(started_s='soon'), TypeError, 'The column started_s must hold numbers.'),
-        (GOOD.assign(seq=[0, np.nan]), ValueError, 'The column seq must hold whole numbers.'),
         (GOOD.assign(seq=[0, 1.5]), ValueError, 'The column seq must hold whole numbers.'),
         (GOOD.iloc[:0], ValueError, 'The table is empty: it needs at least one row.'),
-        (
-            GOOD.assign(published_s=[0.0, np.nan]),
-            ValueError,
-            'It is not known when message 1 was published.',
-        ),
+        (GOOD.assign(published_s=[0, np.nan]), ValueError, 'It is not known when message 1 was'),
     ],
 )
 def test_bad_table(table, error, said):
-    with pytest.raises(error) as failure:
+    with pytest.raises(error, match=re.escape(said)):
         check_table(table)
-    assert str(failure.value) == said
 
 
 # Callbacks of any kind
@@ -212,13 +201,12 @@ def test_runs_of_callbacks(style, threads, together):
         spin(session, asker, answerer, threads=threads)
         session.wait_until(lambda: asker.answer, LIMIT_S)
         session.wait_until(lambda: recording.finished('ask') == 1, LIMIT_S)
-    assert (recording.finished('ask'), recording.finished('look')) == (1, 1)
+    assert recording.finished('look') == 1
     assert recording.inside('look', 'ask') == together
     tables = recording.tables()
     assert list(tables) == ['ask', 'look']
     for table in tables.values():
         check_table(table)
-        assert list(table.columns) == RUN_COLUMNS
         assert table.seq.tolist() == [0]
         assert (table.finished_s > table.started_s).all()
     assert tables['ask'].started_s[0] == 0
