@@ -6,7 +6,6 @@ import signal
 import sys
 import threading
 import time
-import traceback
 import warnings
 from collections import Counter
 
@@ -103,12 +102,8 @@ def test_spin_in_the_wrong_place():
             session.wait_until_quiet(SingleThreadedExecutor())
     with pytest.raises(RuntimeError, match='This session is not open'):
         session.spin(executor)
-    unopened = ros_session()
-    with ros_session() as session:
-        with pytest.raises(ValueError, match='belongs to another session'):
-            session.spin(executor)
-        with pytest.raises(RuntimeError, match='This session is not open'):
-            unopened.spin(SingleThreadedExecutor())
+    with ros_session() as session, pytest.raises(ValueError, match='belongs to another session'):
+        session.spin(executor)
 
 
 # Leaving
@@ -257,10 +252,6 @@ def failing_callback(message=None):
     raise ZeroDivisionError('in the callback')
 
 
-def frames(failure):
-    return [frame.name for frame in traceback.extract_tb(failure.__traceback__)]
-
-
 @EXECUTORS
 @pytest.mark.parametrize('while_it_closes', [False, True])
 def test_callback_failure_is_raised_at_the_end(threads, while_it_closes):
@@ -279,7 +270,7 @@ def test_callback_failure_is_raised_at_the_end(threads, while_it_closes):
         (publisher_thread,) = (t for t in threading.enumerate() if t.name == 'spin 1')
         spin(session, listener, threads=threads)
         assert begun.wait(LIMIT_S)
-    assert 'failing_callback' in frames(failure.value)
+    assert failure.traceback[-1].name == 'failing_callback'
     assert destroyed(talker)
 
 
@@ -295,7 +286,7 @@ def test_waiting_ends_with_a_callback_failure(threads, wait):
         for _ in range(50):  # the message may still be on its way
             session.wait_until_quiet(executor, LIMIT_S)
     assert time.monotonic() - started < LIMIT_S
-    assert 'failing_callback' in frames(failure.value)
+    assert failure.traceback[-1].name == 'failing_callback'
     assert not hasattr(failure.value, '__notes__')
 
 
