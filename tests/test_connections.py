@@ -14,8 +14,6 @@ from test_msgs.action import Fibonacci
 from helpers.recording import Recording
 from helpers.session import ros_session
 
-NOTHING = 'Everything that was made is connected and spins, and no callback waits.'
-
 
 def said_by(wait, *arguments):
     """Wait a moment in vain, and return the lines of the error."""
@@ -105,26 +103,24 @@ def take_the_lock(message):
     [(wait_for_ever, 'threading.Event().wait()'), (take_the_lock, 'with LOCK:')],
 )
 def test_callbacks_that_wait(callback, line):
-    def body():
-        with ros_session() as session:
-            listener = Listener(callback)
-            spin(session, Talker(1), listener, threads=2)
+    # The interrupt ends what waits for an Event.
+    with pytest.raises(KeyboardInterrupt), ros_session() as session:
+        listener = Listener(callback)
+        spin(session, Talker(1), listener, threads=2)
+        with LOCK:
             session.wait_until(lambda: listener.heard)
             assert said_by(session.wait_until, lambda: False) == [
                 f'The callback listener_callback waits at: {line}'
             ]
-            LOCK.release()
-            raise KeyboardInterrupt  # ends what waits for an Event
-
-    LOCK.acquire()
-    with pytest.raises(KeyboardInterrupt):
-        body()
+        raise KeyboardInterrupt
 
 
 def test_nothing_is_wrong():
     with ros_session() as session:
         spin(session, Talker(1), Listener())
-        assert said_by(session.wait_until, lambda: False) == [NOTHING]
+        assert said_by(session.wait_until, lambda: False) == [
+            'Everything that was made is connected and spins, and no callback waits.'
+        ]
 
 
 def test_findings_are_shown_while_the_cell_waits(monkeypatch):

@@ -1,6 +1,7 @@
 """The doctor, with real rclpy, and with environments that lack something."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -30,12 +31,7 @@ def run_doctor(python: Path | str = sys.executable, **environment: str):
 
 def row_of(table: str, name: str) -> str:
     """Return a row of the printed table, with its wrapped lines joined."""
-    lines = table.splitlines()
-    first = next(index for index, line in enumerate(lines) if line.startswith(name))
-    last = first + 1
-    while lines[last].startswith('  '):
-        last += 1
-    return ' '.join(' '.join(lines[first:last]).split())
+    return ' '.join(re.search(rf'^{re.escape(name)}.*(\n  .*)*', table, re.MULTILINE)[0].split())
 
 
 def test_this_machine_is_ready():
@@ -46,7 +42,6 @@ def test_this_machine_is_ready():
     assert ' itself ok rmw_fastrtps_cpp: heard after ' in row_of(answer.stdout, 'one message')
     assert row_of(answer.stdout, 'domain').endswith(', discovery LOCALHOST')
     assert row_of(answer.stdout, 'C++ compiler').startswith('C++ compiler ok ')
-    assert row_of(answer.stdout, 'CMake').startswith('CMake ok cmake version ')
 
 
 def test_without_rclpy_it_says_what_to_run(tmp_path):
@@ -114,24 +109,15 @@ def test_full_or_readonly_shared_memory_is_reported(monkeypatch):
     assert row.found == '31 MiB free'
     assert row.to_do.startswith('run `.venv/bin/fastdds shm clean`, remove files from /dev/shm, or')
     assert not row.required
-    monkeypatch.setattr(shutil, 'disk_usage', lambda path: SimpleNamespace(free=32 * 2**20))
-    assert doctor.check_shared_memory().to_do == ''
     monkeypatch.undo()
     monkeypatch.setattr(doctor, 'SHARED_MEMORY', Path('/proc/self'))
     assert doctor.check_shared_memory().found == '/proc/self cannot be written'
 
 
-@pytest.mark.parametrize(
-    'compiler',
-    [
-        '#!/bin/sh\n[ $1 = --version ] && echo clang 14',  # it has no standard library
-        'of another machine',
-    ],
-)
+@pytest.mark.parametrize('compiler', ['[ $1 = --version ] && echo clang 14', 'exit 1'])
 def test_a_compiler_that_does_not_work_is_reported(monkeypatch, tmp_path, compiler):
-    file = tmp_path / 'c++'
-    file.write_text(compiler)
-    file.chmod(0o755)
+    """It has no standard library, or is of another machine."""
+    file = put(tmp_path, 'c++', compiler)
     monkeypatch.setenv('CXX', str(file))
     rows = {row.name: row for row in doctor.check_build_tools()}
     assert rows['C++ compiler'].found == 'none that works'

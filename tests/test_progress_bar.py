@@ -54,11 +54,8 @@ def test_a_long_wait_shows_a_bar(kernel):
         ('update', ''),
         HEARD,
     ]
-    assert shown(kernel, [2], then='raise KeyError') == [
-        ('display_data', bar(25)),
-        ('update', ''),
-        ERROR,
-    ]
+    ended = [('display_data', bar(25)), ('update', ''), ERROR]
+    assert shown(kernel, [2], then='raise KeyError') == ended
 
 
 def test_a_bar_that_is_not_needed_shows_nothing(kernel):

@@ -1,6 +1,7 @@
 """The web site, opened from its folder without a network. `make test-browser` has written it."""
 
 import re
+from pathlib import Path
 
 import pytest
 from support.lab_page import WIDER
@@ -13,6 +14,9 @@ FOUND = "[...document.querySelectorAll('#search-results li a')].map(link => link
 SERIOUS = """async () => (await axe.run()).violations
     .filter(found => ['serious', 'critical'].includes(found.impact))
     .map(found => `${found.id}: ${found.nodes[0].html.slice(0, 100)}`)"""
+CUT_OFF = """[...document.querySelectorAll('pre')]
+    .filter(part => part.scrollWidth > part.clientWidth + 1)
+    .map(part => part.innerText.slice(0, 80))"""
 on_screens = pytest.mark.parametrize(
     ('width', 'scheme'), [(1280, 'light'), (360, 'dark')], ids=['desktop', 'phone']
 )
@@ -48,9 +52,7 @@ def test_a_page_fits_its_screen(tab, artefacts, axe, name):
     assert tab.evaluate("[...document.images].every(image => image.alt || image.closest('a'))")
     tab.add_script_tag(path=axe)
     assert tab.evaluate(SERIOUS) == []
-    tab.screenshot(
-        path=artefacts / f'site_{name.replace("/", "_")}_{tab.viewport_size["width"]}.png'
-    )
+    tab.screenshot(path=artefacts / f'site_{Path(name).stem}_{tab.viewport_size["width"]}.png')
 
 
 def test_search_finds_a_term_in_each_language(file_page):
@@ -69,8 +71,5 @@ def test_paper_has_the_text_and_nothing_else(file_page, artefacts):
         for part in ('.sidebar-drawer', '.toc-drawer', '.related-pages', '.lesson-file'):
             assert not tab.locator(part).first.is_visible()
         assert tab.locator('h1').first.is_visible()
-        wide = (
-            "[...document.querySelectorAll('pre')].filter(p => p.scrollWidth > p.clientWidth + 1)"
-        )
-        assert tab.evaluate(f'{wide}.map(part => part.innerText.slice(0, 80))') == []
+        assert tab.evaluate(CUT_OFF) == []
         tab.screenshot(path=artefacts / 'site_print.png')

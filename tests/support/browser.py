@@ -23,18 +23,8 @@ if TYPE_CHECKING:  # only what opens a browser needs it
 ARTEFACTS = Path(
     os.environ.get('BROWSER_ARTEFACTS') or Path(tempfile.gettempdir(), 'ros2_notebooks_browser')
 )
-# No sandbox, because root may run this; no shared memory, of which containers have little and nodes
-# need some; and nothing that asks the network.
-CHROMIUM_OPTIONS = [
-    '--no-sandbox',
-    '--disable-dev-shm-usage',
-    '--disable-gpu',
-    '--disable-quic',
-    '--no-first-run',
-    '--disable-background-networking',
-    '--disable-component-update',
-    '--disable-sync',
-]
+# What Playwright does not turn off itself.
+CHROMIUM_OPTIONS = ['--disable-gpu', '--disable-quic']
 # The div stands for a cell, which takes the focus when Escape is pressed.
 PHONE = '<!doctype html><meta name="viewport" content="width=device-width"><div tabindex="0">'
 AXE = Path(__file__).with_name('axe')

@@ -97,8 +97,6 @@ HOSTILE = {
     'CMAKE_GENERATOR': 'No Such Generator',
     'CMAKE_PREFIX_PATH': '/opt/ros/humble',
     'COLCON_DEFAULTS_FILE': '/nowhere/defaults.yaml',
-    'COLCON_EXTENSION_BLOCKLIST': 'colcon_core.verb.build',
-    'COLCON_LOG_PATH': '/nowhere/log',
     'CPATH': '/opt/ros/humble/include',
     'CPLUS_INCLUDE_PATH': '/opt/ros/humble/include',
     'CXXFLAGS': '--no-such-option',
