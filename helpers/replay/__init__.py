@@ -146,7 +146,10 @@ def replay(
         [round(1e6 * at_s), KINDS.index(do), 0, seq if do == ARRIVE else names.index(thread)]
         for at_s, do, seq, thread in made
     ]
-    lost = bool(table['started_s'].isna().any())
+    unheard = table['started_s'].isna()
+    # Those behind the last one that was heard may still wait in the queue.
+    waiting = min(depth, int(unheard[::-1].cummin().sum()))
+    lost = int(unheard.sum()) > waiting
     said = f'{len(names)} threads' if len(names) > 1 else 'one thread' if names else 'no executor'
     if len(names) > 1:
         said += f', a {group} group'

@@ -52,7 +52,8 @@ function picture({ messages, names, time }, [from, until], rows, left) {
       one[kind].forEach(([begin, cause], i) => {
         const stop = Math.min(one[kind][i + 1]?.[0] ?? end, end);
         if (begin >= stop) return;
-        found[kind][cause] = `${found[kind][cause] ?? ''}M${x(begin)} ${y(index)}H${x(stop)}`;
+        const least = kind === 'runs' ? x(begin) + 1.5 : 0; // a short callback is seen, too
+        found[kind][cause] = `${found[kind][cause] ?? ''}M${x(begin)} ${y(index)}H${Math.max(x(stop), least)}`;
       });
     });
     if (by === undefined) return;

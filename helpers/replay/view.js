@@ -151,7 +151,7 @@ function show(root, record) {
   root.querySelectorAll('figure').forEach(figure => figure.remove());
   root.querySelector('.replay-on > p').after(
     says,
-    element('div', { class: 'replay-controls' }, back, forth, play, faster, slider, ...(lists ? [loss] : [])),
+    element('div', { class: 'replay-controls' }, back, forth, play, faster, slider, ...(lists && losses.length ? [loss] : [])),
     element('div', { class: 'replay-runs' }, ...panels.map(({ node }) => node)),
   );
   go(0);
