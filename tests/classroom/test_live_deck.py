@@ -48,6 +48,8 @@ PRINTS = """import time
 for number in range(60):
     print(number)
     time.sleep(0.05)"""
+CODE_OF_SLIDE = f"""() => {PANEL}.content.widgets.flatMap((cell, index) =>
+    (cell.node.classList.contains('deck-on') && cell.model.type === 'code' ? [index] : []))"""
 BLACK = 'body.deck-black'
 
 
@@ -90,6 +92,18 @@ def forward(deck):
         if deck.slide < number:  # texts that wait for a cell
             deck.key(key)
         assert deck.slide == number
+
+    deck.page.command('notebook:clear-all-cell-outputs')
+    deck.page.write('1')
+    deck.page.run_here()
+    frame, slide = deck.page.active(), deck.slide
+    cells = deck.tab.evaluate(CODE_OF_SLIDE)
+    for cell in cells[cells.index(frame) + 1 :]:  # none is left out
+        deck.key('PageDown')
+        assert (deck.slide, deck.page.active()) == (slide, cell)
+        deck.page.run_here()
+    deck.key('PageDown')
+    assert deck.slide == slide + 1
 
 
 def back(deck):

@@ -300,8 +300,8 @@ const KEYS = {
   pageup: previous,
   arrowright: () => toStep(1),
   arrowleft: () => toStep(-1),
-  arrowdown: () => toCell(1),
-  arrowup: () => toCell(-1),
+  arrowdown: () => byCell(1),
+  arrowup: () => byCell(-1),
   home: first,
   end: () => goTo(Infinity),
   enter,
@@ -387,6 +387,14 @@ function next() {
         replay.scrollIntoView({ block: 'nearest' });
         return;
       }
+  // Whoever has run a cell of this slide leaves none of its cells out.
+  const isNew = index => content.widgets[index].model.executionCount === null;
+  const { executionState, executionCount } = content.activeCell.model;
+  if (executionCount || executionState === 'running') {
+    const place = content.activeCellIndex;
+    const left = shown.find(index => index > place && content.widgets[index].model.type === 'code' && isNew(index));
+    if (left !== undefined) return toCell(left);
+  }
   if (outer.scrollTop + outer.clientHeight < outer.scrollHeight - 4) {
     outer.scrollTop += 0.8 * outer.clientHeight;
   } else if (shown.length < slide.length) {
@@ -422,14 +430,17 @@ function toStep(way) {
   used();
 }
 
-function toCell(way) {
+function byCell(way) {
   const { content } = deck;
   const runs = shownOn(slides()[here()]).filter(index => content.widgets[index].model.type === 'code');
   const index = runs[runs.indexOf(content.activeCellIndex) + way];
-  if (index === undefined || content.activeCell.model.type !== 'code') {
+  if (index === undefined || content.activeCell.model.type !== 'code')
     scroller().scrollTop += 0.2 * way * scroller().clientHeight;
-    return;
-  }
+  else toCell(index);
+}
+
+function toCell(index) {
+  const { content } = deck;
   content.activeCellIndex = index;
   focusCell();
   content.activeCell.node.scrollIntoView({ block: 'nearest' });
@@ -490,7 +501,7 @@ async function run(actions, on) {
   say('');
   panel.deckFollows = true;
   void actions.runCells(content, [cell], sessionContext);
-  if (on && panel === deck) toCell(1);
+  if (on && panel === deck) byCell(1);
 }
 
 async function restart() {
