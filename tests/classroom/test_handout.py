@@ -31,6 +31,7 @@ def checkout(tmp_path):
         (root / name).write_text(name)
     git(root, 'init')
     git(root, 'add', '.')
+    git(root, 'commit', '-m', 'all')
     (root / 'my draft').write_text('not in git')
     return root
 
@@ -56,12 +57,20 @@ def test_a_handout_has_no_notes(checkout, tmp_path, capsys):
 
 
 def test_its_readme_links_to_what_it_has():
-    has = handout.files(ROOT)
     readme = handout.for_students((ROOT / 'README.md').read_text(encoding='utf-8'))
     links = re.findall(r'\]\((?!https?:)([^)#]+)', readme)
     assert 'notebooks/00_start_here.ipynb' in links
-    assert not {*links} - {*has}
+    assert not [link for link in links if link.startswith(handout.LEFT_OUT)]
+    assert all((ROOT / link).is_file() for link in links)
     assert 'make test' not in readme
+
+
+def test_what_is_not_committed_is_named_and_left_out(checkout, tmp_path, capsys):
+    (checkout / 'Makefile').write_text('half done')
+    course = unpack(checkout, tmp_path / 'home')
+    assert (course / 'Makefile').read_text() == 'Makefile'
+    said = capsys.readouterr().out
+    assert re.search(r'^Not committed, so not in it: Makefile, .*my draft', said, re.M)
 
 
 def test_solutions_may_come_later(checkout, tmp_path):
@@ -99,6 +108,7 @@ def test_bad_input_gives_one_sentence(checkout, tmp_path, capsys):
     (checkout / 'requirements.lock').write_text('# Every wheel exists for Python 3.12 3.11\na==1\n')
     (checkout / 'requirements-uv.lock').write_text('\nuv==1\n')
     git(checkout, 'add', '.')
+    git(checkout, 'commit', '-m', 'locks')
     assert handout.main(['--root', str(checkout), '--wheels', '3.9']) == 1
     assert capsys.readouterr().err.count('\n') == 1
     assert not (checkout / 'handout').exists()

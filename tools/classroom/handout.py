@@ -38,13 +38,14 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
     `pythons` are versions such as '3.12', whose wheels are added. Raises ValueError with one
     sentence.
     """
-    names = files(root)
     with tempfile.TemporaryDirectory() as folder:
         course = Path(folder, NAME)
-        for name in names:
-            target = course / name
-            target.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(root / name, target)
+        course.mkdir()
+        _git(root, 'archive', f'--output={folder}/committed.tar', 'HEAD')
+        with tarfile.open(f'{folder}/committed.tar') as committed:
+            committed.extractall(course)
+        for name in LEFT_OUT:
+            shutil.rmtree(course / name, ignore_errors=True)
         readme = course / 'README.md'
         readme.write_text(for_students(readme.read_text(encoding='utf-8')), encoding='utf-8')
         left_out = {'notes'} if solutions else {'notes', 'solution'}
@@ -64,18 +65,16 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
     return output
 
 
-def files(root: Path) -> list[str]:
-    """Return the files of a checkout that are handed out. Raises ValueError without a clone."""
-    listed = subprocess.run(['git', 'ls-files', '-z'], cwd=root, capture_output=True, text=True)
-    if listed.returncode:
+def not_committed(root: Path) -> list[str]:
+    """Return the files with changes that a handout leaves out."""
+    return [line[3:] for line in _git(root, 'status', '--porcelain').splitlines()]
+
+
+def _git(root: Path, *words: str) -> str:
+    said = subprocess.run(['git', *words], cwd=root, capture_output=True, text=True)
+    if said.returncode:
         raise ValueError('A handout is made in a clone of the repository: git finds none here.')
-    return [
-        name
-        for name in listed.stdout.split('\0')
-        if name
-        and not name.startswith(tuple(f'{one}/' for one in LEFT_OUT))
-        and (root / name).is_file()
-    ]
+    return said.stdout
 
 
 def for_students(readme: str) -> str:
@@ -136,6 +135,8 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     what = f'for Python {" and ".join(pythons)}, no network needed' if pythons else 'no packages'
     print(f'{output}: {output.stat().st_size / 1e6:.1f} MB, {what}.')
+    if left_out := not_committed(options.root):
+        print('Not committed, so not in it:', ', '.join(left_out))
     print(f'Students: tar xf {output.name} && cd {NAME} && make lab')
     return 0
 

@@ -12,6 +12,7 @@ import hashlib
 import json
 import sys
 import time
+from functools import lru_cache
 from pathlib import Path
 
 import nbformat
@@ -41,6 +42,21 @@ def deck() -> dict:
         return json.loads(deck_file().read_text())
     except (OSError, ValueError):
         return {}
+
+
+def shown_cell(root: Path, deck: dict) -> tuple[list[nbformat.NotebookNode], int] | None:
+    """Return the cells of the copy that the deck shows, and its place in them; or None."""
+    file = root / FOLDER / Path(deck.get('current', '')).name
+    try:
+        cells = _cells(file, file.stat().st_mtime_ns)
+    except (OSError, ValueError):  # there is none, or JupyterLab is writing it
+        return None
+    return cells, min(deck['places'].get(deck['current'], 0), len(cells) - 1)
+
+
+@lru_cache(maxsize=2)
+def _cells(file: Path, _changed: int) -> list[nbformat.NotebookNode]:
+    return nbformat.read(file, as_version=4).cells
 
 
 class Copies:

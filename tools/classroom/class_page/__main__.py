@@ -21,7 +21,7 @@ from tools.classroom.class_page import folder, page_file
 from tools.classroom.class_page.addresses import in_networks
 from tools.classroom.class_page.lessons import Known
 from tools.classroom.class_page.store import ClassStore
-from tools.classroom.class_page.web import Room, application, serve
+from tools.classroom.class_page.web import PAGE_EVERY_S, Room, application, serve
 from tools.lessons.lesson import GLOSSARY, ROOT, lessons
 
 FILE = 'class.sqlite'
@@ -35,8 +35,13 @@ def known_lessons(root: Path = ROOT) -> list[Known]:
 async def hold(store: ClassStore, options: argparse.Namespace) -> None:
     """Hold the class, until its end."""
     over = asyncio.Event()
-    asyncio.get_running_loop().add_signal_handler(signal.SIGINT, over.set)
-    room = Room(store, stop=over.set)
+
+    def end() -> None:
+        room.over = True
+        over.set()
+
+    room = Room(store, end, options.root)
+    asyncio.get_running_loop().add_signal_handler(signal.SIGINT, end)
     address = '0.0.0.0' if options.lan else '127.0.0.1'
     sockets = bind_sockets(options.port, address, socket.AF_INET)
     server = serve(application(room), sockets)
@@ -63,6 +68,7 @@ async def hold(store: ClassStore, options: argparse.Namespace) -> None:
         threading.Thread(target=webbrowser.open, args=[page], daemon=True).start()
     try:
         await over.wait()
+        await asyncio.sleep(2 * PAGE_EVERY_S)  # wall and slides say that it is over
     finally:
         page_file().unlink(missing_ok=True)
         server.stop()

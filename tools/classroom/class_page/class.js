@@ -55,7 +55,13 @@ function guess({ question, answered, shown: open, bars = [], measured = [], by }
   return box;
 }
 
+function end() {
+  live.close();
+  document.body.replaceChildren(element('p', 'The class is over. What it was told is deleted.'));
+}
+
 function show(state) {
+  if (state.over) return end();
   const [, cell] = location.hash.match(/^#cell=(.*)/) ?? [];
   document.body.className = cell ? 'slide' : location.hash === '#wall' ? 'wall' : '';
   find('trouble').textContent = '';
@@ -108,6 +114,5 @@ find('forget').onclick = () =>
 find('end').onclick = async () => {
   if (!confirm('End the class, and delete what it was told? Save the CSV before.')) return;
   await ask('end');
-  live.close();
-  document.body.replaceChildren(element('p', 'The class is over. What it was told is deleted.'));
+  end();
 };

@@ -21,7 +21,9 @@ from helpers._plumbing.look import LOOK_CSS
 from tools.classroom.class_page import events
 from tools.classroom.class_page.events import parse
 from tools.classroom.class_page.store import ClassStore
-from tools.classroom.present import deck
+from tools.classroom.notes import of_step
+from tools.classroom.present import deck, shown_cell
+from tools.lessons.lesson import ROOT
 
 HERE = Path(__file__).resolve().parent
 FILES = {'': 'text/html', 'class.css': 'text/css', 'class.js': 'text/javascript'}
@@ -42,13 +44,15 @@ EVENTS_A_MINUTE = 1200  # of a seat
 class Room:
     """What all handlers share: the class, where it is in the lesson, and how fast one may ask."""
 
-    def __init__(self, store: ClassStore, stop=lambda: None) -> None:
-        self.store, self.stop = store, stop
+    def __init__(self, store: ClassStore, stop=lambda: None, root: Path = ROOT) -> None:
+        self.store, self.stop, self._root = store, stop, root
+        self.over = False  # the pages say it
         self.joins: list[str] = []  # what students type, for the wall
         self.present = next(iter(store.lessons)), 0
         self.follows_students = True  # until a deck or the instructor says where the class is
         # Slides of another day may be there. Those of a class that was broken off are its own.
         self._deck = None if store.went_on else self._place_of(deck())
+        self._minutes: dict[tuple[str, int], dict] = {}  # of the step that the deck shows
         self._began_s: dict[str, float | None] = {}  # by lesson, as the slides say, or when shown
         self._counts, self._until_s = Counter(), 0.0
 
@@ -63,27 +67,37 @@ class Room:
         self.store.lessons[lesson].starts[step]
         self.present, self.follows_students = (lesson, step), False
 
-    def _place_of(self, slides: dict) -> tuple[str, int, float | None] | None:
-        """Return lesson and step of the slides, and since when: None on the first slide."""
+    def _place_of(self, slides: dict) -> tuple[str, int, float | None, dict] | None:
+        """Return lesson and step of the slides, since when, and their minutes.
+
+        They have begun at None on the first slide. Those of a timetable have fewer steps and
+        minutes than the lesson.
+        """
         path = slides.get('current', '')
         known = self.store.lessons.get(Path(path).stem[3:])
-        step = known and known.step_at(slides['places'].get(path, 0))
-        return known and (known.lesson.name, step, slides['began'].get(path))
+        if not known:
+            return None
+        copy = shown_cell(self._root, slides)
+        cells, at = copy or (known.cells, slides['places'].get(path, 0))
+        minutes = {key: of_step(cells, at)[key] for key in ('own', 'planned', 'all')}
+        step = known.step_of.get(cells[at].id, 0)
+        return known.lesson.name, step, slides['began'].get(path), minutes
 
     def view(self) -> dict:
         """Return all that the page shows: where the slides have gone, or most students are."""
         place = self._place_of(deck())
         if place and place != self._deck:
-            lesson, step, began_s = self._deck = place
+            lesson, step, began_s, minutes = self._deck = place
             self.go_to(lesson, step)
-            self._began_s[lesson] = began_s
+            self._began_s[lesson], self._minutes = began_s, {self.present: minutes}
         elif self.follows_students:
             self.present = self.store.busiest() or self.present
         lesson, step = self.present
         began_s = self._began_s.setdefault(lesson, time.time())
         gone = int(time.time() - began_s) // 60 if began_s else 0
         shown = self.store.view(lesson, step) | self.store.lessons[lesson].notes[step]
-        return shown | {'gone': gone, 'joins': self.joins}
+        shown |= self._minutes.get(self.present, {})
+        return shown | {'gone': gone, 'joins': self.joins, 'over': self.over}
 
 
 class Handler(web.RequestHandler):

@@ -6,7 +6,6 @@ presenter.js tells the server where the deck is. The rest is in the notebook.
 import html
 import json
 import time
-from functools import lru_cache
 from pathlib import Path
 
 import nbformat
@@ -19,7 +18,7 @@ from tornado import web
 from helpers._plumbing.look import LOOK_FILE
 from tools.classroom.class_page import page_file
 from tools.classroom.notes import of_step
-from tools.classroom.present import FOLDER, Copies, deck, deck_file
+from tools.classroom.present import FOLDER, Copies, deck, deck_file, shown_cell
 from tools.lessons.clean import write
 
 HERE = Path(__file__).resolve().parent
@@ -37,14 +36,10 @@ def state(root: Path, deck: dict) -> dict:
     `root` is the folder with the copies, `deck` what presenter.js keeps. Without a deck the answer
     is empty.
     """
-    file = root / FOLDER / Path(deck.get('current', '')).name
-    if not file.is_file():
+    place = shown_cell(root, deck)
+    if place is None:
         return {}
-    try:
-        cells = _cells(file, file.stat().st_mtime_ns)
-    except (OSError, ValueError):  # JupyterLab is writing it
-        return {}
-    at = min(deck['places'].get(deck['current'], 0), len(cells) - 1)
+    cells, at = place
     types = [cell.metadata.get('slideshow', {}).get('slide_type') for cell in cells]
     starts = [i for i, kind in enumerate(types) if kind in ('slide', 'subslide')]
     starts += [len(cells)] * 2  # the end of the last slide, and of the one after it, which is empty
@@ -57,12 +52,6 @@ def state(root: Path, deck: dict) -> dict:
         'cells': ''.join(map(_html, following)),
         'gone': int(time.time() - began) // 60 if began else 0,
     }
-
-
-@lru_cache(maxsize=2)
-def _cells(file: Path, _changed: int) -> list[nbformat.NotebookNode]:
-    """Return the cells of a notebook. It is read again where the time of its change is another."""
-    return nbformat.read(file, as_version=4).cells
 
 
 def _html(cell: nbformat.NotebookNode) -> str:

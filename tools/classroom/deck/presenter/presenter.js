@@ -346,7 +346,8 @@ function onKey(event, tracker, actions) {
     if (key === 'escape' && !completes) return take(event, escape);
     // These would make new cells.
     if (['Alt enter', 'Control Shift -', 'Control _', 'Control -'].includes(key)) return take(event);
-    if (!wanted.includes(key)) return;
+    if (key === 'pagedown' || key === 'pageup') escape(actions, false, { edits }); // a clicker
+    else if (!wanted.includes(key)) return;
   } else if (inside) {
     if (target.matches(TYPED) ? !['pagedown', 'pageup', 'escape', 'f5'].includes(key) : !EVERYWHERE.includes(key)) return;
   }
