@@ -110,6 +110,7 @@ ADDED = [
     ('imports_what_is_public', code('from helpers._plumbing.text import table')),
     ('names_stay', code('my_guess = 0')),
     ('names_stay', code('%time 1\nfor my_guess in [0]:\n    run()')),
+    ('steps_begin_cells', new_markdown_cell('So it is.\n\n## 7. Next')),
     ('tasks_are_checked', code('run()', 'check')),
     ('tagged', note('Ask first.')),
     ('tagged', new_raw_cell('For the instructor: ask')),

@@ -170,6 +170,13 @@ def names_stay(lesson: Lesson) -> Iterator[str]:
                 )
 
 
+def steps_begin_cells(lesson: Lesson) -> Iterator[str]:
+    """The title of a step is the first line of its cell: there its slide begins."""
+    for cell in lesson.notebook.cells:
+        if cell.cell_type == 'markdown' and (title := re.search(r'\n## (.*)', cell.source)):
+            yield f'The step "{title[1]}" is inside a cell: let a cell of its own begin with it.'
+
+
 def tagged(lesson: Lesson) -> Iterator[str]:
     """JupyterLab shows the first line of a folded cell, and unfolds Markdown when it runs it."""
     for index, cell in enumerate(lesson.notebook.cells, 1):
@@ -289,6 +296,7 @@ RULES: list[Rule] = [
     pictures_described,
     imports_what_is_public,
     names_stay,
+    steps_begin_cells,
     tagged,
     fits_a_slide,
     named,
