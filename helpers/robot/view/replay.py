@@ -73,7 +73,7 @@ class Drive:
         few = np.linspace(0, len(ANGLES) - 1, BEAMS).round().astype(int)
         return {
             'name': self.name,
-            'step': round(step, 4),
+            'step': round(step, 4) or EVERY_S,  # a drive of no time has one pose
             'poses': poses.tolist(),
             'view': round(float(ANGLES[-1] - ANGLES[0]), 4),
             'scans': [
