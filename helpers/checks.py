@@ -59,7 +59,7 @@ def compare_prediction(
 
     If a measured number moves from run to run, whatever lies within `tolerance` of it is right, in
     its own unit. Choose it wide enough for the slowest machine: then the verdict stays the same.
-    The right answer is then not printed.
+    The right answer is then printed for a student only, not in a run without one.
 
     `because` is a sentence that explains the outcome. It is printed after any guess. If there is no
     guess yet, a student is asked for one; a run without a student, as in CI, prints the answer. A
@@ -73,8 +73,7 @@ def compare_prediction(
         raise TypeError(f'The outcome of a prediction cannot be of type {type(outcome).__name__}.')
     print(question)
     if guess is None or guess is ...:
-        shell = get_ipython()
-        if shell is None or not hasattr(shell, 'kernel') or can_ask(shell.kernel):
+        if _has_student():
             print(f'  {NO_GUESS}')
             return
         if not tolerance:
@@ -86,11 +85,20 @@ def compare_prediction(
         print(f'  Your guess: {guess!r}. Please change it: the answer must be {wanted}.')
         return
     verdict = _verdict(guess, outcome, tolerance)
-    answer = '' if verdict == 'right' or tolerance else f' The answer is {_written(outcome)}.'
+    answer = f' The answer is {_written(outcome)}.'
+    if tolerance:  # it moves from run to run, so a saved output does not have it
+        answer = f' Here it was {outcome:.4g}.' if _has_student() else ''
+    answer = '' if verdict == 'right' else answer
     print(f'  Your guess: {_written(guess)}. Verdict: {verdict}.{answer}')
     classroom.tell_outcome(question, outcome)
     if because:
         print(f'  {because}')
+
+
+def _has_student() -> bool:
+    """Return whether somebody can answer, as in JupyterLab; in CI nobody can."""
+    shell = get_ipython()
+    return shell is None or not hasattr(shell, 'kernel') or can_ask(shell.kernel)
 
 
 def check(task: int, *requirements: tuple[str, object | Callable[[], object], str]) -> None:

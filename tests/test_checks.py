@@ -47,7 +47,9 @@ def test_each_guess_gets_verdict_and_answer(capsys, guess, outcome, said):
     assert told(capsys, guess, outcome) == [f'  Your guess: {said}']
 
 
-def test_tolerance_keeps_the_text_constant(capsys):
+def test_tolerance_keeps_the_text_constant(capsys, monkeypatch):
+    assert told(capsys, 41, 20, tolerance=2)[0].endswith('Verdict: too many. Here it was 20.')
+    monkeypatch.setattr('helpers.checks._has_student', lambda: False)
     texts = {tuple(told(capsys, 41, measured, tolerance=2)) for measured in range(15, 39)}
     assert texts == {('  Your guess: 41. Verdict: too many.',)}
     verdicts = [
