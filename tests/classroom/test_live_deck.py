@@ -104,6 +104,7 @@ def forward(deck):
         deck.page.run_here()
     deck.key('PageDown')
     assert deck.slide == slide + 1
+    deck.tab.wait_for_function(SAVED)
 
 
 def back(deck):
