@@ -16,10 +16,12 @@ from tools.lessons.comparison import start_kernels_by
 # No test reads or changes what the user of this checkout has solved. Kernels inherit it.
 os.environ[FILE_VARIABLE] = ''
 
-# What a shell starts in the background ignores Ctrl+C, and so would all processes that the tests
-# start.
+# What a shell starts in the background ignores Ctrl+C, below `nohup` also the end of a terminal.
+# So would all processes that the tests start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # `make test` tries the same examples every time: what passed yesterday passes in class. New ones:
 # `make test PYTEST_ARGS='--hypothesis-profile=explore tests/test_queue_model.py'`, twenty times as
