@@ -234,8 +234,10 @@ class _Outbox:
             except ValueError as refused:  # the class knows no such seat, or no such event
                 return self._forget(db, known, str(refused))
             except OSError:
-                self._silent_since = self._silent_since or time.monotonic()
-                if time.monotonic() - self._silent_since > GIVE_UP_S:
+                now = time.monotonic()
+                self._silent_since = self._silent_since or now
+                # The class of a hub comes back with the hub: it cannot be left by waiting.
+                if now - self._silent_since > GIVE_UP_S and not os.environ.get(HUB_VARIABLE):
                     return self._forget(db, known, OVER)
                 self._trouble = SILENT
                 return True
@@ -250,7 +252,7 @@ class _Outbox:
             db.execute('DELETE FROM waiting')
             if not os.environ.get(HUB_VARIABLE):
                 db.execute('DELETE FROM class WHERE token = ?', [known.token])
-        self._trouble = why
+        self._trouble, self._silent_since = why, None
         return False
 
 
