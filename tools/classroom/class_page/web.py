@@ -67,29 +67,30 @@ class Room:
         self.store.lessons[lesson].starts[step]
         self.present, self.follows_students = (lesson, step), False
 
-    def _place_of(self, slides: dict) -> tuple[str, int, float | None, dict] | None:
-        """Return lesson and step of the slides, since when, and their minutes.
-
-        They have begun at None on the first slide. Those of a timetable have fewer steps and
-        minutes than the lesson.
-        """
+    def _place_of(self, slides: dict) -> tuple[str, int, float | None] | None:
+        """Return lesson and step of the slides, and since when: None on the first slide."""
         path = slides.get('current', '')
         known = self.store.lessons.get(Path(path).stem[3:])
         if not known:
             return None
+        # The slides of a timetable have fewer cells than the lesson.
         copy = shown_cell(self._root, slides)
-        cells, at = copy or (known.cells, slides['places'].get(path, 0))
-        minutes = {key: of_step(cells, at)[key] for key in ('own', 'planned', 'all')}
-        step = known.step_of.get(cells[at].id, 0)
-        return known.lesson.name, step, slides['began'].get(path), minutes
+        at = slides['places'].get(path, 0)
+        step = known.step_of.get(copy[0][copy[1]].id, 0) if copy else known.step_at(at)
+        return known.lesson.name, step, slides['began'].get(path)
 
     def view(self) -> dict:
         """Return all that the page shows: where the slides have gone, or most students are."""
-        place = self._place_of(deck())
+        slides = deck()
+        place = self._place_of(slides)
         if place and place != self._deck:
-            lesson, step, began_s, minutes = self._deck = place
+            lesson, step, began_s = self._deck = place
             self.go_to(lesson, step)
-            self._began_s[lesson], self._minutes = began_s, {self.present: minutes}
+            self._began_s[lesson], self._minutes = began_s, {}
+            if copy := shown_cell(self._root, slides):
+                notes = of_step(*copy)
+                minutes = {key: notes[key] for key in ('own', 'planned', 'all')}
+                self._minutes = {self.present: minutes}
         elif self.follows_students:
             self.present = self.store.busiest() or self.present
         lesson, step = self.present
