@@ -21,7 +21,7 @@ from pathlib import Path
 import nbformat
 from packaging.requirements import Requirement
 
-from tools.classroom.update import BASE
+from tools.classroom.update import BASE, committed
 from tools.lessons.clean import text_of
 from tools.lessons.lesson import ROOT, tags
 
@@ -39,11 +39,7 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
     sentence.
     """
     with tempfile.TemporaryDirectory() as folder:
-        course = Path(folder, NAME)
-        course.mkdir()
-        _git(root, 'archive', f'--output={folder}/committed.tar', 'HEAD')
-        with tarfile.open(f'{folder}/committed.tar') as committed:
-            committed.extractall(course)
+        course = committed(root, 'HEAD', Path(folder, NAME))
         for name in LEFT_OUT:
             shutil.rmtree(course / name, ignore_errors=True)
         readme = course / 'README.md'
@@ -66,15 +62,12 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
 
 
 def not_committed(root: Path) -> list[str]:
-    """Return the files with changes that a handout leaves out."""
-    return [line[3:] for line in _git(root, 'status', '--porcelain').splitlines()]
-
-
-def _git(root: Path, *words: str) -> str:
-    said = subprocess.run(['git', *words], cwd=root, capture_output=True, text=True)
+    """Return the files with changes, which are left out. Raises ValueError without a clone."""
+    status = ['git', 'status', '--porcelain']
+    said = subprocess.run(status, cwd=root, capture_output=True, text=True)
     if said.returncode:
         raise ValueError('A handout is made in a clone of the repository: git finds none here.')
-    return said.stdout
+    return [line[3:] for line in said.stdout.splitlines()]
 
 
 def for_students(readme: str) -> str:
@@ -129,13 +122,14 @@ def main(arguments: list[str] | None = None) -> int:
     output = options.root / 'handout' / f'{NAME}.tar.gz'
     try:
         solutions, pythons = not options.no_solutions, tuple(options.wheels)
+        left_out = not_committed(options.root)
         handout(options.root, output, solutions=solutions, pythons=pythons)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1
     what = f'for Python {" and ".join(pythons)}, no network needed' if pythons else 'no packages'
     print(f'{output}: {output.stat().st_size / 1e6:.1f} MB, {what}.')
-    if left_out := not_committed(options.root):
+    if left_out:
         print('Not committed, so not in it:', ', '.join(left_out))
     print(f'Students: tar xf {output.name} && cd {NAME} && make lab')
     return 0

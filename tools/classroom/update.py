@@ -182,7 +182,7 @@ def update_from_git(mine: Path) -> list[str]:
     )
     with tempfile.TemporaryDirectory() as folder:
         base, newer = (
-            _tree(mine, name, Path(folder, name[-4:])) for name in ('HEAD', '@{upstream}')
+            committed(mine, name, Path(folder, name[-4:])) for name in ('HEAD', '@{upstream}')
         )
         said = merge_folders(base, mine, newer)
     _git(mine, 'The lessons are new, but git could not note it', 'reset', '@{upstream}')
@@ -195,7 +195,7 @@ def _git(folder: Path, trouble: str, *command: str) -> None:
         raise ValueError(' '.join(f'{trouble}. {done.stderr}'.split()))
 
 
-def _tree(folder: Path, name: str, output: Path) -> Path:
+def committed(folder: Path, name: str, output: Path) -> Path:
     """Write the files of a commit into a folder, and return it."""
     output.mkdir()
     archive = output.with_suffix('.tar')
