@@ -85,10 +85,11 @@ def compare_prediction(
         print(f'  Your guess: {guess!r}. Please change it: the answer must be {wanted}.')
         return
     verdict = _verdict(guess, outcome, tolerance)
-    answer = f' The answer is {_written(outcome)}.'
-    if tolerance:  # it moves from run to run, so a saved output does not have it
-        answer = f' Here it was {outcome:.4g}.' if _has_student() else ''
-    answer = '' if verdict == 'right' else answer
+    answer = ''
+    if verdict != 'right' and not tolerance:
+        answer = f' The answer is {_written(outcome)}.'
+    elif verdict != 'right' and _has_student():  # it moves, so a saved output does not have it
+        answer = f' Here it was {outcome:.4g}.'
     print(f'  Your guess: {_written(guess)}. Verdict: {verdict}.{answer}')
     classroom.tell_outcome(question, outcome)
     if because:

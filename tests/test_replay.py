@@ -281,6 +281,13 @@ def test_two_runs_side_by_side():
     assert re.findall('<figcaption>(.*?)</figcaption>', html(both)) == ['A', 'D']
 
 
+def test_a_message_that_still_waits_is_not_lost():
+    table = predict(0.05, 0.01, 10, 1, 5)
+    table.loc[table.index[-2:], ['started_s', 'finished_s', 'thread']] = None
+    assert str(replay(table, 10)).endswith('None was lost.')
+    assert str(replay(table, 1)).endswith('Some were lost.')
+
+
 def test_what_nbval_compares_does_not_move():
     slow, slower = predict(0.05, 0.2, 10, 1, 41), predict(0.05, 0.21, 10, 1, 41)
     pages = [html(replay(table, 10)) for table in (slow, slower)]

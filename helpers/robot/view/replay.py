@@ -40,14 +40,14 @@ class Drive:
         return 0.0, self.record_.poses[-1].t_s if self.record_.poses else 0.0
 
     def sampled(self) -> tuple[float, np.ndarray]:
-        """Return the time between two poses, and the poses (n, 5): x, y, yaw, v, w."""
+        """Return the time between two poses (s), and the poses (n, 5): x, y, yaw, v, w."""
         rows = np.array(self.record_.poses or [(0.0, *self.record_.floor.start, 0.0, 0.0)], float)
         end = rows[-1, 0]
         count = min(math.ceil(end / EVERY_S), POSES) + 1
         columns = (*rows.T[1:3], np.unwrap(rows[:, 3]), *rows.T[4:6])
         times = np.linspace(0, end, count)
         poses = np.stack([np.interp(times, rows[:, 0], column) for column in columns], axis=1)
-        return end / max(count - 1, 1), poses.round(3)
+        return end / (count - 1) if end else EVERY_S, poses.round(3)
 
     def picture(self) -> str:
         """Return the floor as an SVG at the end of the drive."""
@@ -73,7 +73,7 @@ class Drive:
         few = np.linspace(0, len(ANGLES) - 1, BEAMS).round().astype(int)
         return {
             'name': self.name,
-            'step': round(step, 4) or EVERY_S,  # a drive of no time has one pose
+            'step': round(step, 4),
             'poses': poses.tolist(),
             'view': round(float(ANGLES[-1] - ANGLES[0]), 4),
             'scans': [

@@ -161,6 +161,10 @@ function leave() {
 
 const kindOf = ({ model }) => model.getMetadata('slideshow')?.slide_type;
 
+const isNew = ({ model }) => model.executionCount === null;
+
+const hasRun = ({ model }) => model.executionCount > 0 || model.executionState === 'running';
+
 const isSolution = ({ model }) => model.getMetadata('tags')?.includes('solution');
 
 // Return the slides: the indices of their cells.
@@ -186,8 +190,7 @@ const here = () => slideOf(deck.content.activeCellIndex);
 function shownOn(slide) {
   const { widgets } = deck.content;
   const isText = index => widgets[index].model.type !== 'code';
-  const waits = index => !isText(index) && widgets[index].model.executionState !== 'running'
-    && widgets[index].model.executionCount === null && !isSolution(widgets[index]);
+  const waits = index => !isText(index) && !hasRun(widgets[index]) && !isSolution(widgets[index]);
   const opened = slide.findLastIndex(index => deck.deckOpened?.has(widgets[index].model.id));
   const end = slide.findIndex((index, i) => i > opened && isText(index) && slide.slice(0, i).some(waits));
   return end < 0 ? slide : slide.slice(0, end);
@@ -199,9 +202,9 @@ function goTo(number, cell) {
   const slide = all[Math.min(Math.max(number, 0), all.length - 1)];
   const { content } = deck;
   const runs = shownOn(slide).filter(index => content.widgets[index].model.type === 'code');
-  const isNew = index => content.widgets[index].model.executionCount === null && !isSolution(content.widgets[index]);
+  const waits = index => isNew(content.widgets[index]) && !isSolution(content.widgets[index]);
   content.mode = 'command';
-  content.activeCellIndex = slide.includes(cell) ? cell : (runs.find(isNew) ?? runs[0] ?? slide[0]);
+  content.activeCellIndex = slide.includes(cell) ? cell : (runs.find(waits) ?? runs[0] ?? slide[0]);
   content.deselectAll();
   deck.deckFollows = false;
   update();
@@ -389,11 +392,8 @@ function next() {
         return;
       }
   // Whoever has run a cell of this slide leaves none of its cells out.
-  const isNew = index => content.widgets[index].model.executionCount === null;
-  const { executionState, executionCount } = content.activeCell.model;
-  if (executionCount || executionState === 'running') {
-    const place = content.activeCellIndex;
-    const left = shown.find(index => index > place && content.widgets[index].model.type === 'code' && isNew(index));
+  if (hasRun(content.activeCell)) {
+    const left = shown.find(index => index > content.activeCellIndex && isNew(content.widgets[index]));
     if (left !== undefined) return toCell(left);
   }
   if (outer.scrollTop + outer.clientHeight < outer.scrollHeight - 4) {
