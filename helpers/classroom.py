@@ -46,7 +46,10 @@ WAITING = 1000  # events that are kept while the class does not answer; the olde
 LARGEST = 2**53  # of numbers, which a browser holds exactly
 TEXT = 200  # letters of a text, at most
 ITEMS = 20  # of a list or a set, at most
-UNUSABLE = 'The class hears nothing, because {} cannot be used ({}): remove it, then join again.'
+UNUSABLE = (
+    'Nothing is sent to the class, because {} cannot be used ({}): remove this file, then join '
+    'again.'
+)
 SILENT = (
     'The class does not answer. What you tell is kept for ten minutes. If the class is over, '
     'leave_class() ends this.'
@@ -92,7 +95,7 @@ def guess(question: str, *answers: object) -> object:
         return ...
     [value] = answers
     if value is not ...:
-        print('Your guess is taken:', value)
+        print('Your guess is saved:', value)
         _tell('guess', question=question, value=value)
         _outbox.say_trouble()
     return value
@@ -285,7 +288,9 @@ def _join(address: str, code: str, name: str) -> str:
         return f'There is no class here, because {progress.FILE_VARIABLE} is empty.'
     hub = os.environ.get(HUB_VARIABLE)
     if not hub and not (ADDRESS.fullmatch(address) and code):
-        raise ValueError("Copy it from the wall: join_class('192.0.2.5:8765', 'blue-otter-lamp').")
+        raise ValueError(
+            "Copy the line from the screen: join_class('192.0.2.5:8765', 'blue-otter-lamp')."
+        )
     url = hub or f'{"" if "://" in address else "http://"}{address.rstrip("/")}'
     address = address or 'the hub'
     known = _known()
@@ -296,8 +301,8 @@ def _join(address: str, code: str, name: str) -> str:
         given, seat = answer['token'], answer['seat']
     except (OSError, KeyError) as problem:  # what answers without a seat is no class
         raise ValueError(
-            f'No class answers at {address} ({problem}). Compare the address with the wall; is '
-            'this computer in the same network?'
+            f'No class answers at {address} ({problem}). Compare the address with the one on '
+            'the screen. Is this computer in the same network?'
         ) from None
     with closing(_open(path)) as db, db:
         if given != token:

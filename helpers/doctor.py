@@ -183,7 +183,7 @@ def check_build_tools() -> list[Check]:
     """Check that what builds packages is there, and runs."""
     rows = []
     for tool in build_tools():
-        found, to_do = tool.found, f'for lessons that build packages run `{tool.install}`'
+        found, to_do = tool.found, f'to build packages in the lessons, run `{tool.install}`'
         if os.path.isabs(found):  # a command
             found = _run([found, '--version']).stdout.partition('\n')[0]
         if tool.name == 'C++ compiler' and found:

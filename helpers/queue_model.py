@@ -99,7 +99,7 @@ class Explanation:
             f'{self.lost} of {self.messages} messages were lost, {self.explained} losses explained.'
         ]
         if self.complete:
-            lines.append('Everything is as a KEEP_LAST queue must do it.')
+            lines.append('Everything follows the rules of a KEEP_LAST queue.')
         return '\n'.join(lines + self.contradictions)
 
 

@@ -241,7 +241,7 @@ class Session:
                 self._raise_failure()
                 waited_s = time.monotonic() - started
                 if waited_s > timeout_s:
-                    raise TimeoutError(self._why(f'Waited {timeout_s:g} s in vain.', status))
+                    raise TimeoutError(self._why(f'Gave up after {timeout_s:g} s.', status))
                 bar.update(waited_s)
                 if waited_s > SAY_AFTER_S and not said:
                     said = True
@@ -329,7 +329,7 @@ class Session:
             stuck = any(thread.is_alive() for thread in self._endless)
             raise RuntimeError(
                 f'{len(self._endless)} callback(s) did not end within {CLOSE_TIMEOUT_S:g} s: '
-                f'let every callback end{", and restart the kernel" if stuck else ""}.'
+                f'every callback must end{"; restart the kernel" if stuck else ""}.'
             )
 
     def _clean_up(self) -> None:

@@ -83,7 +83,7 @@ def test_without_a_class_a_sentence_says_so(folder, capsys, call):
 @pytest.mark.parametrize(('address', 'code'), [('192.0.2.5:8765', ''), ('file:///etc', 'a')])
 def test_a_bad_address_gets_one_sentence(folder, capsys, address, code):
     classroom.join_class(address, code)
-    assert capsys.readouterr().out.startswith('Copy it from the wall: join_class(')
+    assert capsys.readouterr().out.startswith('Copy the line from the screen: join_class(')
     assert list(folder.iterdir()) == []
 
 
@@ -94,15 +94,15 @@ def test_an_address_where_nobody_answers(folder, capsys):
         classroom.join_class(nobody, 'blue-otter-lamp')
     said = ' '.join(capsys.readouterr().out.split())
     assert said.startswith(f'No class answers at {nobody} (')
-    assert 'Compare the address with the wall' in said
+    assert 'Compare the address with the one on the screen' in said
     assert list(folder.iterdir()) == []
 
 
 def test_a_file_that_is_damaged_fails_no_lesson(tmp_path):
     tmp_path.joinpath('ros2_notebooks_class.sqlite').write_text('This is no database. ' * 99)
     said = in_kernel(tmp_path, GUESSES.format(0, 50, QUESTION) + 'leave_class()')
-    assert 'The class hears nothing, because ' in said
-    assert 'remove it, then join again.' in said
+    assert 'Nothing is sent to the class, because ' in said
+    assert 'remove this file, then join again.' in said
     assert said.endswith(classroom.NOT_JOINED)
     assert list(tmp_path.iterdir()) == []
 

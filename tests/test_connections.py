@@ -1,4 +1,4 @@
-"""A cell that waits in vain says why."""
+"""A cell that gives up a wait says why."""
 
 import threading
 
@@ -16,11 +16,11 @@ from helpers.session import ros_session
 
 
 def said_by(wait, *arguments):
-    """Wait a moment in vain, and return the lines of the error."""
+    """Wait for what does not happen, and return the lines of the error."""
     with pytest.raises(TimeoutError) as failure:
         wait(*arguments, timeout_s=0.5)
     first, *lines = str(failure.value).splitlines()
-    assert first == 'Waited 0.5 s in vain.'
+    assert first == 'Gave up after 0.5 s.'
     return lines
 
 

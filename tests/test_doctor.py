@@ -66,7 +66,7 @@ def test_only_a_required_check_decides(tmp_path):
     assert answer.returncode == 1
     assert 'run `unset RMW_IMPLEMENTATION`, and' in row_of(answer.stdout, 'rclpy')
     assert row_of(answer.stdout, 'C++ compiler') == (
-        'C++ compiler optional none that works: for lessons that build packages run '
+        'C++ compiler optional none that works: to build packages in the lessons, run '
         '`sudo apt install g++`'
     )
     summary = answer.stdout[answer.stdout.index('This machine is not ready: 2 of 5') :]
@@ -98,7 +98,7 @@ def test_a_message_that_does_not_arrive_is_reported(monkeypatch):
     monkeypatch.setattr(doctor, 'MESSAGE_TIMEOUT_S', 0.2)
     monkeypatch.setattr(SingleThreadedExecutor, 'add_node', lambda executor, node: None)
     row = doctor.check_message()
-    assert row.found == 'rmw_fastrtps_cpp: Waited 0.2 s in vain.'
+    assert row.found == 'rmw_fastrtps_cpp: Gave up after 0.2 s.'
     assert row.to_do.startswith('allow UDP on the loopback interface')
 
 

@@ -127,7 +127,7 @@ def test_descriptions_do_not_move_between_runs(slow, parallel, draw):
 
 def test_what_no_lesson_shows_in_words(parallel):
     unheard = table_of([np.nan] * 12)
-    assert 'None was heard: a cross is when' in said(plots.sequence_gaps, unheard)
+    assert 'None was heard: a cross marks when' in said(plots.sequence_gaps, unheard)
     assert 'No two callbacks overlap.' in said(plots.timeline, unheard)
     assert 'None is pushed out.' in said(plots.queue_length, parallel, 10)
 

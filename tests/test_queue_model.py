@@ -251,7 +251,7 @@ def test_what_is_impossible_is_said(table, said):
     explanation = explain(table, 10, 1)
     assert said is None or any(said in sentence for sentence in explanation.contradictions)
     assert explanation.complete is (said is None)
-    assert ('Everything is' in str(explanation)) is (said is None)
+    assert ('Everything follows' in str(explanation)) is (said is None)
 
 
 def test_last_messages_that_were_never_heard():

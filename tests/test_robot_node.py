@@ -163,8 +163,8 @@ def test_the_brake_is_a_law(depth, hits):
     - Depth 10: of ten scans a second five are heard, so the queue is full after 2 s. Then the
       oldest of ten is heard, which is 0.9 s old or more.
     What a busy machine loses makes the second worse still. Of the first it may lose 0.19 s in each
-    callback, which counts twice: before the scan is heard, and in its age. Whoever works first, and
-    stops then, is later by 0.2 s, and needs a limit of 0.6 m for the same.
+    callback, which counts twice: before the scan is heard, and in its age. A node that works first,
+    and stops then, is later by 0.2 s, and needs a limit of 0.6 m for the same.
     """
     v, limit, work = 0.5, 0.5, 0.2
     to_go = limit - RADIUS_M - v**2 / 2 / MAX_ACCELERATION  # from the limit, in time to brake

@@ -354,10 +354,10 @@ def test_the_same_run_again_ends_the_one_before(built):
 def test_waiting_is_bounded_and_says_what_was_printed(built):
     with built.run('talker_pkg', 'talker') as talker:
         talker.wait_for('Publishing: 1')
-        said = r"^Waited 0.1 s in vain for a line with 'never' of talker. Its last lines: .*Publish"
+        said = r"^Waited 0.1 s, but talker did not print 'never'. Its last lines: .*Publish"
         with pytest.raises(TimeoutError, match=said):
             talker.wait_for('never', timeout_s=0.1)
-        with pytest.raises(TimeoutError, match='^Waited 0.1 s in vain for the end of talker. Its'):
+        with pytest.raises(TimeoutError, match='^Waited 0.1 s, but talker did not end. Its'):
             talker.wait(timeout_s=0.1)
 
 
@@ -468,7 +468,7 @@ def test_a_terminal_knows_packages_after_source(built):
     assert talker.lines[-1] == 'The talker ends.'
 
 
-def test_a_wait_in_vain_names_topics_that_do_not_meet(other):
+def test_a_wait_that_gives_up_names_topics_that_do_not_meet(other):
     publish = 'ros2 topic pub /topik std_msgs/msg/String "data: a"'
     with (
         other.start(publish, 'publish') as publisher,
@@ -478,8 +478,8 @@ def test_a_wait_in_vain_names_topics_that_do_not_meet(other):
         with pytest.raises(TimeoutError) as failure:
             echo.wait_for('data', timeout_s=1)
     assert str(failure.value) == (
-        "Waited 1 s in vain for a line with 'data' of echo. Its last lines: none. The topic /topik "
-        'has a publisher and no subscription. Nearly the same name: /topic. The topic /topic has a '
+        "Waited 1 s, but echo did not print 'data'. Its last lines: none. The topic /topik has a "
+        'publisher and no subscription. Nearly the same name: /topic. The topic /topic has a '
         'subscription and no publisher. Nearly the same name: /topik'
     )
 

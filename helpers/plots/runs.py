@@ -197,7 +197,7 @@ def timeline(
     ax.set_xlim(0, 1.02 * last_s if math.isfinite(last_s) else 1)
     handles = [Patch(**look)] if group else None
     label_axes(ax, title, TIME_LABEL, 'thread', handles, grid='x')
-    named = f' The hatches stand for: {group}.' if group else ''
+    named = f' The hatching stands for: {group}.' if group else ''
     describe(
         ax,
         'One lane for each thread that ran a callback, one bar for each callback, with its '
@@ -336,11 +336,11 @@ def _loss(table: pd.DataFrame) -> str:
 
 def _gaps_in_words(table: pd.DataFrame, depth: int) -> str:
     marks = (
-        'a cross is when one was pushed out, and a dotted line leads to the message that did it, '
-        f'{depth} numbers later'
+        'a cross marks when one was pushed out, and a dotted line leads to the message that did '
+        f'it, {depth} numbers later'
     )
     return (
-        f'{len(table)} messages. A small dot is a message when it was published, a large dot the '
+        f'{len(table)} messages. A small dot marks when a message was published, a large dot the '
         f'start of its callback. {_loss_in_words(table, marks)}'
     )
 

@@ -147,8 +147,8 @@ def _starve() -> Variant:
         },
         1,
         "No order saves them all. While the camera's callback runs, messages of the IMU push each "
-        'other out; while the camera waits, a picture is pushed out. With one thread somebody has '
-        'to wait, and rclpy does not know whom you would choose.',
+        'other out; while the camera waits, a picture is pushed out. With one thread one has '
+        'to wait, and rclpy does not know which you would choose.',
         rclpy=2,
     )
 
@@ -194,7 +194,7 @@ def _counter(lock: str) -> Variant:
             'arrivals': _arrivals(0, [0, 0]),
         },
         2 if lock == 'with' else 1,
-        'No order loses one: whoever has the lock reads and writes before anybody else reads.'
+        'No order loses one: the thread with the lock reads and writes before the other one reads.'
         if lock == 'with'
         else 'Two callbacks ran, and the count is 1: both read 0, and both wrote 1. One update is '
         'lost. Try it with a lock.',
@@ -262,7 +262,7 @@ def _cancel(threads: int, job: str) -> Variant:
     elif looks:
         lesson = 'The second thread took the cancel while the job ran, and the job looked.'
     else:
-        lesson = 'The cancel was heard, and nobody looked: to hear is not to obey.'
+        lesson = 'The cancel was heard, but the job did not look: hearing is not obeying.'
     return Variant(
         {
             'threads': _threads(threads),
@@ -303,7 +303,7 @@ LEVELS = {
         {'depth': (1, 2, 4)},
     ),
     'starve': Level(
-        'You are the executor, with one thread. The IMU, a sensor of motion, sends a message '
+        'You are the executor, with one thread. The IMU, a motion sensor, sends a message '
         'every second, and its callback needs 0.4 s. The camera sends one every 3 s, and needs '
         '2.5 s. Lose as few as you can.',
         'keep',
@@ -334,7 +334,7 @@ LEVELS = {
     'cancel': Level(
         'You are the executor of a robot. Its job has begun: visit three places, a second each. '
         'After 1.5 s somebody cancels. Let the robot visit as few places as you can. Choose the '
-        'threads, and whether the job looks for a cancel in front of each place.',
+        'threads, and whether the job looks for a cancel before each place.',
         'stop',
         _cancel,
         {'threads': (1, 2), 'job': ('looks', 'does not look')},

@@ -58,7 +58,7 @@ class Robot(Node):
     `{'imu_link': 0.3, 'base_scan': -0.5}`; their messages are in their own frames, as they are.
 
     With `sim_time=True` time passes in `run` alone, as fast as the program, and `/clock` says it.
-    With `spin=False` whoever makes it spins it, and no session is needed.
+    With `spin=False` the caller spins it, and no session is needed.
 
     Raises RuntimeError where no session is open, TypeError for a floor that is none, and ValueError
     for a start in a wall and for a name that another node has.

@@ -113,7 +113,7 @@ class Graph:
         name = f'{node}/{re.sub("(?<!^)(?=[A-Z])", "_", service.__name__).lower()}'
         client = self.node.create_client(service, name)
         if not wait_for(client.service_is_ready, SERVICE_S):
-            raise CommandError(f"Waited {SERVICE_S:g} s in vain for the service '{name}'")
+            raise CommandError(f"Waited {SERVICE_S:g} s, but the service '{name}' did not appear")
         return self.result(client.call_async(service.Request(**fields)), f"calling '{name}'")
 
     def close(self) -> None:

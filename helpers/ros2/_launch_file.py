@@ -235,7 +235,7 @@ def _one(element: Element, scope: Scope) -> Iterator[Process]:
         return default if value is None else scope.text(str(value))
 
     if {'if', 'unless'} <= element.attributes.keys():
-        raise ValueError("an action has 'if' or 'unless', not both")
+        raise ValueError("an entry has 'if' or 'unless', not both")
     if not is_true(text('if', '1')) or is_true(text('unless', '0')):
         return
     match element.tag:
@@ -287,7 +287,7 @@ def _process(element: Element, scope: Scope, text: Callable[..., Any]) -> Proces
     if not command or output not in ('screen', 'log', 'both'):
         raise ValueError(f"no output is called '{output}'" if command else 'there is no command')
     if text('on_exit') not in (None, 'shutdown'):
-        raise ValueError(f"'on_exit' can be shutdown, not '{text('on_exit')}'")
+        raise ValueError(f"'on_exit' must be 'shutdown', not '{text('on_exit')}'")
     return Process(
         name=name,
         command=command,

@@ -56,5 +56,5 @@ def _scratch() -> Path:
             continue
     raise RuntimeError(
         'There is no folder for a workspace: neither this checkout nor /tmp can be written. Set '
-        'TMPDIR to a folder of yours whose name has no spaces and accents, and restart the kernel.'
+        'TMPDIR to a folder of yours whose name has no spaces or accents, and restart the kernel.'
     )

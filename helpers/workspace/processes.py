@@ -115,7 +115,7 @@ class Process:
                 )
             if time.monotonic() > deadline:
                 raise TimeoutError(
-                    f'Waited {timeout_s:g} s in vain for a line with {text!r} of {self.name}. '
+                    f'Waited {timeout_s:g} s, but {self.name} did not print {text!r}. '
                     f'{". ".join([self._last(), *_lonely_topics(self._environment)])}'
                 )
             time.sleep(POLL_S)
@@ -129,7 +129,7 @@ class Process:
             return self._process.wait(timeout_s)
         except subprocess.TimeoutExpired:
             raise TimeoutError(
-                f'Waited {timeout_s:g} s in vain for the end of {self.name}. {self._last()}'
+                f'Waited {timeout_s:g} s, but {self.name} did not end. {self._last()}'
             ) from None
 
     def _last(self) -> str:

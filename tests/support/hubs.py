@@ -29,8 +29,8 @@ from tools.lessons.lesson import read
 ROOT = Path(__file__).resolve().parents[2]
 STUDENTS = [f'student{number:02}' for number in range(1, 13)]
 CLAIMS = {  # of the lessons that the students run, by the lesson's name
-    'lose_messages': 'All is as a KEEP_LAST queue must do it: True',
-    'run_callbacks_in_parallel': 'D explained, threads at work: 8: True',
+    'lose_messages': 'Everything follows the rules of a KEEP_LAST queue: True',
+    'run_callbacks_in_parallel': 'D, threads at work: 8. Every loss is explained: True',
 }
 LESSONS = [next((ROOT / 'notebooks').glob(f'??_{name}.ipynb')) for name in CLAIMS]
 QUESTIONS = sum(len(Known(read(path.read_text(), path.name)).guesses) for path in LESSONS)

@@ -62,7 +62,7 @@ def _cells(file: Path, _changed: int) -> list[nbformat.NotebookNode]:
 class Copies:
     """The copies below `root`: all steps, or those of a timetable, with or without outputs.
 
-    Whoever does not say so gets them as they were made.
+    Without these arguments, they stay as they were made.
     """
 
     def __init__(self, root: Path, plan: str | None = None, outputs: bool = False) -> None:

@@ -102,7 +102,7 @@ def height(cell: NotebookNode) -> float:
     lines = len(cell.source.splitlines())
     figure = next(tall for most, tall in CODE.items() if lines <= most)
     source = FOLDED if folded(cell) else _height_of_text(cell.source)
-    # What a solution prints comes into view for whoever runs it.
+    # What a solution prints comes into view if it is run.
     shown = [] if 'solution' in tags(cell) else cell.outputs
     outputs = sum(_height_of_output(output, figure) for output in shown)
     return BORDER + source + outputs + (BORDER if shown else 0)

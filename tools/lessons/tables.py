@@ -5,7 +5,7 @@ README.md and teaching.md and the notebook 00 hold tables between two marks:
     <!-- made by `make notebooks`: map of nodes -->
     <!-- end -->
 
-Each lesson ends with a link to the next one. Of a timetable, whoever writes it gives the rows: what
+Each lesson ends with a link to the next one. The rows of a timetable are written by hand: what
 happens, and the minutes if it is no lesson. The times, and the minutes and titles of lessons, are
 made. The functions take and return texts by their path in the checkout, so that nothing is written
 before all of it is right.

@@ -1,6 +1,6 @@
 """A floor from above, with the robot on it: one SVG for the live picture, the replay and paper.
 
-All is drawn in metres, x to the right and y up, inside one group: whoever moves a part of the
+All is drawn in metres, x to the right and y up, inside one group: a script that moves a part of the
 picture, as drive.js does, computes no pixels. Ink is `currentColor`, right in light and in dark.
 """
 

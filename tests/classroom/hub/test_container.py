@@ -95,7 +95,7 @@ def test_a_student_stops_and_goes_on(lab, make, podman, port):
     assert done.returncode
     assert 'in use' in done.stdout
     [notebook] = mine.glob(f'ros2_notebooks/??_{LESSON}.ipynb')
-    written = notebook.read_text().replace('**You will do**', 'I have written this.')
+    written = notebook.read_text().replace('**You will**', 'I have written this.')
     notebook.write_text(written)
     subprocess.run([*podman, 'rm', '--force', 'lab'], capture_output=True)
     lab()

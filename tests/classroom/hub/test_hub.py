@@ -25,7 +25,7 @@ from support.processes import segments
 from support.waits import wait_for
 
 pytestmark = needs_hub
-# The accounts are folders, and all run as whoever runs this test.
+# The accounts are folders, and all run as the user of this test.
 CONFIG = """
 c.JupyterHub.spawner_class = 'simple'
 c.SimpleLocalProcessSpawner.home_dir_template = str(folder / 'home' / '{username}')

@@ -44,7 +44,7 @@ class HubStudent(HubOAuthenticated, Student):
         return self._token
 
     def check_xsrf_cookie(self) -> None:
-        """Ask for none: whoever writes here has a token, not a cookie."""
+        """Ask for none: a student's kernel has a token, not a cookie."""
 
     def join(self) -> None:
         """Say which seat the student has; the hub's login takes the place of the code."""

@@ -391,7 +391,7 @@ function next() {
         replay.scrollIntoView({ block: 'nearest' });
         return;
       }
-  // Whoever has run a cell of this slide leaves none of its cells out.
+  // If one cell of this slide has run, none of its cells is left out.
   if (hasRun(content.activeCell)) {
     const left = shown.find(index => index > content.activeCellIndex && isNew(content.widgets[index]));
     if (left !== undefined) return toCell(left);
