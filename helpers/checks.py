@@ -29,13 +29,14 @@ from helpers._plumbing.rclpy_private import can_ask
 from helpers._plumbing.text import wrap
 
 NO_GUESS = 'No guess yet. Write one in place of the three dots, run that cell, then this one again.'
-ENDLESS = 'it did not end. Is there a loop that never ends?'
-NOT_TRIED = 'not tried, for the one above did not end'
+ENDLESS = 'it did not end. Is there an endless loop, or a spin() that never returns?'
+AGAIN = ' Try again, or go on with the solution below.'
+NOT_TRIED = 'not tried, because the one above did not end'
 CPU_LIMIT_S = 5.0  # of one test of a check: an endless loop uses it up
 LIMIT_S = 90.0  # a build on a busy machine takes its time
 
 # By the numbers of the tasks of this notebook:
-_requirements: dict[int, Sequence[tuple]] = {}
+_requirements: dict[int, tuple[Sequence[tuple], tuple[float, float]]] = {}
 _solved: dict[int, bool] = {}
 _failed_tries: dict[int, int] = {}  # since the last try that passed
 _given: dict[int, dict[str, object]] = {}  # names and values that `%%solution` has given
@@ -102,7 +103,12 @@ def _has_student() -> bool:
     return shell is None or not hasattr(shell, 'kernel') or can_ask(shell.kernel)
 
 
-def check(task: int, *requirements: tuple[str, object | Callable[[], object], str]) -> None:
+def check(
+    task: int,
+    *requirements: tuple[str, object | Callable[[], object], str],
+    limit_s: float = LIMIT_S,
+    cpu_s: float = CPU_LIMIT_S,
+) -> None:
     """Print for each requirement of a task whether it is met, and if not, what the code did.
 
     A requirement is `(what_is_right, test, hint)`. `test`, or what it returns if it is a function
@@ -116,23 +122,25 @@ def check(task: int, *requirements: tuple[str, object | Callable[[], object], st
     it again. What was found must not move from run to run. Hints are shown when the task is still
     wrong at the second try. A task that passes is kept in the student's progress.
 
-    A test may use CPU_LIMIT_S seconds of CPU and LIMIT_S seconds of the clock. If one needs more,
+    A test may use `cpu_s` seconds of CPU and `limit_s` seconds of the clock. If one needs more,
     those after it are not tried.
     """
-    _requirements[task] = requirements
+    _requirements[task] = requirements, (limit_s, cpu_s)
     with _without_solution(task):
-        solved = _print_results(f'Task {task}', requirements, task)
+        solved = _print_results(f'Task {task}', *_requirements[task], task)
     _solved[task] = solved
     if solved:
         progress.record(task)
     classroom.tell_task(task, solved)
 
 
-def _print_results(title: str, requirements: Sequence[tuple], task: int | None = None) -> bool:
+def _print_results(
+    title: str, requirements: Sequence[tuple], limits: tuple[float, float], task: int | None = None
+) -> bool:
     """Print the results; with a `task`, count the tries at it. Return whether all is right."""
     results, endless = [], False
     for what, test, hint in requirements:
-        met, found = (False, NOT_TRIED) if endless else _run(test)
+        met, found = (False, NOT_TRIED) if endless else _run(test, *limits)
         results.append((what, met, found, hint))
         endless = endless or found.endswith(ENDLESS)
     met_ones = sum(met for _, met, _, _ in results)
@@ -145,7 +153,7 @@ def _print_results(title: str, requirements: Sequence[tuple], task: int | None =
             _print(f'    Found: {found}')
         if not met and _failed_tries.get(task, 0) > 1:
             _print(f'    Hint: {hint}')
-    end = '' if task is None else ' All done.' if done else ' Try again, or go on: see below.'
+    end = '' if task is None else ' All done.' if done else AGAIN
     _print(f'{title}: {met_ones} of {len(results)}.{end}')
     return done
 
@@ -172,7 +180,9 @@ def solution(line: str, cell: str) -> None:
         for name, value in names.items()
         if name not in before or before[name] is not value
     }
-    _print_results(f'Solution of task {task}', _requirements.get(task, ()))
+    _print_results(
+        f'Solution of task {task}', *_requirements.get(task, ((), (LIMIT_S, CPU_LIMIT_S)))
+    )
 
 
 @contextmanager
@@ -243,10 +253,10 @@ def _written(value: object) -> str:
     return str(value)
 
 
-def _run(test: object) -> tuple[bool, str]:
+def _run(test: object, limit_s: float, cpu_s: float) -> tuple[bool, str]:
     """Return whether the test is met, and what was found instead, if that is known."""
     try:
-        with _limited():
+        with _limited(limit_s, cpu_s):
             result = test() if callable(test) else test
         return (False, result) if isinstance(result, str) else (bool(result), '')
     except Exception as error:  # whatever a student's code raises is an answer that is not right
@@ -254,7 +264,7 @@ def _run(test: object) -> tuple[bool, str]:
 
 
 @contextmanager
-def _limited() -> Iterator[None]:
+def _limited(limit_s: float, cpu_s: float) -> Iterator[None]:
     """Interrupt what takes too long, as the student would. Raises TimeoutError after that.
 
     An endless loop uses CPU, which a busy machine does not use up for us; a wait does not.
@@ -269,13 +279,13 @@ def _limited() -> Iterator[None]:
         signal.raise_signal(signal.SIGINT)
 
     timers = {
-        signal.SIGPROF: (signal.ITIMER_PROF, CPU_LIMIT_S),
-        signal.SIGALRM: (signal.ITIMER_REAL, LIMIT_S),
+        signal.SIGPROF: (signal.ITIMER_PROF, cpu_s),
+        signal.SIGALRM: (signal.ITIMER_REAL, limit_s),
     }
     handlers = {number: signal.signal(number, interrupt) for number in timers}
     try:
-        for timer, limit_s in timers.values():
-            signal.setitimer(timer, limit_s)
+        for timer, seconds in timers.values():
+            signal.setitimer(timer, seconds)
         yield
     except KeyboardInterrupt:
         if not over:
@@ -298,9 +308,9 @@ def _found(error: Exception) -> str:
     text = ' '.join(lines[: 2 if isinstance(error, TimeoutError) else 1])
     found = re.sub(r' at 0x[0-9a-fA-F]+', '', f'{type(error).__name__}: {text}')
     if isinstance(error, NameError) and error.name:
-        found += '. Does the cell of the task give this name, and did you run it?'
+        found += '. Does the cell of the task define this name, and did you run it?'
     if re.match(r'[A-Z]\w*\.\w+\(\) missing 1 required positional argument', text):
-        found += '. Are () missing after a class, or too many after a callback?'
+        found += '. Did you forget () after a class, or write () after a callback?'
     return found
 
 

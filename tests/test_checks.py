@@ -5,9 +5,8 @@ import pandas as pd
 import pytest
 from support.kernel import Kernel
 
-from helpers.checks import NO_GUESS, check, compare_prediction
+from helpers.checks import AGAIN, NO_GUESS, check, compare_prediction
 
-AGAIN = ' Try again, or go on: see below.'
 QUESTION = 'How many of 41 messages are heard?'
 
 
@@ -124,7 +123,7 @@ def test_what_the_code_did_is_said(capsys, task):
         raise RuntimeError(f'no {object()!r}\nmore')
 
     def late():
-        raise TimeoutError('Waited 30 s in vain.\nNo publisher: /scans.\nmore')
+        raise TimeoutError('Waited 30 s and more.\nNo publisher: /scans.\nmore')
 
     def hidden():  # as publish() does for a float in an Int32
         raise SystemError('returned a result with an exception set') from TypeError('a float')
@@ -149,10 +148,11 @@ def test_what_the_code_did_is_said(capsys, task):
         '[not yet] the node exists',
         '    Found: RuntimeError: no <object object>',
         '[not yet] it is heard',
-        '    Found: TimeoutError: Waited 30 s in vain. No publisher: /scans.',
+        '    Found: TimeoutError: Waited 30 s and more. No publisher: /scans.',
         '[not yet] it is in a group',
-        "    Found: TypeError: Group.add() missing 1 required positional argument: 'timer'. Are ()",
-        '          missing after a class, or too many after a callback?',
+        "    Found: TypeError: Group.add() missing 1 required positional argument: 'timer'. "
+        'Did you',
+        '          forget () after a class, or write () after a callback?',
         '[not yet] it publishes',
         '    Found: TypeError: a float',
         '[not yet] some',
@@ -200,10 +200,13 @@ def test_a_callback_without_end_gets_a_sentence():
         kernel.run(ENDLESS)
         twice = "check(1, ('it counts', counts, ''), ('and again', counts, ''))"
         said = kernel.run(f'{twice}\nprint(threading.active_count())')
-        assert 'Found: TimeoutError: it did not end. Is there a loop that never ends?' in said
-        assert 'Found: not tried, for the one above did not end' in said
+        ended = 'Found: TimeoutError: it did not end. Is there an endless loop, or a spin()'
+        assert ended in said
+        assert 'Found: not tried, because the one above did not end' in said
         assert kernel.run('print(threading.active_count())') == said.splitlines()[-1] + '\n'
         assert '[ok]' in kernel.run("loops = False\ncheck(1, ('it counts', counts, ''))")
+        waits = "('it waits', threading.Event().wait, '')"
+        assert ended in kernel.run(f'check(1, {waits}, limit_s=0.2)')
 
 
 ENDLESS = """
