@@ -180,9 +180,10 @@ def solution(line: str, cell: str) -> None:
         for name, value in names.items()
         if name not in before or before[name] is not value
     }
-    _print_results(
-        f'Solution of task {task}', *_requirements.get(task, ((), (LIMIT_S, CPU_LIMIT_S)))
-    )
+    if task in _requirements:
+        _print_results(f'Solution of task {task}', *_requirements[task])
+    else:
+        _print(f'The solution of task {task} has run, but its check has not.')
 
 
 @contextmanager
@@ -304,11 +305,12 @@ def _found(error: Exception) -> str:
     lines = str(error).splitlines()
     if not lines:
         return f'{type(error).__name__} in {traceback.extract_tb(error.__traceback__)[-1].name}()'
-    # The second line of a time-out says what was waited for.
-    text = ' '.join(lines[: 2 if isinstance(error, TimeoutError) else 1])
+    # The second line of a time-out says what was waited for, and one after a colon the fault.
+    more = isinstance(error, TimeoutError) or lines[0].rstrip().endswith(':')
+    text = ' '.join(map(str.strip, lines[: 2 if more else 1]))
     found = re.sub(r' at 0x[0-9a-fA-F]+', '', f'{type(error).__name__}: {text}')
     if isinstance(error, NameError) and error.name:
-        found += '. Does the cell of the task define this name, and did you run it?'
+        found += '. Is it defined in the cell of the task, or in a cell above that has not run?'
     if re.match(r'[A-Z]\w*\.\w+\(\) missing 1 required positional argument', text):
         found += '. Did you forget () after a class, or write () after a callback?'
     return found

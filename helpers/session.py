@@ -25,7 +25,8 @@ from helpers._plumbing.domain import (
     reserve_domain_id,
     share_domain_id,
 )
-from helpers._plumbing.interrupts import uninterrupted
+from helpers._plumbing.fields import check_fields
+from helpers._plumbing.interrupts import at_each_signal, uninterrupted
 from helpers.ros2._sessions import recorded
 
 try:
@@ -49,6 +50,8 @@ except ImportError as error:
         f'rclpy cannot be imported in this Python ({error}): start JupyterLab with `make lab`, '
         'or see environment.md for the other ways to get ROS 2.'
     ) from error
+
+check_fields()
 
 CLOSE_TIMEOUT_S = 5.0
 BREAK_OFF_S = 1.0
@@ -139,6 +142,7 @@ class Session:
                 self._context = rclpy.get_default_context()
                 _open_session = self
                 self._initialise()
+                self._shared.enter_context(at_each_signal(self._wake))
         except BaseException as failure:  # __exit__ will not run
             clear_frames(failure.__traceback__)
             self._clean_up()
@@ -157,6 +161,11 @@ class Session:
         with one_process_at_a_time():  # the first node makes the participant
             node = Node(LOG_NODE, enable_rosout=False, start_parameter_services=False)
         self._rosout = Rosout(node)
+
+    def _wake(self) -> None:
+        # The executors that a cell spins itself, too: `rclpy.spin(node)`.
+        for executor in find(Executor, self._context):
+            executor.wake()
 
     # --- Spinning
 

@@ -184,6 +184,7 @@ def test_a_lesson_goes_on_with_the_code_that_passes():
         kernel.run('from helpers.checks import check')
         checked = "check(1, ('it is 2', lambda: two == 2 or f'it is {two}', 'One and one.'))"
         solution = '%%solution 1\ntwo = 1 + 1'
+        assert 'its check has not' in kernel.run('%%solution 1\nthree = 3')
         assert '[not yet]' in kernel.run(f'two = 3\n{checked}')
         assert kernel.run(solution) == '[ok] it is 2\nSolution of task 1: 1 of 1.\n'
         assert kernel.run('two') == ''
@@ -193,6 +194,22 @@ def test_a_lesson_goes_on_with_the_code_that_passes():
         assert 'All done.' in kernel.run(f'two = 2.0\n{checked}')
         assert 'goes on with your code' in kernel.run(solution)
         assert kernel.run('print(two)') == '2.0\n'
+
+
+def test_a_name_of_another_part_of_a_check_says_which_cells_to_run():
+    part = '# ✔ Check of task 1, part {} of 2\nprint(seconds)'
+    with Kernel() as kernel:
+        kernel.run('%load_ext helpers._plumbing.kernel\nimport helpers.session')
+        assert 'Run all parts of this check' in kernel.run(part.format(2))
+        assert 'Run all parts' not in kernel.run(part.format(1))
+
+
+def test_an_int_in_a_float_field_is_an_error():
+    with Kernel() as kernel:
+        early = 'from geometry_msgs.msg import Vector3\nimport helpers.session\n'
+        assert "The 'x' field must be of type 'float'" in kernel.run(f'{early}Vector3(x=1)')
+        late = 'from sensor_msgs.msg import Range'
+        assert "The 'range' field must" in kernel.run(f'{late}\nRange(range=1)')
 
 
 def test_a_callback_without_end_gets_a_sentence():

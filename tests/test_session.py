@@ -485,3 +485,14 @@ def test_warnings_are_printed_at_the_end(capsys):
         '[ERROR] [a_node]: an error\n[WARN] [node]: a warning\n[FATAL] [node]: the end\n',
         '',
     )
+
+
+@pytest.mark.parametrize('timer', [False, True])
+def test_interrupt_ends_a_spin_of_the_cell_itself(timer):
+    """Without a timer, the wait of rcl has no end of its own."""
+    with pytest.raises(KeyboardInterrupt), ros_session():
+        node = Node('spun')
+        if timer:
+            node.create_timer(0.1, int)
+        threading.Timer(0.3, signal.raise_signal, [signal.SIGINT]).start()
+        rclpy.spin(node)

@@ -1,11 +1,12 @@
-"""What an Interrupt must not cut in two."""
+"""What an Interrupt must not cut in two, and what it must end."""
 
 from __future__ import annotations
 
 import contextlib
 import signal
+import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 
 @contextlib.contextmanager
@@ -27,3 +28,32 @@ def uninterrupted() -> Iterator[None]:
         signal.signal(signal.SIGINT, handler)
         if interrupts:
             signal.raise_signal(signal.SIGINT)
+
+
+@contextlib.contextmanager
+def at_each_signal(call: Callable[[], None]) -> Iterator[None]:
+    """Call a function, in a thread, when a signal comes, such as that of an Interrupt.
+
+    Python handles a signal when the main thread is back from C. The wait of rcl comes back only if
+    something is there: the function has to make it so.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield  # a signal is none of its business
+        return
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+
+    def watch() -> None:
+        while reader.recv(1):
+            call()
+
+    thread = threading.Thread(target=watch, name='signals', daemon=True)
+    thread.start()
+    before = signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(before)
+        writer.close()
+        thread.join()
+        reader.close()

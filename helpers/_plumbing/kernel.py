@@ -1,6 +1,8 @@
 """What each kernel of this environment gets: the environment's own settings of IPython load it."""
 
+import linecache
 import os
+import re
 import sys
 
 from IPython.core.error import UsageError
@@ -9,6 +11,8 @@ NOT_RUN = (
     'This kernel has not run the first cells of the lesson: choose Run > Run All Above Selected '
     'Cell, then run this cell again.'
 )
+LATER_PART = re.compile(r'# ✔ Check of task \d+, part [2-9]')
+PARTS = 'Run all parts of this check in their order, from part 1 on.'
 NO_GUESS = '{} is a guess: make it in its cell above, run that cell, then this one again.'
 
 
@@ -27,5 +31,11 @@ def load_ipython_extension(shell) -> None:
             print(NOT_RUN)
         elif (getattr(error, 'name', None) or '').startswith('my_'):
             print(NO_GUESS.format(error.name))
+        elif traceback.tb_next and LATER_PART.match(_first_line(traceback.tb_next)):
+            print(PARTS)
 
     shell.set_custom_exc((NameError, UsageError), explain)
+
+
+def _first_line(traceback) -> str:
+    return linecache.getline(traceback.tb_frame.f_code.co_filename, 1)

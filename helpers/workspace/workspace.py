@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath
 
 from helpers._plumbing.build_tools import build_environment, build_tools, from_wheels
 from helpers._plumbing.interrupts import uninterrupted
-from helpers._plumbing.progress_bar import ProgressBar
+from helpers._plumbing.progress_bar import ProgressBar, somebody_watches
 from helpers.ros2._commands import CommandError
 from helpers.ros2.run import command_of
 from helpers.session import graph_environment
@@ -32,6 +32,8 @@ SMALL_RCLCPP = Path(__file__).with_name('small_rclcpp')
 # A script for a terminal: the repository of somebody else, on a server.
 COLLEAGUE = Path(__file__).with_name('colleague.sh')
 CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
+
+EMPTY_AGAIN = 'The workspace is empty again: run the cells below this one again, too.'
 
 _open_workspace: Workspace | None = None
 
@@ -76,6 +78,9 @@ class Workspace:
                 shutil.rmtree(self.path)
         (self.path / 'src').mkdir(parents=True)
         if underlay is None:
+            again = _open_workspace is not None and _open_workspace.path == self.path
+            if again and somebody_watches():  # a second run without a student prints the same
+                print(EMPTY_AGAIN)
             _open_workspace = self
         else:
             underlay._overlays[name] = self
