@@ -51,7 +51,7 @@ def test_from_join_to_forget_everything(lab_page, tabs, student_server, artefact
                 lab.wait_for_notebook(f'{name}/{LESSON}')
                 said = ' '.join(lab.run(0).split())
                 assert f'on seat {number}. Sent to it: your guesses' in said
-                assert lab.run(1).startswith('Your guess is taken')
+                assert lab.run(1).startswith('Your guess is saved')
                 page.get_by_text(f'{number} of {number} have answered').wait_for()
                 if name != 'cyd':
                     assert 'Verdict' in lab.run(2)
