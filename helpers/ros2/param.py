@@ -87,7 +87,7 @@ def _get(args: argparse.Namespace) -> None:
 def _set(args: argparse.Namespace) -> None:
     """Set parameter."""
     value = None
-    with contextlib.suppress(yaml.YAMLError):
+    with contextlib.suppress(yaml.YAMLError, AssertionError):  # the second, if fields are checked
         value = get_parameter_value(args.value)
     if value is None or not isinstance(value.string_value, str):  # but a dict
         raise CommandError(f"'{args.value}' is no value of a parameter: put a text in quotes")
