@@ -467,7 +467,7 @@ def _destroy_actions(node: Node) -> None:
 
 
 def find(kind: type, context: rclpy.Context) -> Iterator:
-    """Yield all nodes or clients of a context."""
+    """Yield all that is of this kind in a context: nodes, clients, executors."""
     return _of(context, _objects(kind))
 
 

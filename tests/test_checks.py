@@ -5,8 +5,9 @@ import pandas as pd
 import pytest
 from support.kernel import Kernel
 
-from helpers.checks import AGAIN, NO_GUESS, check, compare_prediction
+from helpers.checks import NO_GUESS, check, compare_prediction
 
+AGAIN = ' Try again, or go on with the solution below.'
 QUESTION = 'How many of 41 messages are heard?'
 
 

@@ -1,8 +1,9 @@
 """Messages check the types of their fields: `twist.linear.x = 1` is an error.
 
-Since Jazzy they do so only on demand (https://github.com/ros2/rosidl_python/pull/194). Without it,
-an int in a float field is sent as 5e-324, and in an interface that was built here it ends the
-kernel: its C code has an assert, which the wheels were built without.
+Since rosidl_generator_py 0.18.0 they do so only on demand
+(https://github.com/ros2/rosidl_python/pull/194). Without it, an int in a float field is sent as
+5e-324, and in an interface that was built here it ends the kernel: its C code has an assert, which
+the wheels were built without.
 """
 
 import os
