@@ -54,8 +54,14 @@ def _send_goal(args: argparse.Namespace) -> None:
     goal = filled(class_.Goal(), args.values, 'Failed to populate message fields: {!r}')
     words = ['UNKNOWN', 'ACCEPTED', 'EXECUTING', 'CANCELING', 'SUCCEEDED', 'CANCELED', 'ABORTED']
 
+    early: list[Any] = []  # feedback that overtook the answer to the goal
+    accepted = False
+
     def show(message: Any) -> None:
-        print(f'Feedback:\n    {to_yaml(message.feedback)}')
+        if accepted:
+            print(f'Feedback:\n    {to_yaml(message.feedback)}')
+        else:
+            early.append(message)
 
     with graph() as opened:
         client = ActionClient(opened.node, class_, args.action_name)
@@ -68,6 +74,9 @@ def _send_goal(args: argparse.Namespace) -> None:
             print('Goal was rejected.')
             return
         print(f'Goal accepted with ID: {bytes(handle.goal_id.uuid).hex()}\n')
+        accepted = True
+        for message in early:
+            show(message)
         try:
             answer = opened.result(handle.get_result_async(), 'getting result')
         except KeyboardInterrupt:
