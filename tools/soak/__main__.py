@@ -3,7 +3,7 @@
     python -m tools.soak
     python -m tools.soak --conditions interrupt kill --lesson "02 03"
 
-It prints a line for each run, and at its end what failed. Ctrl+C ends it.
+It prints a line for each run, and what failed in it. Ctrl+C ends it.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def main(arguments: list[str] | None = None) -> int:
         parser.error(str(error))
     if os.getuid():
         parser.error('Each run has a /dev/shm of its own, which only root can mount: use sudo.')
-    texts = []
+    failures = 0
     for condition in options.conditions:
         for path in paths:
             if '"cell_type": "code"' not in path.read_text('utf-8'):
@@ -143,15 +143,12 @@ def main(arguments: list[str] | None = None) -> int:
             start = time.monotonic()
             failed = run(path, condition)
             said = f'failed: {", ".join(failed)}' if failed else 'passed'
-            print(
-                f'{condition:<9} {path.stem} {time.monotonic() - start:4.0f} s  {said}', flush=True
-            )
-            texts += [
-                f'{condition}, {path.stem}, {item}: {text[-LONGEST_TEXT:]}'
-                for item, text in failed.items()
-            ]
-    print(*texts, sep='\n\n')
-    return int(bool(texts))
+            print(f'{condition:<9} {path.stem} {time.monotonic() - start:4.0f} s  {said}')
+            for item, text in failed.items():
+                print(f'\n{item}: {text[-LONGEST_TEXT:]}\n')
+            sys.stdout.flush()
+            failures += len(failed)
+    return int(failures > 0)
 
 
 if __name__ == '__main__':
