@@ -32,6 +32,8 @@ LONGEST_TEXT = 1600
 INSIDE = """
 set -e
 mount -t tmpfs tmpfs /dev/shm
+mkdir -p /tmp/ros2_notebooks_0
+mount -t tmpfs tmpfs /tmp/ros2_notebooks_0
 python=$1
 shift
 status=0
@@ -44,7 +46,8 @@ exit $status
 def run(notebook: Path, condition: str) -> dict[str, str]:
     """Run a notebook once; return by the name of a cell, or of what was looked at, how it failed.
 
-    The run has a /dev/shm, a table of processes, a home and a temporary folder of its own.
+    The run has a /dev/shm, a table of processes, a record of kernels (which has process ids), a
+    home and a temporary folder of its own.
     """
     with tempfile.TemporaryDirectory(prefix='soak-', ignore_cleanup_errors=True) as temporary:
         folder = Path(temporary)
