@@ -1,8 +1,10 @@
 """An Interrupt waits for the end of what must not be cut in two."""
 
 import signal
+import threading
 
 import pytest
+from support.kernel import Kernel
 
 from helpers._plumbing.interrupts import uninterrupted
 
@@ -21,3 +23,13 @@ def test_an_interrupt_survives_a_failing_block():
         signal.raise_signal(signal.SIGINT)
         raise ZeroDivisionError
     assert isinstance(interrupt.value.__context__, ZeroDivisionError)
+
+
+def test_an_interrupt_of_a_command_ends_its_cell():
+    with Kernel() as kernel:
+        kernel.run('import helpers.session')
+        interrupt = threading.Timer(2, kernel.km.provisioner.process.send_signal, [signal.SIGINT])
+        interrupt.start()
+        said = kernel.run('!sleep 60\nprint("the cell goes on")')
+        assert 'the cell goes on' not in said
+        assert kernel.run('!echo the kernel lives').strip() == 'the kernel lives'

@@ -6,6 +6,7 @@ the run: it has a /dev/shm and a table of processes of its own, so that whatever
 
 import os
 import re
+import sys
 import threading
 import time
 from contextlib import suppress
@@ -42,7 +43,11 @@ def look() -> None:
 
 def state_of_process() -> dict[str, str]:
     """Return a sentence for each thread, child and shared memory, by a key of its own."""
-    children = [child for child in psutil.Process().children(recursive=True) if not _of_pool(child)]
+    children = [
+        child
+        for child in psutil.Process().children(recursive=True)
+        if not _of_pool(child) and not _of_terminal(child)
+    ]
     found = threads_of_process() | processes_that_stay(children, MOMENT_S)
     for file in SHARED_MEMORY.findall(Path('/proc/self/maps').read_text()):
         found[file] = f'The kernel still uses {file}.'
@@ -70,6 +75,16 @@ def threads_of_process() -> dict[str, str]:
 def _of_pool(process: psutil.Process) -> bool:
     with suppress(psutil.NoSuchProcess):  # nor a zombie
         return any(word.startswith(TRACKER) for word in process.cmdline())
+    return False
+
+
+def _of_terminal(process: psutil.Process) -> bool:
+    """Return whether it runs in a terminal that a cell has opened, and that is to stay open."""
+    processes = sys.modules.get('helpers.workspace.processes')
+    terminals = processes._started if processes else ()  # noqa: SLF001
+    open_now = {terminal._process.pid for terminal in terminals}  # noqa: SLF001
+    with suppress(psutil.NoSuchProcess):
+        return any(one.pid in open_now for one in (process, *process.parents()))
     return False
 
 
