@@ -603,16 +603,21 @@ def test_cells_are_terminals(shell, capsys):
     assert workspace.terminals == {}
 
 
-def test_an_interrupted_cell_ends_the_processes(shell, built):
+def test_an_interrupted_cell_ends_its_processes(shell, built):
     workspace = Workspace('test_workspace_other')
     (workspace.path / 'install').symlink_to(built.path / 'install')
-    for interrupt in (
-        lambda: shell.run_cell('raise KeyboardInterrupt'),
-        lambda: shell.events.trigger('post_run_cell', None),  # what IPython does outside the cell
-    ):
+
+    def start():
         talker = workspace.run('talker_pkg', 'talker')
         talker.wait_for('Publishing')
-        shell.run_cell('1 + 1')
-        assert talker.running
-        interrupt()
-        assert not talker.running
+        return talker
+
+    shell.push({'start': start})
+    shell.run_cell('first = start()')
+    shell.run_cell('raise KeyboardInterrupt')
+    assert shell.user_ns['first'].running  # a later cell does not end it
+    shell.run_cell('second = start(); raise KeyboardInterrupt')
+    assert not shell.user_ns['second'].running
+    third = start()
+    shell.events.trigger('post_run_cell', None)  # what IPython does outside the cell
+    assert not third.running

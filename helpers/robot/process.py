@@ -18,7 +18,7 @@ def start_robot(floor: str = 'empty', *arguments: str) -> Process:
 
     `floor` is 'empty', 'corridor', 'rooms' or the path of a text; `arguments` are further ones,
     such as '--seed', '1' or '--ros-args', '-r', '__ns:=/two'. It ends with its `with` block, with
-    `stop()`, when a cell is interrupted, and with the kernel.
+    `stop()`, when the cell that starts it is interrupted, and with the kernel.
 
     Raises RuntimeError, with its last line, where it does not start.
     """

@@ -1,4 +1,4 @@
-"""A process that prints lines, and ends: with its block, with an Interrupt, with the kernel."""
+"""A process that prints lines, and ends: with its block, an Interrupt of its cell, the kernel."""
 
 from __future__ import annotations
 
@@ -37,12 +37,14 @@ if os.getppid() == parent:
 """
 
 _started: set[Process] = set()  # and not stopped
+_of_this_cell: set[Process] = set()
 
 
 class Process:
     """A running process and what it has printed. See `Workspace.start`.
 
-    It ends with its `with` block, with `stop()`, when a cell is interrupted, and with the kernel.
+    It ends with its `with` block, with `stop()`, when the cell that starts it is interrupted, and
+    with the kernel.
     With `ends_with_kernel=False` it goes on when the kernel is killed. With `terminal=True` it has
     a terminal of its own, which closes with the kernel, and takes all programs in it along.
     """
@@ -81,6 +83,7 @@ class Process:
                 start_new_session=True,
             )
             _started.add(self)
+            _of_this_cell.add(self)
 
     @property
     def lines(self) -> list[str]:
@@ -187,15 +190,20 @@ def _lonely_topics(environment: dict[str, str]) -> Iterator[str]:
 
 @atexit.register
 def _stop_all() -> None:
+    _stop_each(_started)
+
+
+def _stop_each(processes: set[Process]) -> None:
     with uninterrupted():
-        for process in list(_started):
+        for process in list(processes):
             process.stop()
 
 
 def _after_cell(result) -> None:
-    """End the processes when a cell was interrupted, in its code or in IPython's (no result).
+    """End the processes of a cell that was interrupted, in its code or in IPython's (no result).
 
     The Interrupt may have come before a variable held the process.
     """
     if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
-        _stop_all()
+        _stop_each(_of_this_cell)
+    _of_this_cell.clear()

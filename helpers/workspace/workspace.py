@@ -221,8 +221,8 @@ class Workspace:
 
         It has the sourced environment, and the domain id and discovery range of the open session,
         or of this kernel's next one. It ends with its `with` block, with `stop()`, when the same is
-        run again, when a cell is interrupted, and with the kernel. If there is no such package or
-        executable, it has printed what `ros2 run` prints, and has ended with 1.
+        run again, when the cell that starts it is interrupted, and with the kernel. If there is no
+        such package or executable, it has printed what `ros2 run` prints, and has ended with 1.
         """
         environment = self.environment() | self._environment_of_nodes()
         key = (package, executable, *arguments)
@@ -260,7 +260,7 @@ class Workspace:
 
         It is as that of `terminal`, and nodes that run in it print no times before their lines. It
         ends with its `with` block, with `stop()`, when another one of this `name` is started, when
-        a cell is interrupted, and with the kernel.
+        the cell that starts it is interrupted, and with the kernel.
         """
         if name in self.terminals:
             self.terminals[name].stop()
