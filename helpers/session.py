@@ -438,6 +438,7 @@ def _destroy(node: Node) -> list[Exception]:
         # the executor.
         *_failure(lambda: node.executor.shutdown(timeout_sec=0)),
         *_failure(lambda: _destroy_actions(node)),
+        *_failure(lambda: rclpy_private.end_lifecycle(node)),
         *_failure(node.destroy_node, () if own else ALREADY_DESTROYED),
         *(_failure(lambda: Node.destroy_node(node)) if own else []),  # if its own one failed
         # A node whose __init__ failed or was interrupted has only some of its parts: destroy_node

@@ -10,6 +10,7 @@ import rclpy
 from ipykernel.kernelbase import Kernel
 from rclpy.action import ActionClient
 from rclpy.executors import MultiThreadedExecutor
+from rclpy.lifecycle import LifecycleNode
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
@@ -27,6 +28,7 @@ def things():
         'an executor': executor,
         'a MultiThreadedExecutor': executor,
         'a client': node.create_client(Trigger, 'look'),
+        'a lifecycle node': LifecycleNode('lifecycle', context=context),
         'an action client': ActionClient(node, Fibonacci, 'patrol'),
         'a ThreadPoolExecutor': ThreadPoolExecutor(),
         'a kernel': Kernel,

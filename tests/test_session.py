@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from rclpy.action import ActionClient, ActionServer
 from rclpy.exceptions import InvalidHandle, InvalidNodeNameException
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -344,6 +345,13 @@ def test_actions_leave_nothing(by_the_cell):
         spin_once = (lambda: executor.spin_once(timeout_sec=0)) if by_the_cell else (lambda: None)
         session.wait_until(lambda: spin_once() or goal.done(), LIMIT_S)
     del server  # until here it and the executor are held, as by variables of a notebook
+
+
+def test_a_lifecycle_node_leaves_nothing():
+    """Its state machine would keep the participant until Python collects the node."""
+    with nothing_left(), ros_session():
+        camera = LifecycleNode('camera')
+    del camera  # until here it is held
 
 
 @pytest.mark.parametrize(

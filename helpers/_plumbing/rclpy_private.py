@@ -17,6 +17,7 @@ from types import FrameType
 from rclpy.action import ActionClient
 from rclpy.client import Client
 from rclpy.executors import Executor
+from rclpy.node import Node
 
 # What has the name: the name, and the versions in which it was read.
 NAMES = {
@@ -28,6 +29,7 @@ NAMES = {
     'a MultiThreadedExecutor': {'_executor': 'rclpy 7.1.6', '_futures': 'rclpy 7.1.6'},
     'a client': {'_pending_requests': 'rclpy 7.1.6'},
     'an action client': {'_action_name': 'rclpy 7.1.6'},
+    'a lifecycle node': {'_state_machine': 'rclpy 7.1.6'},
     'a ThreadPoolExecutor': {'_threads': 'Python 3.11.7', '_max_workers': 'Python 3.11.7'},
     'a kernel': {'_allow_stdin': 'ipykernel 7.4.0'},
 }
@@ -74,6 +76,16 @@ def fail_calls(client: Client, failure: Exception) -> None:
         with warnings.catch_warnings(action='ignore'):  # a done callback that fails
             future.set_exception(failure)
         future.exception()  # or rclpy warns that it was not read
+
+
+def end_lifecycle(node: Node) -> None:
+    """Destroy the state machine of a lifecycle node, which keeps the node and its participant.
+
+    rclpy leaves that to the garbage collector.
+    """
+    machine = getattr(node, '_state_machine', None)
+    if machine is not None:
+        machine.destroy_when_not_in_use()
 
 
 def end_answered_call(thread: threading.Thread) -> None:
