@@ -18,6 +18,7 @@ import re
 import time
 from collections import defaultdict
 from contextlib import suppress
+from copy import deepcopy
 from itertools import groupby
 from pathlib import Path
 from queue import Empty
@@ -79,7 +80,8 @@ def _like(cell: IPyNbCell, kind: type[IPyNbCell], name: str, source: str = '') -
         cell.parent,
         name=name,
         cell_num=cell.cell_num,
-        cell=new_code_cell(source) if source else cell.cell,
+        # A copy: nbval joins the streams of a saved cell when it compares it.
+        cell=new_code_cell(source) if source else deepcopy(cell.cell),
         options=defaultdict(bool, check=True) if source else cell.options,
     )
 
