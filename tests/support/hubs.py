@@ -147,7 +147,7 @@ class Hub:
         return (await self.ask(f'/hub/api/users/{name}/tokens', 'POST', {}))['token']
 
     async def guesses(self) -> list[int]:
-        """Return how many questions each seat has answered, as an administrator's CSV says it."""
+        """Return how many questions each seat has answered, the most first, as the CSV says it."""
         answer = await self.answer('/services/class/class.csv', await self.token_of('teacher'))
         told = pd.read_csv(io.BytesIO(answer.body))
         assert set(told['name']) == {'""'}  # nobody has given one
