@@ -116,7 +116,7 @@ server = --root "$(ROOT)" $(if $(PORT),--port "$(PORT)") $(if $(filter no,$(BROW
 
 # What you have set for other work stays out: another ROS 2 that is sourced, Python's and Jupyter's
 # variables, the settings in your home folder. What must not reach a build stands in
-# helpers/_plumbing/build_tools.py. JupyterLab's state of this course is in .jupyter.
+# helpers/machine/build_tools.py. JupyterLab's state of this course is in .jupyter.
 unexport $(filter PYTHON% ROS_% RMW_% RCUTILS_% FASTDDS_% FASTRTPS_% JUPYTER% IPYTHON% \
 	_ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH VIRTUAL_ENV MPLBACKEND,$(.VARIABLES))
 ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)

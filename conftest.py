@@ -10,7 +10,7 @@ import pytest
 from hypothesis import settings
 from jupyter_client.manager import KernelManager
 
-from helpers.progress import FILE_VARIABLE
+from helpers.checks.progress import FILE_VARIABLE
 from tools.lessons.comparison import start_kernels_by
 
 # No test reads or changes what the user of this checkout has solved. Kernels inherit it.

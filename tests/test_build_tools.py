@@ -6,8 +6,8 @@ import sys
 import pytest
 from support.packages import HOSTILE
 
-from helpers._plumbing import build_tools as module
-from helpers._plumbing.build_tools import build_environment, build_tools
+from helpers.machine import build_tools as module
+from helpers.machine.build_tools import build_environment, build_tools
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 from support.kernel import Kernel
 
-from helpers.checks import NO_GUESS, check, compare_prediction
+from helpers.checks.checks import NO_GUESS, check, compare_prediction
 
 AGAIN = ' Try again, or go on with the solution below.'
 QUESTION = 'How many of 41 messages are heard?'
@@ -49,7 +49,7 @@ def test_each_guess_gets_verdict_and_answer(capsys, guess, outcome, said):
 
 def test_tolerance_keeps_the_text_constant(capsys, monkeypatch):
     assert told(capsys, 41, 20, tolerance=2)[0].endswith('Verdict: too many. Here it was 20.')
-    monkeypatch.setattr('helpers.checks._has_student', lambda: False)
+    monkeypatch.setattr('helpers.checks.checks._has_student', lambda: False)
     texts = {tuple(told(capsys, 41, measured, tolerance=2)) for measured in range(15, 39)}
     assert texts == {('  Your guess: 41. Verdict: too many.',)}
     verdicts = [
@@ -200,14 +200,14 @@ def test_a_lesson_goes_on_with_the_code_that_passes():
 def test_a_name_of_another_part_of_a_check_says_which_cells_to_run():
     part = '# ✔ Check of task 1, part {} of 2\nprint(seconds)'
     with Kernel() as kernel:
-        kernel.run('%load_ext helpers._plumbing.kernel\nimport helpers.session')
+        kernel.run('%load_ext helpers.notebook.kernel\nimport helpers.ros.session')
         assert 'Run all parts of this check' in kernel.run(part.format(2))
         assert 'Run all parts' not in kernel.run(part.format(1))
 
 
 def test_an_int_in_a_float_field_is_an_error():
     with Kernel() as kernel:
-        early = 'from geometry_msgs.msg import Vector3\nimport helpers.session\n'
+        early = 'from geometry_msgs.msg import Vector3\nimport helpers.ros.session\n'
         assert "The 'x' field must be of type 'float'" in kernel.run(f'{early}Vector3(x=1)')
         late = 'from sensor_msgs.msg import Range'
         assert "The 'range' field must" in kernel.run(f'{late}\nRange(range=1)')
@@ -232,7 +232,7 @@ import threading
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from helpers.checks import check
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 
 loops, counted = True, []
 

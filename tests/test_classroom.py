@@ -9,7 +9,7 @@ import pytest
 from support.classes import LATER, OTHER, QUESTION, STEP, running_class, student
 from support.processes import running
 
-from helpers import checks, classroom
+from helpers.checks import checks, classroom
 
 VALUES = [41, 0.2, True, 'the way is free', {'D', 'C'}, [0, 1, 2], ('a', 1)]
 GUESSES = """
@@ -18,7 +18,7 @@ for value in range({}, {}):
     guess({!r}, value)
     time.sleep(0.01)
 """
-BEGIN = 'import sys\nfrom helpers import checks, classroom\nfrom helpers.classroom import *\n'
+BEGIN = 'import sys\nfrom helpers.checks import checks, classroom\nfrom helpers.checks import *\n'
 TOLD = [41, 0.2, True, 'the way is free', ['C', 'D'], [0, 1, 2], ['a', 1]]
 
 
@@ -168,7 +168,7 @@ def test_membership_lasts_until_the_student_leaves(opened, tmp_path):
 def test_the_steps_of_the_cells_that_run(opened, tmp_path):
     script = f"""
 shell = InteractiveShell.instance()
-shell.run_cell('from helpers.classroom import *', cell_id={STEP!r})
+shell.run_cell('from helpers.checks import *', cell_id={STEP!r})
 shell.run_cell('1', cell_id='my own')
 shell.run_cell('1', cell_id={LATER!r})
 """

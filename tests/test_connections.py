@@ -12,7 +12,7 @@ from support.nodes import Asker, Listener, Talker, spin
 from test_msgs.action import Fibonacci
 
 from helpers.recording import Recording
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 
 
 def said_by(wait, *arguments):
@@ -126,9 +126,9 @@ def test_nothing_is_wrong():
 def test_findings_are_shown_while_the_cell_waits(monkeypatch):
     said = []
     monkeypatch.setattr(
-        'helpers._plumbing.progress_bar.ProgressBar.say', lambda bar, text: said.append(text)
+        'helpers.notebook.progress_bar.ProgressBar.say', lambda bar, text: said.append(text)
     )
-    monkeypatch.setattr('helpers.session.SAY_AFTER_S', 0.3)
+    monkeypatch.setattr('helpers.ros.session.SAY_AFTER_S', 0.3)
     with ros_session() as session:
         talker = Talker(1)  # never spun
         session.wait_until(lambda: said)

@@ -13,14 +13,14 @@ import pytest
 from rclpy.executors import SingleThreadedExecutor
 from support.processes import put
 
-from helpers import doctor
+from helpers.machine import doctor
 
 ROOT = Path(__file__).resolve().parent.parent
 
 
 def run_doctor(python: Path | str = sys.executable, **environment: str):
     return subprocess.run(
-        [python, '-m', 'helpers.doctor'],
+        [python, '-m', 'helpers.machine.doctor'],
         cwd=ROOT,
         env=os.environ | environment,
         capture_output=True,

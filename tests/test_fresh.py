@@ -5,7 +5,7 @@ import asyncio
 import nbformat
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 
-from helpers._plumbing.fresh import AS_SAVED, MARK, FreshLessons
+from helpers.notebook.fresh import AS_SAVED, MARK, FreshLessons
 
 ANSWER = new_output('stream', text='The answer is 3.\n')
 

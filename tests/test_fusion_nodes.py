@@ -12,7 +12,7 @@ from sensor_msgs.msg import Imu, LaserScan
 from helpers.fusion.messages import yaw_of
 from helpers.fusion.nodes import PARTS, EkfNode
 from helpers.robot import ROOMS, Robot
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 
 
 def heard_from_a_robot(**options):

@@ -2,7 +2,7 @@
 
 import pytest
 
-from helpers.interfaces import share_folder, show
+from helpers.ros.interfaces import share_folder, show
 from helpers.ros2._index import interfaces
 
 INSTALLED = interfaces()

@@ -6,7 +6,7 @@ import threading
 import pytest
 from support.kernel import Kernel
 
-from helpers._plumbing.interrupts import uninterrupted
+from helpers.notebook.interrupts import uninterrupted
 
 
 def test_an_interrupt_waits_for_the_end():
@@ -27,7 +27,7 @@ def test_an_interrupt_survives_a_failing_block():
 
 def test_an_interrupt_of_a_command_ends_its_cell():
     with Kernel() as kernel:
-        kernel.run('import helpers.session')
+        kernel.run('import helpers.ros.session')
         interrupt = threading.Timer(2, kernel.km.provisioner.process.send_signal, [signal.SIGINT])
         interrupt.start()
         said = kernel.run('!sleep 60\nprint("the cell goes on")')

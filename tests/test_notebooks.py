@@ -2,7 +2,7 @@
 
 import pytest
 
-from helpers import progress
+from helpers.checks import progress
 from tools.lessons import rules, tables
 from tools.lessons.lesson import lessons
 

@@ -15,7 +15,7 @@ from matplotlib.patches import Ellipse
 from matplotlib.text import Text
 
 from helpers import plots
-from helpers._plumbing.alt_text import alt_text
+from helpers.plots.alt_text import alt_text
 
 HEARD = [0, 1, 2, 3, 7, 11, 15, 19, 23, 27, *range(31, 41)]  # the slow subscriber of lesson 02
 PERIOD_S, CALLBACK_S = 0.05, 0.2

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from helpers import checks, progress
+from helpers.checks import checks, progress
 
 NOTEBOOKS = {
     '00_start_here': ['# 00 Start here', '### ✎ Task 1: Two robots'],
@@ -80,7 +80,7 @@ def test_passed_tasks_are_kept(kept):
 
 def test_kernels_that_write_at_once_lose_nothing(kept, capsys):
     write = (
-        'import random, sys; from helpers import progress; '
+        'import random, sys; from helpers.checks import progress; '
         'tasks = [1, 2, 3]; random.shuffle(tasks); print(flush=True); sys.stdin.read(1)\n'
         'for task in tasks: progress.record(task)'
     )

@@ -6,7 +6,7 @@ import pytest
 from jupyter_client.manager import run_kernel
 
 CELL = """
-    from helpers._plumbing.progress_bar import ProgressBar
+    from helpers.notebook.progress_bar import ProgressBar
     parts = iter([0.25, 0.5, 1.2])
     with ProgressBar({progress}) as bar:
         for waited_s in {waits}:

@@ -22,10 +22,10 @@ from support.runs import (
 )
 from support.waits import wait_for
 
-from helpers._plumbing.values import RUN_COLUMNS, check_table
-from helpers.queue_model import ALLOWED_REST, explain, predict
+from helpers.notebook.values import RUN_COLUMNS, check_table
 from helpers.recording import Recording
-from helpers.session import ros_session
+from helpers.recording.queue_model import ALLOWED_REST, explain, predict
+from helpers.ros.session import ros_session
 
 # predict
 

@@ -11,9 +11,9 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Int64, String
 from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 
-from helpers._plumbing.values import RUN_COLUMNS, check_table
+from helpers.notebook.values import RUN_COLUMNS, check_table
 from helpers.recording import CallbackRecording, Recording
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 
 TIMES = ['published_s', 'started_s', 'finished_s']
 

@@ -19,7 +19,7 @@ from support.runs import (
     tries,
 )
 
-from helpers.queue_model import explain, predict
+from helpers.recording.queue_model import explain, predict
 from helpers.replay import replay, side_by_side
 from helpers.replay.free import FreePlay
 from helpers.replay.levels import level

@@ -13,7 +13,7 @@ from support.nodes import LIMIT_S, call_in_executor, spin
 from test_msgs.action import Fibonacci
 
 from helpers.replay.actions import ActionRecording, replay_action
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 
 CANCEL = 2  # the place of cancel_goal
 

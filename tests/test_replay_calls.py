@@ -8,7 +8,7 @@ from support.nodes import LIMIT_S, Answerer, Asker, spin
 
 from helpers.recording import CallbackRecording
 from helpers.replay.calls import replay_calls
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 
 
 def record(threads, groups, style='call'):

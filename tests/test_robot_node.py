@@ -24,7 +24,7 @@ from helpers.robot import CORRIDOR, EMPTY, ROOMS, Pose, Robot, start_robot
 from helpers.robot.body import MAX_ACCELERATION, RADIUS_M, Body
 from helpers.robot.messages import DATUM, SKY
 from helpers.robot.robot import TOPICS
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 
 
 class Wanderer(Node):

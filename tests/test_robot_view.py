@@ -19,7 +19,7 @@ from helpers.robot.body import Body
 from helpers.robot.record import Command, Event, Scan, Step
 from helpers.robot.sensors import Sensors
 from helpers.robot.view import drive_by_hand, replay_drive, watch
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 
 MOST_BYTES = 60_000
 
@@ -152,7 +152,7 @@ def test_one_sees_which_scan_it_acted_on(script, capsys):
 CELL = """
 from helpers.robot import EMPTY, Robot
 from helpers.robot.view import drive_by_hand, watch
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 import threading
 with ros_session():
     robot = Robot(EMPTY)

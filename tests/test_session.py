@@ -25,10 +25,11 @@ from support.processes import run_python, traces
 from support.waits import wait_for
 from test_msgs.action import Fibonacci
 
-import helpers.session
-from helpers._plumbing import domain, interrupts, rclpy_private, rosout
-from helpers._plumbing.domain import configure_discovery, reserve_domain_id
-from helpers.session import current_session, ros_session
+import helpers.ros.session
+from helpers.notebook import interrupts
+from helpers.ros import domain, private, rosout
+from helpers.ros.domain import configure_discovery, reserve_domain_id
+from helpers.ros.session import current_session, ros_session
 
 EXECUTORS = pytest.mark.parametrize('threads', [1, 3], ids=['single', 'multi'])
 
@@ -151,7 +152,7 @@ def test_session_that_is_open_when_python_ends():
         """
         import threading
         from support.nodes import Listener, Talker, spin
-        from helpers import session as module
+        from helpers.ros import session as module
         module.CLOSE_TIMEOUT_S = 0.2
         session = module.ros_session().__enter__()
         talker = Talker(10**6, period_s=0.001)
@@ -171,7 +172,7 @@ def test_session_that_is_open_when_python_ends():
 
 @EXECUTORS
 def test_callback_that_does_not_end(threads, monkeypatch):
-    monkeypatch.setattr('helpers.session.CLOSE_TIMEOUT_S', 0.3)
+    monkeypatch.setattr('helpers.ros.session.CLOSE_TIMEOUT_S', 0.3)
     gate = Gate()
     with (
         pytest.raises(RuntimeError, match=r'1 callback\(s\) did not end within 0\.3 s'),
@@ -387,7 +388,7 @@ def test_an_interrupt_is_the_cells_alone():
 
 # This module, ours, and those of rclpy that a cell calls.
 RUN_BY_A_CELL = (
-    *(sys.modules[__name__], domain, interrupts, rclpy_private, rosout, helpers.session),
+    *(sys.modules[__name__], domain, interrupts, private, rosout, helpers.ros.session),
     *(rclpy, rclpy.context, rclpy.executors, rclpy.node, threading),
 )
 

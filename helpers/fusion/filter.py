@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from helpers._plumbing.values import shown
 from helpers.fusion import settings
+from helpers.notebook.values import shown
 
 STATE = ('x', 'y', 'yaw', 'vx', 'vy', 'vyaw', 'ax', 'ay')
 

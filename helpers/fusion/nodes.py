@@ -36,7 +36,7 @@ from helpers.fusion.messages import (
     table_of,
     yaw_of,
 )
-from helpers.session import ros_session
+from helpers.ros.session import ros_session
 
 if TYPE_CHECKING:
     from helpers.robot import Robot

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 
-from helpers._plumbing.values import shown
+from helpers.notebook.values import shown
 
 
 def positive(name: str, value, or_zero: bool = False) -> float:

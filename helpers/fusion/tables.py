@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from helpers._plumbing.values import check_columns, column_of_numbers
 from helpers.fusion import settings
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter, Innovation, part_of_state
+from helpers.notebook.values import check_columns, column_of_numbers
 
 # The variance of the noise of each column, per axis. `vy` is no column: wheels that cannot move
 # sideways say 0.

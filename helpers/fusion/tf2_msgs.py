@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from helpers.interfaces import share_folder
+from helpers.ros.interfaces import share_folder
 from helpers.workspace import Workspace
 
 MESSAGE = 'geometry_msgs/TransformStamped[] transforms\n'

@@ -5,7 +5,7 @@ legend counts, and no meaning depends on a colour alone. Each picture has an alt
 that cannot be drawn raises TypeError or ValueError, with one sentence.
 """
 
-from helpers._plumbing.alt_text import describe, show
+from helpers.plots.alt_text import describe, show
 from helpers.plots.comparisons import bars, sweep
 from helpers.plots.drives import error, frame_tree, gate, path, scans
 from helpers.plots.runs import before_and_after, latency, queue_length, sequence_gaps, timeline

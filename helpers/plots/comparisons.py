@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from helpers._plumbing.alt_text import describe
+from helpers.plots.alt_text import describe
 from helpers.plots.style import (
     DPI,
     HEARD,

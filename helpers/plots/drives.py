@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Ellipse
 
-from helpers._plumbing.alt_text import describe
+from helpers.plots.alt_text import describe
 from helpers.plots.style import (
     HEARD,
     INK,

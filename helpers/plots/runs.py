@@ -20,8 +20,8 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
-from helpers._plumbing.alt_text import describe
-from helpers._plumbing.values import check_table, natural
+from helpers.notebook.values import check_table, natural
+from helpers.plots.alt_text import describe
 from helpers.plots.style import (
     DPI,
     HEARD,

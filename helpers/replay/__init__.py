@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 import pandas as pd
 
-from helpers._plumbing.values import check_count, check_table, natural, shown
+from helpers.notebook.values import check_count, check_table, natural, shown
 from helpers.replay.events import ARRIVE, END, TAKE, events
 from helpers.replay.script import attribute, javascript, script, style
 

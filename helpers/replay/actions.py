@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from helpers._plumbing.values import check_count
-from helpers.recording import CallbackRecording
+from helpers.notebook.values import check_count
+from helpers.recording.recording import CallbackRecording
 from helpers.replay import Replay
 from helpers.replay.recorded import GO, Callback, Move, count_of, moves_of, run_of
 

@@ -6,8 +6,8 @@ import inspect
 from collections.abc import Iterator
 from dataclasses import replace
 
-from helpers._plumbing.values import check_count
-from helpers.recording import Call, CallbackRecording
+from helpers.notebook.values import check_count
+from helpers.recording.recording import Call, CallbackRecording
 from helpers.replay import Replay
 from helpers.replay.recorded import GO, Callback, Move, count_of, moves_of, run_of
 from helpers.replay.script import javascript

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 
-from helpers.recording import CallbackRecording, CallbackRun
+from helpers.recording.recording import CallbackRecording, CallbackRun
 from helpers.replay import KINDS, Run, fill_up
 from helpers.replay.events import ARRIVE, END, TAKE
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from _quickjs import Context
 from rjsmin import jsmin
 
-from helpers._plumbing.look import LOOK, LOOK_CSS
+from helpers.notebook.look import LOOK, LOOK_CSS
 
 DRAWN = 'model.js', 'rules.js', 'walk.js', 'stories.js', 'picture.js'
 COLOURS = f'const LOOK = {json.dumps(LOOK)};\n'

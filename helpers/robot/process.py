@@ -7,7 +7,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from helpers.session import graph_environment
+from helpers.ros.session import graph_environment
 from helpers.workspace.processes import Process
 
 START_TIMEOUT_S = 60.0  # a machine that a class shares may need it

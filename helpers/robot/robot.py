@@ -23,14 +23,14 @@ from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan, NavSatFix
 from std_msgs.msg import Bool, Header
 from std_srvs.srv import Trigger
 
-from helpers._plumbing.interrupts import uninterrupted
 from helpers.fusion.messages import START_NS, quaternion
+from helpers.notebook.interrupts import uninterrupted
 from helpers.robot import messages
 from helpers.robot.body import RATE_HZ, Body, wrapped
 from helpers.robot.floor import EMPTY, Floor, Pose
 from helpers.robot.record import Command, DriveRecord, Event, Scan, Step
 from helpers.robot.sensors import Sensors
-from helpers.session import current_session, find
+from helpers.ros.session import current_session, find
 
 # RELIABLE, which both kinds of subscriptions hear, as a TurtleBot 3 in Gazebo has it. The drivers
 # of its real lasers are BEST_EFFORT.
@@ -64,9 +64,7 @@ class Robot(Node):
     for a start in a wall and for a name that another node has.
     """
 
-    stands_alone = (
-        True  # for helpers._plumbing.connections: not everything that it says needs a listener
-    )
+    stands_alone = True  # for helpers.ros.connections: not everything that it says needs a listener
     _own_executor: Executor | None = None
 
     def __init__(

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from helpers._plumbing.domain import one_process_at_a_time
-from helpers._plumbing.interrupts import uninterrupted
+from helpers.notebook.interrupts import uninterrupted
+from helpers.ros.domain import one_process_at_a_time
 from helpers.ros2 import _sessions
 from helpers.ros2._commands import CommandError
 

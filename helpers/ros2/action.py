@@ -8,7 +8,7 @@ from typing import Any
 from rclpy import action
 from rclpy.action import ActionClient, get_action_names_and_types
 
-from helpers._plumbing.interrupts import uninterrupted
+from helpers.notebook.interrupts import uninterrupted
 from helpers.ros2._commands import VALUES, command, flag
 from helpers.ros2._graph import full_name, graph
 from helpers.ros2._names import Names

@@ -6,12 +6,12 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, output_f
 from support.lab_page import PANEL, WIDER
 from support.runs import assert_is_the_run
 
-from helpers._plumbing.fresh import MARK
-from helpers.queue_model import predict
+from helpers.notebook.fresh import MARK
+from helpers.recording.queue_model import predict
 from helpers.replay import replay
 from tools.lessons.clean import NOTEBOOK_METADATA
 
-SOURCE = """from helpers.queue_model import predict
+SOURCE = """from helpers.recording.queue_model import predict
 from helpers.replay import replay
 replay(predict(0.05, 0.2, 10, 1, 41), 10)"""
 PUSHED_OUT = 'Message 14 arrives. Ten wait, so the oldest, 4, is pushed out.'

@@ -8,7 +8,7 @@ from tools.lessons.clean import NOTEBOOK_METADATA
 
 IMPORTS = """from helpers.robot import ROOMS, Robot
 from helpers.robot.view import drive_by_hand, watch
-from helpers.session import ros_session"""
+from helpers.ros.session import ros_session"""
 BY_HAND = """with ros_session():
     robot = Robot(ROOMS)
     watch(robot)

@@ -25,7 +25,7 @@ def write_lesson_of(folder, name, join):
     cells[0].source = f'my_guess = guess({QUESTION!r}, {NAMES[name]})'
     sources = [
         f"import os\nos.environ['ROS2_NOTEBOOKS_PROGRESS'] = {own!r}\n"
-        f'from helpers.classroom import *\nfrom helpers.checks import *\n{join}',
+        f'from helpers.checks import *\n{join}',
         f'compare_prediction({QUESTION!r}, my_guess, 14)',
         "check(1, ('it is so', True, ''))\nraise_hand()",
     ]
@@ -95,7 +95,7 @@ def test_a_slide_shows_the_guesses_of_the_class(lab_page, tmp_path):
     ):
         tell = f"""
 import time
-from helpers.classroom import *
+from helpers.checks import *
 {started[1]}
 guess({QUESTION!r}, 14)
 time.sleep(2)

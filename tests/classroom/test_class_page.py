@@ -24,7 +24,7 @@ from support.classes import (
     write_lesson,
 )
 
-from helpers.classroom import BATCH
+from helpers.checks.classroom import BATCH
 from tools.classroom.class_page.addresses import in_networks
 from tools.classroom.class_page.lessons import Known
 from tools.classroom.class_page.store import BARS, WORDS, ClassStore, bars

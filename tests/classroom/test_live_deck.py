@@ -21,7 +21,7 @@ KERNELS = """async () => {
     await kernels.refreshRunning();
     return [...kernels.running()].length;
 }"""
-REPLAY = """from helpers.queue_model import predict
+REPLAY = """from helpers.recording.queue_model import predict
 from helpers.replay import replay
 replay(predict(0.05, 0.2, 10, 1, 41), 10)"""
 LEVEL = """from helpers.replay.levels import level

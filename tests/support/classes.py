@@ -16,8 +16,8 @@ import nbformat
 import requests
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
 
-from helpers.classroom import HUB_VARIABLE
-from helpers.progress import FILE_VARIABLE
+from helpers.checks.classroom import HUB_VARIABLE
+from helpers.checks.progress import FILE_VARIABLE
 from support.waits import LIMIT_S, wait_for
 from tools.lessons.lesson import ROOT
 

@@ -20,7 +20,7 @@ for number in random.sample(range(1000), k=random.randint(5, 15)):
 RANDOM_FIGURE = """\
 import random
 import matplotlib.pyplot as plt
-from helpers._plumbing.alt_text import describe
+from helpers.plots.alt_text import describe
 _, axes = plt.subplots()
 line = axes.plot([random.random() for _ in range(9)])
 describe(axes, 'A line through <nine> "points".')"""

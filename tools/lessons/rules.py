@@ -138,7 +138,7 @@ def pictures_described(lesson: Lesson) -> Iterator[str]:
             if len(alt.split()) < MIN_WORDS:
                 yield (
                     f'Cell {index} has a picture without an alternative text of {MIN_WORDS} '
-                    f'words or more: {alt!r}. helpers._plumbing.alt_text gives one to a figure.'
+                    f'words or more: {alt!r}. helpers.plots.alt_text gives one to a figure.'
                 )
             elif alt in known:
                 yield f'Cell {index}: another picture has the alternative text {alt!r}.'

@@ -30,7 +30,7 @@ from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernelError
 from nbformat import NotebookNode
 
-from helpers.progress import FILE_VARIABLE
+from helpers.checks.progress import FILE_VARIABLE
 from tools.lessons import tables
 from tools.lessons.clean import clean, text_of, write
 from tools.lessons.lesson import ROOT, START, chosen

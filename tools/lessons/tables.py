@@ -16,7 +16,7 @@ from collections.abc import Callable
 from itertools import zip_longest
 from pathlib import Path
 
-from helpers import progress
+from helpers.checks import progress
 from tools.lessons.clean import clean, text_of
 from tools.lessons.lesson import GLOSSARY, PARTS, ROOT, START, Lesson, paths, read
 
@@ -75,7 +75,7 @@ def needs_run(lessons: list[Lesson]) -> bool:
 
 
 def with_tasks(lessons: list[Lesson]) -> list[progress.Tasks]:
-    """Return the notebooks that have tasks, as `helpers.progress` knows them."""
+    """Return the notebooks that have tasks, as `helpers.checks.progress` knows them."""
     return [
         progress.Tasks(one.number, one.name, one.title, len(one.tasks))
         for one in lessons

@@ -21,7 +21,7 @@ from nbformat import NotebookNode
 from PIL import Image
 from sphinx.cmd.build import build_main
 
-from helpers._plumbing.look import LOOK_CSS
+from helpers.notebook.look import LOOK_CSS
 from helpers.replay.levels import level
 from tools.lessons.lesson import (
     FOLDER,

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from html import escape
 
-from helpers._plumbing.progress_bar import somebody_watches
+from helpers.notebook.progress_bar import somebody_watches
 from helpers.replay.script import script, style
 from helpers.robot.robot import Robot
-from helpers.session import current_session
+from helpers.ros.session import current_session
 
 SPEED, TURN = 0.5, 1.2  # m/s, rad/s
 EVERY_S = 0.1  # a command: the robot stops 0.5 s after the last one

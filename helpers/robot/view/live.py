@@ -7,7 +7,7 @@ from html import escape
 
 from rclpy.subscription import Subscription
 
-from helpers._plumbing.progress_bar import somebody_watches
+from helpers.notebook.progress_bar import somebody_watches
 from helpers.replay import Replay
 from helpers.replay.script import style
 from helpers.robot.floor import Pose
@@ -15,7 +15,7 @@ from helpers.robot.robot import Robot
 from helpers.robot.view.picture import described, picture
 from helpers.robot.view.replay import bumps, place, replay_drive
 from helpers.robot.view.scans import ScanRecording
-from helpers.session import current_session
+from helpers.ros.session import current_session
 
 PERIOD_S = 1 / 12
 EVERY = 5  # steps of the robot: a point of its path

@@ -12,7 +12,7 @@ from html import escape
 
 import numpy as np
 
-from helpers._plumbing.look import LOOK
+from helpers.notebook.look import LOOK
 from helpers.robot.body import RADIUS_M
 from helpers.robot.floor import Floor, Pose
 from helpers.robot.sensors import ANGLES, RANGE_MAX

@@ -32,7 +32,7 @@ c.SimpleLocalProcessSpawner.home_dir_template = str(folder / 'home' / '{username
 c.Spawner.args.append('--allow-root')
 c.Spawner.environment['TMPDIR'] = str(folder)
 """
-DOMAIN = 'import helpers._plumbing.domain; print(helpers._plumbing.domain.reserve_domain_id())'
+DOMAIN = 'import helpers.ros.domain; print(helpers.ros.domain.reserve_domain_id())'
 
 
 async def teach(hub: Hub) -> None:

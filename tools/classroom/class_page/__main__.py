@@ -50,7 +50,7 @@ async def hold(store: ClassStore, options: argparse.Namespace) -> None:
     one, *others = (options.lan and in_networks()) or ['127.0.0.1']
     room.joins = [
         '# Type this into a new cell of a lesson, then press Shift+Enter:',
-        'from helpers.classroom import *',
+        'from helpers.checks import *',
         f"join_class('{one}:{port}', '{store.code}')",
     ]
     print('For the wall:', *room.joins, sep='\n    ')

@@ -4,8 +4,8 @@ import json
 
 from jsonschema import Draft202012Validator
 
-from helpers.classroom import BATCH, ITEMS, LARGEST
-from helpers.classroom import TEXT as LONGEST
+from helpers.checks.classroom import BATCH, ITEMS, LARGEST
+from helpers.checks.classroom import TEXT as LONGEST
 
 LARGEST_BODY = 256 * 1024  # bytes
 NUMBER = {'type': 'number', 'minimum': -LARGEST, 'maximum': LARGEST}

@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 from jupyterhub.proxy import ConfigurableHTTPProxy
 
-from helpers.classroom import HUB_VARIABLE
+from helpers.checks.classroom import HUB_VARIABLE
 
 ROOT = Path(__file__).resolve().parents[3]
 STATE = ROOT / '.jupyter/hub'

@@ -17,7 +17,8 @@ from collections.abc import Callable, Iterator
 from itertools import chain
 from traceback import clear_frames
 
-from helpers._plumbing.domain import (
+from helpers.notebook.interrupts import at_each_signal, uninterrupted
+from helpers.ros.domain import (
     check_domain,
     configure_discovery,
     domain_variables,
@@ -25,8 +26,7 @@ from helpers._plumbing.domain import (
     reserve_domain_id,
     share_domain_id,
 )
-from helpers._plumbing.fields import check_fields
-from helpers._plumbing.interrupts import at_each_signal, uninterrupted
+from helpers.ros.fields import check_fields
 from helpers.ros2._sessions import recorded
 
 try:
@@ -41,10 +41,10 @@ try:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.subscription import Subscription
 
-    from helpers._plumbing import connections, rclpy_private
-    from helpers._plumbing.progress_bar import ProgressBar
-    from helpers._plumbing.rclpy_private import frames as frames
-    from helpers._plumbing.rosout import Rosout
+    from helpers.notebook.progress_bar import ProgressBar
+    from helpers.ros import connections, private
+    from helpers.ros.private import frames as frames
+    from helpers.ros.rosout import Rosout
 except ImportError as error:
     raise ImportError(
         f'rclpy cannot be imported in this Python ({error}): start JupyterLab with `make lab`, '
@@ -217,7 +217,7 @@ class Session:
 
     def _collect_failures(self) -> None:
         for executor in self._spinning:
-            for failure in rclpy_private.failures_in_pool(executor):
+            for failure in private.failures_in_pool(executor):
                 if failure not in self._failures and not isinstance(failure, SessionClosedError):
                     self._failures.append(failure)
 
@@ -265,7 +265,7 @@ class Session:
     def _findings(self) -> list[str]:
         nodes = [node for node in find(Node, self._context) if is_used(node)]
         nodes = [node for node in nodes if node.get_name() != LOG_NODE]
-        frames = [frame for _, frame in rclpy_private.frames(self._threads())]
+        frames = [frame for _, frame in private.frames(self._threads())]
         return connections.findings(nodes, self._spinning, frames)
 
     def wait_until_quiet(self, executor: Executor, timeout_s: float = 30.0) -> bool:
@@ -286,7 +286,7 @@ class Session:
 
         def is_quiet() -> bool:
             nonlocal task, rounds, states
-            states = rclpy_private.states(executor, self._spinning[executor])
+            states = private.states(executor, self._spinning[executor])
             if 'working' in states:
                 rounds = 0
             elif task.done():
@@ -349,7 +349,7 @@ class Session:
         self._end_threads(time.monotonic() + CLOSE_TIMEOUT_S)
         self._collect_failures()
         for executor in self._spinning:
-            rclpy_private.cancel_tasks(executor)
+            private.cancel_tasks(executor)
             executor.shutdown(timeout_sec=0)
         if self._rosout is not None:
             self._rosout.close()
@@ -362,16 +362,16 @@ class Session:
 
     def _end_threads(self, deadline: float) -> None:
         for executor in self._spinning:
-            rclpy_private.end_spin(executor)
+            private.end_spin(executor)
         for thread in self._spinning.values():
             self._join(thread, deadline)
         for executor in self._spinning:
-            rclpy_private.end_pool(executor)
+            private.end_pool(executor)
         for thread in self._threads():
             self._join(thread, deadline)
         self._endless = [thread for thread in self._threads() if thread.is_alive()]
         for thread in self._endless:
-            rclpy_private.break_off(thread, SessionClosedError)
+            private.break_off(thread, SessionClosedError)
             thread.join(BREAK_OFF_S)
 
     def _join(self, thread: threading.Thread, deadline: float) -> None:
@@ -383,18 +383,18 @@ class Session:
         started = time.monotonic()
         while thread.is_alive() and time.monotonic() < deadline:
             if self._ended_by_exception and time.monotonic() > started + BREAK_OFF_S:
-                rclpy_private.break_off(thread, SessionClosedError)
+                private.break_off(thread, SessionClosedError)
             for client in find(Client, self._context):
-                rclpy_private.fail_calls(client, SessionClosedError('The session closes.'))
-            rclpy_private.end_answered_call(thread)
+                private.fail_calls(client, SessionClosedError('The session closes.'))
+            private.end_answered_call(thread)
             if self._ended_by_exception:
                 # A long wait at once. A short one ends by itself, unless it comes again and again.
                 left_s = deadline - time.monotonic()
-                rclpy_private.end_wait(thread, longer_than_s=left_s - CLOSE_TIMEOUT_S / 2)
+                private.end_wait(thread, longer_than_s=left_s - CLOSE_TIMEOUT_S / 2)
             thread.join(25 * POLL_S)  # less often than POLL_S: to look for calls takes long
 
     def _threads(self) -> list[threading.Thread]:
-        pools = [rclpy_private.pool_threads(executor) for executor in self._spinning]
+        pools = [private.pool_threads(executor) for executor in self._spinning]
         return [*self._spinning.values(), *(thread for pool in pools for thread in pool)]
 
 
@@ -438,7 +438,7 @@ def _destroy(node: Node) -> list[Exception]:
         # the executor.
         *_failure(lambda: node.executor.shutdown(timeout_sec=0)),
         *_failure(lambda: _destroy_actions(node)),
-        *_failure(lambda: rclpy_private.end_lifecycle(node)),
+        *_failure(lambda: private.end_lifecycle(node)),
         *_failure(node.destroy_node, () if own else ALREADY_DESTROYED),
         *(_failure(lambda: Node.destroy_node(node)) if own else []),  # if its own one failed
         # A node whose __init__ failed or was interrupted has only some of its parts: destroy_node

@@ -14,7 +14,7 @@ from rclpy.lifecycle import LifecycleNode
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
-from helpers._plumbing.rclpy_private import NAMES
+from helpers.ros.private import NAMES
 
 
 @pytest.fixture(scope='module')

@@ -19,7 +19,7 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
-from helpers._plumbing.rclpy_private import action_name
+from helpers.ros.private import action_name
 
 NOT_OF_A_LESSON = ('/rosout', '/parameter_events')
 # Code that is in no callback of a lesson.

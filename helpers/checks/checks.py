@@ -24,9 +24,9 @@ from numbers import Integral, Real
 from IPython import get_ipython
 from IPython.core.error import UsageError
 
-from helpers import classroom, progress
-from helpers._plumbing.rclpy_private import can_ask
-from helpers._plumbing.text import wrap
+from helpers.checks import classroom, progress
+from helpers.notebook.kernel import can_ask
+from helpers.notebook.text import wrap
 
 NO_GUESS = 'No guess yet. Write one in place of the three dots, run that cell, then this one again.'
 ENDLESS = 'it did not end. Is there an endless loop, or a spin() that never returns?'

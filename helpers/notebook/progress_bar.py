@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 from collections.abc import Callable
 
-from helpers._plumbing.rclpy_private import can_ask
+from helpers.notebook.kernel import can_ask
 
 SHOW_AFTER_S = 2.0
 REFRESH_S = 0.2

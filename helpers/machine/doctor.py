@@ -1,6 +1,6 @@
 """Is this machine ready for the notebooks, and if not, what to do.
 
-`python -m helpers.doctor` prints a table of checks and exits with 1 if a required one fails.
+`python -m helpers.machine.doctor` prints a table of checks and exits with 1 if a required one fails.
 It runs on Python 3.10 and newer, and with any installation of ROS 2, also with none.
 """
 
@@ -18,9 +18,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from helpers._plumbing.build_tools import build_tools, from_wheels
-from helpers._plumbing.interrupts import uninterrupted
-from helpers._plumbing.text import table
+from helpers.machine.build_tools import build_tools, from_wheels
+from helpers.notebook.interrupts import uninterrupted
+from helpers.notebook.text import table
 
 JAZZY = '7.1.'  # the versions of rclpy in ROS 2 Jazzy
 SHARED_MEMORY = Path('/dev/shm')
@@ -107,7 +107,7 @@ def _why_import_failed(trial: subprocess.CompletedProcess[str]) -> tuple[str, st
 
 def check_domain() -> Check:
     """Reserve this process's domain id."""
-    from helpers.session import graph_environment
+    from helpers.ros.session import graph_environment
 
     name = 'domain and discovery'
     try:
@@ -140,7 +140,7 @@ def _seconds_to_hear() -> float:
     from rclpy.qos import DurabilityPolicy, QoSProfile
     from std_msgs.msg import String
 
-    from helpers.session import ros_session
+    from helpers.ros.session import ros_session
 
     # Transient local: the message arrives also if discovery ends after publish().
     qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -1,4 +1,4 @@
-"""Every private name that we touch: of rclpy, and of the Python and the ipykernel that it runs in.
+"""Every private name of rclpy that we touch, and of the Python that it runs in.
 
 A new version may take one away. `NAMES` says in which version each was read. A test says which one
 is gone, and another one that no other module touches any.
@@ -31,7 +31,6 @@ NAMES = {
     'an action client': {'_action_name': 'rclpy 7.1.6'},
     'a lifecycle node': {'_state_machine': 'rclpy 7.1.6'},
     'a ThreadPoolExecutor': {'_threads': 'Python 3.11.7', '_max_workers': 'Python 3.11.7'},
-    'a kernel': {'_allow_stdin': 'ipykernel 7.4.0'},
 }
 
 
@@ -156,8 +155,3 @@ def break_off(thread: threading.Thread, error: type[Exception]) -> None:
         ctypes.pythonapi.PyThreadState_SetAsyncExc(
             ctypes.c_ulong(thread.ident), ctypes.py_object(error)
         )
-
-
-def can_ask(kernel: object) -> bool:
-    """Return whether input() gets an answer: in JupyterLab it does, in nbval it does not."""
-    return getattr(kernel, '_allow_stdin', False)

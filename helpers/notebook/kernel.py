@@ -27,7 +27,7 @@ def load_ipython_extension(shell) -> None:
 
     def explain(shell, kind, error, traceback, tb_offset=None) -> None:
         shell.showtraceback((kind, error, traceback), tb_offset=tb_offset)
-        if 'helpers.session' not in sys.modules and 'helpers.workspace' not in sys.modules:
+        if 'helpers.ros.session' not in sys.modules and 'helpers.workspace' not in sys.modules:
             print(NOT_RUN)
         elif (getattr(error, 'name', None) or '').startswith('my_'):
             print(NO_GUESS.format(error.name))
@@ -39,3 +39,8 @@ def load_ipython_extension(shell) -> None:
 
 def _first_line(traceback) -> str:
     return linecache.getline(traceback.tb_frame.f_code.co_filename, 1)
+
+
+def can_ask(kernel: object) -> bool:
+    """Return whether input() gets an answer: in JupyterLab it does, in nbval it does not."""
+    return getattr(kernel, '_allow_stdin', False)

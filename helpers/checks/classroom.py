@@ -29,8 +29,8 @@ from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from helpers import progress
-from helpers._plumbing.text import wrap
+from helpers.checks import progress
+from helpers.notebook.text import wrap
 
 __all__ = ['guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand']
 
@@ -148,7 +148,7 @@ def lower_hand() -> None:
     _hand(False, 'Your hand is down.')
 
 
-# --- What `helpers.checks` sends -----------------------------------------------------------------
+# --- What `checks` sends
 
 
 def tell_outcome(question: str, value: object) -> None:

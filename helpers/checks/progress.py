@@ -19,7 +19,7 @@ from typing import NamedTuple
 from IPython import get_ipython
 from jupyter_core.paths import jupyter_data_dir
 
-from helpers._plumbing import text
+from helpers.notebook import text
 
 FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progress is kept
 LESSON = re.compile(r'(?:^|/)\d\d_(\w+)\.ipynb$')
@@ -143,7 +143,7 @@ def _notebooks(number: str = '[0-9][0-9]') -> list[Path]:
     """Return the notebooks with this number: a student of a JupyterHub has a copy of their own."""
     here = Path.cwd()
     own = any(here.glob('00_*.ipynb'))
-    folder = here if own else Path(__file__).resolve().parent.parent / 'notebooks'
+    folder = here if own else Path(__file__).resolve().parents[2] / 'notebooks'
     return sorted(folder.glob(f'{number}_*.ipynb'))
 
 

@@ -1,1 +1,0 @@
-"""What helpers need and no lesson imports."""
