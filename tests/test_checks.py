@@ -3,9 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from support.kernel import Kernel
-
 from helpers.checks.checks import NO_GUESS, check, compare_prediction
+from support.kernel import Kernel
 
 AGAIN = ' Try again, or go on with the solution below.'
 QUESTION = 'How many of 41 messages are heard?'

@@ -66,18 +66,24 @@ def edited(source: str, edits: list[tuple[tuple[int, int], str]]) -> str:
 
 
 def judge(kernel: Kernel, answers: dict, key: str, cells: dict[str, list[str]]) -> None:
-    """Run each answer, and the check: it must find that the answer is of its kind."""
+    """Run each answer, and its check twice: each time it must find of which kind the answer is."""
     kind = key.split()[1]
-    some = answers.pop(key)
-    assert len(some) >= LEAST[kind], f'Task {key}: {len(some)} answers'
+    some = answers.pop(key, [])
+    assert len(some) >= LEAST[kind], (
+        f'{HERE.name} has {len(some)} answers under "{key}", and {LEAST[kind]} are wanted.'
+    )
     starters = cells['exercise']
     files = starters if len(starters) > 1 else []  # the answer changes what they have written
     for answer in some:
         source = source_of(answer, *cells['solution'], *starters)
-        said = ''.join(map(kernel.run, [*files, source, *cells['check']]))
-        assert ('All done.' in said) == (kind == 'right'), (
-            f'Task {key} answer:\n{source}\nThe check said:\n{said}'
-        )
+        said = ''.join(map(kernel.run, [*files, source]))
+        for _ in range(2):
+            said += kernel.run(cells['check'][0])
+            solved = [verdict['solved'] for verdict in kernel.verdicts]
+            # A name that the answer does not define is an error of the cell, not a verdict.
+            assert solved == [kind == 'right'] or (kind == 'wrong' and not solved), (
+                f'Task {key} answer:\n{source}\nThe check said:\n{said}'
+            )
 
 
 @pytest.mark.parametrize('lesson', LESSONS)
@@ -93,14 +99,18 @@ def test_checks_judge_right_and_wrong_answers(lesson):
                 judge(kernel, answers, f'{task} wrong', cells)
                 # What a right answer builds stays, so the solution is tried before.
                 said = ''.join(map(kernel.run, [*cells['exercise'], cell.source]))
-                assert re.search(r'Solution of task \d+: (\d+) of \1\.', said), said
+                assert [(verdict['of'], verdict['solved']) for verdict in kernel.verdicts] == [
+                    ('solution', True)
+                ], said
                 judge(kernel, answers, f'{task} right', cells)
                 for source in [*cells['exercise'], *cells['check'], cell.source]:
                     kernel.run(source)
                 task, cells = task + 1, defaultdict(list)
             elif cell.cell_type == 'code':
-                said = kernel.run(cell.source)
-                assert 'All done.' not in said, f'The starter of task {task} is right.'
+                kernel.run(cell.source)
+                assert not any(verdict['solved'] for verdict in kernel.verdicts), (
+                    f'The starter of task {task} is right.'
+                )
                 for tag in {'exercise', 'check'}.intersection(tags):
                     cells[tag].append(cell.source)
-    assert not answers, 'There are no such tasks.'
+    assert not answers, f'There are no such tasks: {", ".join(answers)}.'
