@@ -13,6 +13,7 @@ from support.processes import put
 
 from tools.lessons.lesson import ROOT
 
+LOCKS = Path('tools/locks')
 BASE_PYTHON = Path(sys._base_executable)
 HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
 COMMANDS = (
@@ -21,7 +22,9 @@ COMMANDS = (
 
 
 def test_the_locks_name_no_package_index():
-    for lock in ROOT.glob('requirements*.lock'):
+    locks = [*ROOT.glob('*.lock'), *(ROOT / LOCKS).glob('*.lock')]
+    assert ROOT / LOCKS / 'requirements.lock' in locks
+    for lock in locks:
         assert not re.search(r'://|--(extra-)?index|--find-links|file:|@', lock.read_text())
     for lock in (ROOT / 'tools').glob('**/package-lock.json'):
         packages = json.loads(lock.read_text())['packages']
@@ -48,9 +51,9 @@ class Checkout:
         self.root.mkdir()
         for name in ('tools', 'helpers'):
             shutil.copytree(ROOT / name, self.root / name)
-        for name in ('pyproject.toml', 'LICENSE', 'requirements-uv.lock'):
+        for name in ('pyproject.toml', 'LICENSE'):
             shutil.copy(ROOT / name, self.root)
-        blocks = re.split(r'\n(?=[a-z])', (ROOT / 'requirements.lock').read_text())
+        blocks = re.split(r'\n(?=[a-z])', (ROOT / LOCKS / 'requirements.lock').read_text())
         self.pins = {
             name: next(f'{block}\n' for block in blocks if block.startswith(f'{name}=='))
             for name in ('iniconfig', 'pluggy')
@@ -62,13 +65,13 @@ class Checkout:
         for lock in ('requirements.lock', 'requirements-uv.lock'):
             subprocess.run(
                 [BASE_PYTHON, '-I', ROOT / 'tools/pip.py', 'download', '--quiet', '--no-deps']
-                + ['--require-hashes', '--requirement', self.root / lock, '--dest', self.wheels],
+                + ['--require-hashes', '--requirement', self.root / LOCKS / lock, '--dest', self.wheels],
                 check=True,
             )
 
     def lock(self, *names: str, group: str = '') -> None:
         """Write a lock of these packages, or of all."""
-        file = self.root / f'requirements{group and f"-{group}"}.lock'
+        file = self.root / LOCKS / f'requirements{group and f"-{group}"}.lock'
         header = f'# Every wheel exists for Python 3.14 {HERE}\n'
         file.write_text(header + ''.join(self.pins[name] for name in names or self.pins))
 
@@ -161,7 +164,7 @@ def test_a_group_is_kept_once_it_was_asked_for(checkout):
 
 def test_a_wrong_hash_installs_nothing_and_the_next_call_repairs(checkout):
     checkout.lock()
-    lock = checkout.root / 'requirements.lock'
+    lock = checkout.root / LOCKS / 'requirements.lock'
     lock.write_text(re.sub(r'sha256:\w+', f'sha256:{"0" * 64}', lock.read_text()))
     (checkout.root / '.venv/set_up.stamp').unlink(missing_ok=True)
     answer = checkout.set_up()
@@ -218,7 +221,8 @@ def test_without_venv_it_says_what_to_install(tmp_path):
 def test_without_a_usable_python_it_says_which(tmp_path, checkout):
     one = Checkout(tmp_path)
     one.wheels = checkout.wheels
-    (one.root / 'requirements.lock').write_text('# Every wheel exists for Python 3.14\n')
+    lock = one.root / LOCKS / 'requirements.lock'
+    lock.write_text('# Every wheel exists for Python 3.14\n')
     answer = one.set_up(UV_OFFLINE='1')
     assert answer.returncode == 1
     assert last_line(answer).startswith('No usable Python 3.14 to 3.14 is on the PATH')
