@@ -19,7 +19,7 @@ class: set_up ## see the guesses of a class as they come: LAN=yes lets students 
 test: set_up lint ## lint, tests of the helpers, every notebook compared with its saved outputs
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(PYTEST_ARGS)
 
-test-tools: set_up ## the tools: an installation from nothing, two machines, the licences
+test-tools: set_up ## the tools: an installation from nothing, a new lesson, two machines
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/tools $(PYTEST_ARGS)
 
 test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour: LESSON=lose_messages for one
@@ -67,8 +67,8 @@ soak: set_up ## before a release, as root: run the notebooks in hard conditions;
 	@$(PYTHON) -m tools.soak $(if $(CONDITIONS),--conditions $(CONDITIONS)) $(if $(LESSON),--lesson "$(LESSON)")
 
 bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="20 200" for some rates
-	@$(PYTHON) -m benchmarks $(ONLY)
-	@$(PYTHON) -m benchmarks.start
+	@PYTHONPATH=tests $(PYTHON) -m benchmarks $(ONLY)
+	@PYTHONPATH=tests $(PYTHON) -m benchmarks.start
 
 release: set_up ## make handout, site and image of a tagged commit, and say what to publish where
 	@tools/release.sh
@@ -76,11 +76,13 @@ release: set_up ## make handout, site and image of a tagged commit, and say what
 lint: set_up ## ruff: style and format of modules and notebooks
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
 
-lock: ## write requirements.lock from pyproject.toml; UPGRADE=yes takes newer versions
+lock: ## write tools/locks from pyproject.toml; UPGRADE=yes takes newer versions
 	@tools/lock.sh $(if $(filter yes,$(UPGRADE)),--upgrade)
 
-licences: set_up ## write licences.md from the lock files and what the packages say
-	@$(PYTHON) -m tools.licences
+licences: set_up ## the licence that each installed package names
+	@.venv/bin/pip-licenses --from=mixed --with-system --order=license
+	@echo 'Unknown above, named in package.xml: the packages of ROS 2.'
+	@sed -n 's/.*<license[^>]*>\([^<]*\).*/\1/p' .venv/share/*/package.xml | sort | uniq -c
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built; students' files stay
 	if [ -d .jupyter ]; then find .jupyter -mindepth 1 -maxdepth 1 ! -name hub -exec rm -rf {} +; fi

@@ -63,11 +63,9 @@ class Checkout:
     def fetch(self) -> None:
         """Fetch the packages of the locks, as `make handout OFFLINE=yes` does."""
         for lock in ('requirements.lock', 'requirements-uv.lock'):
-            subprocess.run(
-                [BASE_PYTHON, '-I', ROOT / 'tools/pip.py', 'download', '--quiet', '--no-deps']
-                + ['--require-hashes', '--requirement', self.root / LOCKS / lock, '--dest', self.wheels],
-                check=True,
-            )
+            command = [BASE_PYTHON, '-I', ROOT / 'tools/pip.py', 'download', '--quiet', '--no-deps']
+            command += ['--require-hashes', '--requirement', self.root / LOCKS / lock]
+            subprocess.run([*command, '--dest', self.wheels], check=True)
 
     def lock(self, *names: str, group: str = '') -> None:
         """Write a lock of these packages, or of all."""

@@ -45,7 +45,6 @@ DOCUMENTS = (
     *CLASSROOM,
     'CONTRIBUTING',
     'tools/UPGRADING',
-    'licences',
 )
 FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')

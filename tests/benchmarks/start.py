@@ -1,6 +1,6 @@
 """From a fresh clone with empty caches to JupyterLab's answer, beside the packages asked for alone.
 
-    python -m benchmarks.start [ROUNDS]        on an idle machine, with a network
+    PYTHONPATH=tests python -m benchmarks.start [ROUNDS]        on an idle machine, with a network
 
 No number fails: a reader judges the ratios. Neither side has uv in a cache. The reference is given
 uv; a course that must fetch it pays for that.
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pandas as pd
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = "jupyterlab nbval 'ros-jazzy-rclpy[fastrtps]==7.1.6' ros-jazzy-common-interfaces==5.3.6"
 LAB = '--no-browser --ServerApp.port={port} --ServerApp.port_retries=0 --allow-root'
 COMMANDS = {
