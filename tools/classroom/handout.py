@@ -28,7 +28,7 @@ from tools.lessons.lesson import ROOT, tags
 NAME = 'ros2_notebooks'
 LOCK = 'tools/locks/requirements.lock'
 WHEELS = 'wheels'
-LEFT_OUT = ('tests', '.ci', '.github', 'tools/classroom/hub', 'tools/soak')
+LEFT_OUT = ('tests', '.ci', '.github', 'tools/classroom/hub')
 NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', re.DOTALL)
 GLIBC = ('_2_28', '_2_27', '_2_26', '_2_24', '_2_17', '_2_12', '_2_5', '2014', '2010', '1')
 

@@ -24,6 +24,7 @@ FOLDER = ROOT / 'notebooks'
 START, GLOSSARY = '00', '99'  # the notebooks that are no lessons
 PARTS = ('nodes', 'packages', 'robot')
 NOTE = 'For the instructor'
+LONGEST_NAME = 40  # letters of a cell's first line that are enough to find it
 
 
 @dataclass(frozen=True)
@@ -135,6 +136,16 @@ def tags(cell: NotebookNode) -> set[str]:
     return set(cell.metadata.get('tags', []))
 
 
+def called(cell: NotebookNode) -> str:
+    """Return how a cell is called: by its first words, and by its id.
+
+    JupyterLab finds the words with Ctrl+F, and the id at the end of its address, such as
+    02_lose_messages.ipynb#cell-id=check-02-1.
+    """
+    words = next((line.strip() for line in cell.source.splitlines() if line.strip()), '')
+    return f'"{words[:LONGEST_NAME]}" ({cell.id})'
+
+
 def minutes_of_note(source: str) -> int:
     """Return the minutes that a note for the instructor names; 0 for what is none."""
     found = re.match(rf'{NOTE}: (\d+) minutes', source)
@@ -164,19 +175,24 @@ def lessons(folder: Path = FOLDER) -> list[Lesson]:
     return [read(path.read_text(encoding='utf-8'), path.name) for path in paths(folder)]
 
 
-def chosen(numbers: str, folder: Path = FOLDER) -> list[Path]:
-    """Return the notebooks with these numbers, such as '02 03'; all of them for an empty text.
+def chosen(words: str, folder: Path = FOLDER) -> list[Path]:
+    """Return the notebooks with these numbers or names, such as '02 set_parameters'.
 
-    Raises ValueError if a number is not that of exactly one notebook.
+    An empty text chooses all. Raises ValueError if a word is not that of exactly one notebook.
     """
     known = paths(folder)
     if not known:
         raise ValueError(f'There is no notebook in {folder}.')
-    found = []
-    for number in numbers.split():
-        match = [path for path in known if path.name.startswith(f'{number:0>2}_')]
+    notebooks = set()
+    for word in words.split():
+        number = f'{word:0>2}'
+        match = [
+            path for path in known if word in (path.stem, path.stem[3:]) or number == path.stem[:2]
+        ]
         if len(match) != 1:
-            names = ', '.join(path.name[:2] for path in known)
-            raise ValueError(f'There is no single lesson {number!r}. Give one of {names}.')
-        found += match
-    return sorted(set(found)) or known
+            names = ', '.join(path.stem for path in known)
+            raise ValueError(
+                f'There is no single lesson {word!r}. Give a number or a name: {names}.'
+            )
+        notebooks |= {*match}
+    return sorted(notebooks) or known
