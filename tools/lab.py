@@ -22,7 +22,9 @@ def parser(description: str) -> argparse.ArgumentParser:
     """Return a parser of the options that `open_lab` takes."""
     options = argparse.ArgumentParser(description=description)
     options.add_argument('--root', type=Path, default=ROOT, help='the folder that JupyterLab shows')
-    options.add_argument('--port', help='this port or none; otherwise the first free one from 8888 on')
+    options.add_argument(
+        '--port', help='this port or none; otherwise the first free one from 8888 on'
+    )
     options.add_argument('--no-browser', dest='browser', action='store_false')
     options.add_argument(
         '--outputs', action='store_true', help='show lessons with the outputs of the repository'

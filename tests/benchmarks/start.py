@@ -65,7 +65,9 @@ def start(command: str) -> dict[str, float]:
 
 if __name__ == '__main__':
     rounds = int(sys.argv[1]) if sys.argv[1:] else 3
-    found = [{'what': c} | start(w) for _ in range(rounds) for c, w in COMMANDS.items()]
-    medians = pd.DataFrame(found).groupby('what', sort=False).median()
+    starts = [
+        {'command': name} | start(words) for _ in range(rounds) for name, words in COMMANDS.items()
+    ]
+    medians = pd.DataFrame(starts).groupby('command', sort=False).median()
     medians.loc['ratio'] = medians.iloc[0] / medians.iloc[1]
-    print(pd.DataFrame(found).to_string(), medians.to_string(), sep='\n\n')
+    print(pd.DataFrame(starts).to_string(), medians.to_string(), sep='\n\n')

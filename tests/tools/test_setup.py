@@ -107,9 +107,9 @@ class Checkout:
 
 @pytest.fixture(scope='module')
 def checkout(tmp_path_factory):
-    found = Checkout(tmp_path_factory.mktemp('set_up'))
-    found.fetch()
-    return found
+    checkout = Checkout(tmp_path_factory.mktemp('set_up'))
+    checkout.fetch()
+    return checkout
 
 
 ALL = ['iniconfig', 'pluggy', 'ros2-notebooks']
@@ -188,43 +188,43 @@ def test_a_moved_checkout_is_made_anew(checkout):
 
 
 def test_packages_that_came_along_are_enough(tmp_path, checkout):
-    one = Checkout(tmp_path)
-    shutil.copytree(checkout.wheels, one.root / 'wheels', ignore=lambda *_: ['cache'])
-    (one.root / 'wheels/pythons').write_text(HERE)
+    offline = Checkout(tmp_path)
+    shutil.copytree(checkout.wheels, offline.root / 'wheels', ignore=lambda *_: ['cache'])
+    (offline.root / 'wheels/pythons').write_text(HERE)
     nowhere = {'UV_DEFAULT_INDEX': 'http://127.0.0.1:9/', 'PIP_FIND_LINKS': '/nowhere'}
-    answer = one.set_up(**nowhere, PIP_NO_INDEX='0')
+    answer = offline.set_up(**nowhere, PIP_NO_INDEX='0')
     assert answer.returncode == 0, answer.stderr
-    assert one.installed() == ALL
+    assert offline.installed() == ALL
 
 
 # --- One sentence says what to do ----------------------------------------------------------------
 
 
 def test_without_a_python_it_says_what_to_install(tmp_path):
-    one = Checkout(tmp_path)
+    checkout = Checkout(tmp_path)
     for name in ('python3', 'python3.14'):
-        (one.bin / name).unlink()
-    assert last_line(one.set_up()).startswith('No Python is on the PATH: install one')
+        (checkout.bin / name).unlink()
+    assert last_line(checkout.set_up()).startswith('No Python is on the PATH: install one')
 
 
 def test_without_venv_it_says_what_to_install(tmp_path):
-    one = Checkout(tmp_path)
+    checkout = Checkout(tmp_path)
     # What Debian's python3 is without the package python3-venv, and without pip.
-    put(one.bin, 'python3', f'case $* in *pip*) exit 1 ;; esac; exec "{BASE_PYTHON}" "$@"')
-    assert last_line(one.set_up()) == (
+    put(checkout.bin, 'python3', f'case $* in *pip*) exit 1 ;; esac; exec "{BASE_PYTHON}" "$@"')
+    assert last_line(checkout.set_up()) == (
         'python3 has no pip and no venv: run `sudo apt install python3-venv`, then try again.'
     )
 
 
 def test_without_a_usable_python_it_says_which(tmp_path, checkout):
-    one = Checkout(tmp_path)
-    one.wheels = checkout.wheels
-    lock = one.root / LOCKS / 'requirements.lock'
+    unlucky = Checkout(tmp_path)
+    unlucky.wheels = checkout.wheels
+    lock = unlucky.root / LOCKS / 'requirements.lock'
     lock.write_text('# Every wheel exists for Python 3.14\n')
-    answer = one.set_up(UV_OFFLINE='1')
+    answer = unlucky.set_up(UV_OFFLINE='1')
     assert answer.returncode == 1
     assert last_line(answer).startswith('No usable Python 3.14 to 3.14 is on the PATH')
-    answer = one.set_up('--python', '3.9')
+    answer = unlucky.set_up('--python', '3.9')
     assert last_line(answer) == 'Not every pinned package has a wheel for Python 3.9.'
 
 
@@ -236,9 +236,9 @@ def test_without_a_network_it_says_what_to_check(tmp_path):
 
 
 def test_another_machine_is_sent_to_environment_md(tmp_path):
-    one = Checkout(tmp_path)
-    put(one.bin, 'uname', 'echo Linux aarch64')
-    assert 'environment.md says what to do on other machines' in last_line(one.set_up())
+    checkout = Checkout(tmp_path)
+    put(checkout.bin, 'uname', 'echo Linux aarch64')
+    assert 'environment.md says what to do on other machines' in last_line(checkout.set_up())
 
 
 # --- make ----------------------------------------------------------------------------------------

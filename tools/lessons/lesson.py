@@ -75,8 +75,8 @@ class Lesson:
     @property
     def leave_out(self) -> str:
         """What a class leaves out first when time runs out; empty where nothing is named."""
-        found = re.search(r'^When time runs out, leave out: (.+)$', self._class_note, re.MULTILINE)
-        return found[1] if found else ''
+        line = re.search(r'^When time runs out, leave out: (.+)$', self._class_note, re.MULTILINE)
+        return line[1] if line else ''
 
     @property
     def next_link(self) -> str:
@@ -92,21 +92,21 @@ class Lesson:
     @cached_property
     def steps(self) -> list[str]:
         """The step of each cell, such as `1`; empty before the first one."""
-        found, step = [], ''
+        steps, step = [], ''
         for cell in self.notebook.cells:
             if heading := re.match(r'## (\w+)', cell.source):
                 step = heading[1]
-            found.append(step)
-        return found
+            steps.append(step)
+        return steps
 
     @cached_property
     def minutes_by_step(self) -> dict[str, int]:
         """The minutes of the instructor's notes: `1`, `2`, ... to their sum."""
-        found: dict[str, int] = {}
+        minutes_by_step: dict[str, int] = {}
         for cell, step in zip(self.notebook.cells, self.steps, strict=True):
             if minutes := minutes_of_note(cell.source):
-                found[step] = found.get(step, 0) + minutes
-        return found
+                minutes_by_step[step] = minutes_by_step.get(step, 0) + minutes
+        return minutes_by_step
 
     def minutes_of(self, steps: tuple[int, int] | None) -> int:
         """Return the minutes of some steps, the first and the last one, or of the whole lesson."""
@@ -125,14 +125,13 @@ class Lesson:
     def _class_note(self) -> str:
         return '\n'.join(cell.source for cell in self.notebook.cells if cell.cell_type == 'raw')
 
-    def _find(self, pattern: str, text: str, what: str) -> re.Match:
-        if found := re.search(pattern, text, re.MULTILINE):
-            return found
-        raise ValueError(f'{self.file} needs a {what}.')
+    def _find(self, pattern: str, text: str, missing: str) -> re.Match:
+        if match := re.search(pattern, text, re.MULTILINE):
+            return match
+        raise ValueError(f'{self.file} needs a {missing}.')
 
 
 def tags(cell: NotebookNode) -> set[str]:
-    """Return the tags of a cell."""
     return set(cell.metadata.get('tags', []))
 
 
@@ -148,8 +147,8 @@ def called(cell: NotebookNode) -> str:
 
 def minutes_of_note(source: str) -> int:
     """Return the minutes that a note for the instructor names; 0 for what is none."""
-    found = re.match(rf'{NOTE}: (\d+) minutes', source)
-    return int(found[1]) if found else 0
+    minutes = re.match(rf'{NOTE}: (\d+) minutes', source)
+    return int(minutes[1]) if minutes else 0
 
 
 def first_heading(text: str) -> str:
