@@ -19,7 +19,6 @@ FIRST = 'lab/tree/notebooks/00_start_here.ipynb'
 
 
 def parser(description: str) -> argparse.ArgumentParser:
-    """Return a parser of the options that `open_lab` takes."""
     options = argparse.ArgumentParser(description=description)
     options.add_argument('--root', type=Path, default=ROOT, help='the folder that JupyterLab shows')
     options.add_argument(

@@ -152,7 +152,6 @@ def minutes_of_note(source: str) -> int:
 
 
 def first_heading(text: str) -> str:
-    """Return the words of the heading with which a text begins."""
     return text.splitlines()[0].lstrip('# ')
 
 
@@ -165,12 +164,10 @@ def read(text: str, file: str) -> Lesson:
 
 
 def paths(folder: Path = FOLDER) -> list[Path]:
-    """Return the notebooks of a folder, in teaching order."""
     return sorted(folder.glob('*.ipynb'))
 
 
 def lessons(folder: Path = FOLDER) -> list[Lesson]:
-    """Return what the notebooks of a folder hold, in teaching order."""
     return [read(path.read_text(encoding='utf-8'), path.name) for path in paths(folder)]
 
 

@@ -164,7 +164,6 @@ def to_look_at(texts: tables.Texts, numbers: set[str]) -> list[str]:
 
 
 def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
-    """Run the tool; return its exit status."""
     parser = argparse.ArgumentParser(description='Add a lesson, or take one out.')
     parser.add_argument('name', help='for example count_the_losses; to remove, also a number')
     parser.add_argument('--after', default='', metavar='LESSON', help='the lesson before it')

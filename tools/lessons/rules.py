@@ -59,7 +59,6 @@ def texts(cell: NotebookNode) -> Iterator[str]:
 
 
 def printed(cells: list[NotebookNode], start: str) -> int:
-    """Return how many lines of the cells' text outputs start with `start`."""
     lines = [line for cell in cells for text in texts(cell) for line in text.splitlines()]
     return sum(line.startswith(start) for line in lines)
 

@@ -133,7 +133,6 @@ def update(path: Path) -> bool:
 
 
 def main(arguments: list[str], root: Path = ROOT) -> int:
-    """Run the tool with the numbers of lessons; return its exit status."""
     try:
         paths = chosen(' '.join(arguments), root / 'notebooks')
         texts = tables.texts_of(root)

@@ -40,7 +40,6 @@ def texts_of(root: Path = ROOT) -> Texts:
 
 
 def lessons_of(texts: Texts) -> list[Lesson]:
-    """Return the notebooks among some texts, in teaching order."""
     return [read(texts[path], Path(path).name) for path in sorted(texts) if path.endswith('.ipynb')]
 
 

@@ -150,7 +150,6 @@ def _linked(pages: Path) -> set[str]:
 
 
 def _parts(known: list[Lesson]) -> dict[str, list[str]]:
-    """Return the pages by the parts of the table of contents."""
     parts: dict[str, list[str]] = {'Start': []} | {part.capitalize(): [] for part in PARTS}
     names = {START: 'Start', GLOSSARY: 'Terms'}
     for lesson in known:
@@ -167,7 +166,6 @@ def _first_page() -> str:
 
 
 def main() -> int:
-    """Write the site; return the exit status."""
     pages, built, site = WORK / 'pages', WORK / 'built', ROOT / 'site'
     try:
         prepare(pages)
