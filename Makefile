@@ -69,8 +69,8 @@ soak: set_up ## before a release, as root: run the notebooks in hard conditions;
 	@tests/soak/run.sh "$(CONDITIONS)" "$(LESSON)"
 
 bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="20 200" for some rates
-	@PYTHONPATH=tests $(PYTHON) -m benchmarks $(ONLY)
-	@PYTHONPATH=tests $(PYTHON) -m benchmarks.start
+	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks $(ONLY)
+	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks.start
 
 release: set_up ## make handout, site and image of a tagged commit, and say what to publish where
 	@tools/release.sh
