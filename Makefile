@@ -88,7 +88,7 @@ licences: set_up ## the licence that each installed package names
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built; students' files stay
 	if [ -d .jupyter ]; then find .jupyter -mindepth 1 -maxdepth 1 ! -name hub -exec rm -rf {} +; fi
-	rm -rf .venv .uv .soak scratch handout site .site .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv .uv scratch handout site .site .hypothesis .pytest_cache .ruff_cache
 	find . \( -name .git -o -path ./my_lessons -o -path ./presentation -o -path ./.jupyter/hub \) -prune -o \
 		\( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
