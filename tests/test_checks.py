@@ -232,7 +232,7 @@ import threading
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from helpers.checks import check
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 loops, counted = True, []
 

@@ -25,8 +25,7 @@ from IPython import get_ipython
 from IPython.core.error import UsageError
 
 from helpers.checks import classroom, progress
-from helpers.notebook.kernel import can_ask
-from helpers.notebook.text import wrap
+from helpers.notebook import can_ask, wrap
 
 NO_GUESS = 'No guess yet. Write one in place of the three dots, run that cell, then this one again.'
 ENDLESS = 'it did not end. Is there an endless loop, or a spin() that never returns?'

@@ -12,7 +12,7 @@ import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -26,20 +26,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter
-from helpers.fusion.messages import (
-    ON_THE_FLOOR,
-    from_odometry,
-    odometry_message,
-    quaternion,
-    seconds_of,
-    stamp_of,
-    table_of,
-    yaw_of,
-)
-from helpers.ros.session import ros_session
-
-if TYPE_CHECKING:
-    from helpers.robot import Robot
+from helpers.fusion.messages import from_odometry, table_of
+from helpers.robot import EMPTY, ON_THE_FLOOR, Pose, Robot, odometry_message, trip
+from helpers.ros import quaternion, ros_session, seconds_of, stamp_of, yaw_of
 
 # The 15 numbers of each `..._config` and covariance, in their order.
 PARTS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw', 'vx', 'vy', 'vz', 'vroll', 'vpitch', 'vyaw')
@@ -291,8 +280,6 @@ def localize(
     """
     from tf2_msgs.msg import TFMessage
 
-    from helpers.robot import EMPTY, Pose, Robot
-
     heard: dict[str, list] = {'ekf_odom': [], 'ekf_map': []}
     frames: dict[str, tuple[str, str, str]] = {}
 
@@ -325,12 +312,3 @@ def localize(
         pd.DataFrame(list(frames.values()), columns=['parent', 'child', 'publisher']),
         *of_filters,
     )
-
-
-def trip(robot: Robot, *executors, seconds: float = 60.0) -> None:
-    """Drive a robot in sim time as `simulate` does: to and fro, to the left and to the right."""
-    for tenth in range(round(seconds * 10)):
-        t = tenth / 10
-        v = 0.5 * min(t, 2) + 0.75 * (math.sin(0.4 * t) - math.sin(0.8)) * (t > 2)
-        robot.command(v, 0.05 + 0.3 * math.sin(0.2 * t))
-        robot.run(0.1, *executors)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 
-from helpers.notebook.values import shown
+from helpers.notebook import chosen, shown
 
 
 def positive(name: str, value, or_zero: bool = False) -> float:
@@ -23,16 +23,6 @@ def some_of(name: str, given: Sequence[str], allowed: Iterable[str]) -> None:
         raise ValueError(
             f'{name} must be a list of some of {", ".join(allowed)}, not {shown(given)}.'
         )
-
-
-def chosen(name: str, given: Mapping | None, allowed: Iterable[str]) -> dict:
-    """Return a dict (None: an empty one) whose keys are all allowed."""
-    if not isinstance(given, Mapping | None):
-        raise TypeError(f'{name} must be a dict, not {shown(given)}.')
-    for key in given or {}:
-        if key not in allowed:
-            raise ValueError(f'{name} can name {", ".join(allowed)}, not {shown(key)}.')
-    return dict(given or {})
 
 
 def variances(

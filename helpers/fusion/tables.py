@@ -14,20 +14,8 @@ import pandas as pd
 
 from helpers.fusion import settings
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter, Innovation, part_of_state
-from helpers.notebook.values import check_columns, column_of_numbers
-
-# The variance of the noise of each column, per axis. `vy` is no column: wheels that cannot move
-# sideways say 0.
-VARIANCES = {
-    'vx': 0.0025,
-    'vy': 0.01,
-    'vyaw': 0.0025,
-    'imu_yaw': 0.0004,
-    'imu_vyaw': 0.0001,
-    'ax': 0.01,
-    'gps_x': 0.25,
-    'gps_y': 0.25,
-}
+from helpers.notebook import check_columns, chosen, column_of_numbers
+from helpers.robot import VARIANCES
 
 # What a row says, in the order in which it is applied: each message has the column of each part of
 # the state that it measures. The IMU's parts are applied one after the other.
@@ -119,10 +107,10 @@ def _innovations(steps: list[_Step]) -> pd.DataFrame:
 
 def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -> list[_Step]:
     """Feed the rows to a filter. A message of which one number is NaN is left out."""
-    settings.chosen('options', options, ('process_noise', 'variances', 'config', 'gate'))
+    chosen('options', options, ('process_noise', 'variances', 'config', 'gate'))
     ekf = ExtendedKalmanFilter(options.get('process_noise'))
     variances = settings.variances('variances', options.get('variances'), VARIANCES)
-    gates = settings.chosen('gate', options.get('gate'), SENSORS)
+    gates = chosen('gate', options.get('gate'), SENSORS)
     gates = {sensor: settings.positive(f'gate[{sensor!r}]', gates[sensor]) for sensor in gates}
     messages = _messages(sensors, options.get('config'))
     table = _table(measurements, {name for _, parts in messages for name in parts.values()})
@@ -152,7 +140,7 @@ def _messages(sensors: Iterable[str], config) -> list[tuple[str, dict[str, str]]
     """Return the messages of the sensors, without the parts that are not to be used."""
     sensors = sensors if isinstance(sensors, str) else tuple(sensors)
     settings.some_of('sensors', sensors, SENSORS)
-    config = settings.chosen('config', config, SENSORS)
+    config = chosen('config', config, SENSORS)
     for sensor, names in config.items():
         can = [name for parts in MESSAGES[sensor] for name in parts]
         settings.some_of(f'config[{sensor!r}]', names, can)

@@ -1,7 +1,7 @@
 """Is this machine ready for the notebooks, and if not, what to do.
 
-`python -m helpers.machine.doctor` prints a table of checks. It exits with 1 if a required one fails.
-It runs on Python 3.10 and newer, and with any installation of ROS 2, also with none.
+`python -m helpers.machine.doctor` prints a table of checks. It exits with 1 if a required one
+fails. It runs on Python 3.10 and newer, and with any installation of ROS 2, also with none.
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from helpers.machine.build_tools import build_tools, from_wheels
-from helpers.notebook.interrupts import uninterrupted
-from helpers.notebook.text import table
+from helpers.machine.build_tools import from_wheels, tools_of_a_build
+from helpers.notebook import table, uninterrupted
 
 JAZZY = '7.1.'  # the versions of rclpy in ROS 2 Jazzy
 SHARED_MEMORY = Path('/dev/shm')
@@ -107,7 +106,7 @@ def _why_import_failed(trial: subprocess.CompletedProcess[str]) -> tuple[str, st
 
 def check_domain() -> Check:
     """Reserve this process's domain id."""
-    from helpers.ros.session import graph_environment
+    from helpers.ros import graph_environment
 
     name = 'domain and discovery'
     try:
@@ -140,7 +139,7 @@ def _seconds_to_hear() -> float:
     from rclpy.qos import DurabilityPolicy, QoSProfile
     from std_msgs.msg import String
 
-    from helpers.ros.session import ros_session
+    from helpers.ros import ros_session
 
     # Transient local: the message arrives also if discovery ends after publish().
     qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -182,7 +181,7 @@ def _more_shared_memory() -> str:
 def check_build_tools() -> list[Check]:
     """Check that what builds packages is there, and runs."""
     rows = []
-    for tool in build_tools():
+    for tool in tools_of_a_build():
         found, to_do = tool.found, f'to build packages in the lessons, run `{tool.install}`'
         if os.path.isabs(found):  # a command
             found = _run([found, '--version']).stdout.partition('\n')[0]

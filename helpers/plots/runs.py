@@ -20,7 +20,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
-from helpers.notebook.values import check_table, natural
+from helpers.notebook import check_table, natural
 from helpers.plots.alt_text import describe
 from helpers.plots.style import (
     DPI,

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 
-from helpers.notebook.look import LOOK
+from helpers.notebook import LOOK
 
 HEARD, LOST, WAITING, ROBOT, INK, PALE = (
     LOOK[name] for name in ('heard', 'lost', 'waiting', 'robot', 'ink', 'line')

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import pandas as pd
 from rclpy.service import Service
 
-from helpers.notebook.values import RUN_COLUMNS
+from helpers.notebook import RUN_COLUMNS
 
 
 def number_of(message) -> int:
@@ -150,7 +150,7 @@ class Recording:
         Raises ValueError for a count below 1, TimeoutError after `timeout_s` seconds, and the
         exception of a callback that failed.
         """
-        from helpers.ros.session import current_session
+        from helpers.ros import current_session
 
         __tracebackhide__ = True
         if messages < 1:

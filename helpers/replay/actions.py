@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from helpers.notebook.values import check_count
-from helpers.recording.recording import CallbackRecording
-from helpers.replay import Replay
+from helpers.notebook import check_count
+from helpers.recording import CallbackRecording
 from helpers.replay.recorded import GO, Callback, Move, count_of, moves_of, run_of
+from helpers.replay.replays import Replay
 
 REQUESTS = {'goal': 'send_goal', 'cancel': 'cancel_goal'}  # in `Waitable.execute`, and the service
 SAYS = 'publish_feedback', 'succeed', 'canceled', 'abort'  # methods of a goal handle

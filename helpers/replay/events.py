@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from helpers.recording.queue_model import take_bounds
+from helpers.recording import take_bounds
 
 ARRIVE, TAKE, END = 'arrive', 'take', 'end'
 

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
-from helpers.notebook.values import shown
+from helpers.notebook import shown
 from helpers.replay.script import played
 
 SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'element.js', 'board.js', 'level.js'

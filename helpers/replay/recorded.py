@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 
-from helpers.recording.recording import CallbackRecording, CallbackRun
-from helpers.replay import KINDS, Run, fill_up
+from helpers.recording import CallbackRecording, CallbackRun
 from helpers.replay.events import ARRIVE, END, TAKE
+from helpers.replay.replays import KINDS, Run, fill_up
 
 DEPTH = 10  # of services and clients, by default; a timer's tick is taken when it is recorded
 GO = 'go'

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -12,25 +11,22 @@ from geometry_msgs.msg import TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.time import Time
-from rclpy.utilities import get_default_context
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan, NavSatFix
 from std_msgs.msg import Bool, Header
 from std_srvs.srv import Trigger
 
-from helpers.fusion.messages import START_NS, quaternion
-from helpers.notebook.interrupts import uninterrupted
+from helpers.notebook import uninterrupted
 from helpers.robot import messages
 from helpers.robot.body import RATE_HZ, Body, wrapped
 from helpers.robot.floor import EMPTY, Floor, Pose
 from helpers.robot.record import Command, DriveRecord, Event, Scan, Step
 from helpers.robot.sensors import Sensors
-from helpers.ros.session import current_session, find
+from helpers.ros import START_NS, current_session, quaternion
 
 # RELIABLE, which both kinds of subscriptions hear, as a TurtleBot 3 in Gazebo has it. The drivers
 # of its real lasers are BEST_EFFORT.
@@ -87,7 +83,7 @@ class Robot(Node):
         self._sensors = Sensors(seed, noise, slip, mounting)
         if spin:
             session = current_session()
-            check_names(name, namespace.strip('/'))
+            check_names(session.node, name, namespace.strip('/'))
         super().__init__(name, namespace=namespace)
         self.floor, self.sim_time, self.record = floor, sim_time, DriveRecord(floor)
         self._arrived: list[Command] = []
@@ -129,7 +125,7 @@ class Robot(Node):
         self._remote = None
         try:
             from tf2_msgs.msg import TFMessage
-        except ImportError:  # the wheels lack it: see helpers.fusion.tf2_msgs
+        except ImportError:  # the wheels lack it: see provide_tf2_msgs of helpers.workspace
             return
         # Where its parts are on it, a robot_state_publisher knows from the URDF.
         self._topics['/tf'] = self._publisher(TFMessage, '/tf')
@@ -328,17 +324,18 @@ class Robot(Node):
             self.get_logger().warning(text)
 
 
-def check_names(name: str, namespace: str) -> None:
-    """Raise ValueError for names that are taken, before a node spoils those of another."""
-    for node in find(Node, get_default_context()):  # each sees the same: the session has one
-        with contextlib.suppress(InvalidHandle):  # it was destroyed
-            if (name, f'/{namespace}') in node.get_node_names_and_namespaces():
-                raise ValueError(
-                    f'There is a node {name} already: give this robot another name and namespace, '
-                    "as in Robot(name='robot_2', namespace='two')."
-                )
-            for _, sentence in other_types(node, namespace):
-                raise ValueError(sentence)
+def check_names(node: Node, name: str, namespace: str) -> None:
+    """Raise ValueError for names that are taken, before a robot spoils those of another.
+
+    `node` is asked which there are.
+    """
+    if (name, f'/{namespace}') in node.get_node_names_and_namespaces():
+        raise ValueError(
+            f'There is a node {name} already: give this robot another name and namespace, '
+            "as in Robot(name='robot_2', namespace='two')."
+        )
+    for _, sentence in other_types(node, namespace):
+        raise ValueError(sentence)
 
 
 def other_types(node: Node, namespace: str) -> Iterator[tuple[str, str]]:

@@ -15,8 +15,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from helpers.notebook.interrupts import uninterrupted
-from helpers.ros.connections import NOT_OF_A_LESSON, nearly
+from helpers.notebook import uninterrupted
+from helpers.ros import NOT_OF_A_LESSON, nearly
 from helpers.workspace.folders import locks
 
 STOP_TIMEOUT_S = 5.0

@@ -10,8 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from helpers.machine.build_tools import build_environment
-from helpers.notebook.interrupts import uninterrupted
+from helpers.machine import build_environment
+from helpers.notebook import uninterrupted
 
 SOURCE_TIMEOUT_S = 20.0
 

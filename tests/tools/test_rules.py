@@ -107,7 +107,7 @@ ADDED = [
     ('pictures_described', shown(text_html=f'<img {ALT}> <img {ALT}>')),
     ('pictures_described', shown(image_png='iVBO')),
     ('pictures_described', new_markdown_cell('![](images/b.png)')),
-    ('imports_what_is_public', code('from helpers.notebook.text import table')),
+    ('imports_from_doors', code('from helpers.notebook.text import table')),
     ('names_stay', code('my_guess = 0')),
     ('names_stay', code('%time 1\nfor my_guess in [0]:\n    run()')),
     ('steps_begin_cells', new_markdown_cell('So it is.\n\n## 7. Next')),

@@ -12,7 +12,7 @@ from tools.soak import __main__ as soak
 LEAVES = """
     import subprocess, threading
     from pathlib import Path
-    from helpers.ros.session import ros_session
+    from helpers.ros import ros_session
     threading.Thread(target=threading.Event().wait, args=[60], name='mine').start()
     _ = ros_session().__enter__()
     # Its parent ends at once.

@@ -29,7 +29,7 @@ PATH = re.compile(
     r'|\b[A-Z]:\\\S+|(?<!\S)(?!python3/)\S*(?:site|dist)-packages\S*|'
     + '|'.join(rf'{re.escape(folder)}\b' for folder in sorted(THIS_MACHINE))
 )
-PRIVATE = re.compile(r'^\s*(?:from|import) (helpers\._\w+)', re.MULTILINE)
+BEHIND_A_DOOR = re.compile(r'^\s*(?:from|import) (helpers\.(\w+)\.\w+)', re.MULTILINE)
 Rule = Callable[[Lesson], Iterator[str]]
 
 
@@ -148,10 +148,10 @@ def pictures_described(lesson: Lesson) -> Iterator[str]:
 # Cells
 
 
-def imports_what_is_public(lesson: Lesson) -> Iterator[str]:
+def imports_from_doors(lesson: Lesson) -> Iterator[str]:
     for name, cell in code_cells(lesson):
-        if found := PRIVATE.search(cell.source):
-            yield f'{name} imports {found[1]}: a lesson imports what helpers offer.'
+        if found := BEHIND_A_DOOR.search(cell.source):
+            yield f'{name} imports {found[1]}: a lesson imports from the door, helpers.{found[2]}.'
 
 
 def names_stay(lesson: Lesson) -> Iterator[str]:
@@ -294,7 +294,7 @@ RULES: list[Rule] = [
     prints_what_stays,
     compared,
     pictures_described,
-    imports_what_is_public,
+    imports_from_doors,
     names_stay,
     steps_begin_cells,
     tagged,

@@ -6,6 +6,7 @@ import math
 from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from helpers.replay import Replay, replay
 from helpers.robot.floor import Pose
 from helpers.robot.record import DriveRecord, Event
 from helpers.robot.sensors import ANGLES, RANGE_MAX
-from helpers.robot.view.picture import described, picture
+from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
 from helpers.robot.view.scans import ScanRecording
 
 # What a notebook keeps of a drive, at most: so it stays below 60 kB.
@@ -34,6 +35,9 @@ class Drive:
     name: str = ''
     setup: None = None
 
+    scripts = (Path(__file__).with_name('drive.js'),)
+    styles = (DRIVE_CSS,)
+
     @property
     def span_s(self) -> tuple[float, float]:
         """From when to when it was recorded."""
@@ -53,7 +57,7 @@ class Drive:
         """Return the floor as an SVG at the end of the drive."""
         _, end = self.span_s
         scans = self.record_.scans
-        return picture(
+        return floor_picture(
             self.record_.floor,
             self.sampled()[1][:, :2].tolist(),
             place(self.record_, end),
@@ -65,7 +69,7 @@ class Drive:
     @property
     def words(self) -> str:
         """What its picture shows, for everybody who does not see it."""
-        return f'{self.summary} {described(self.record_.floor)}'
+        return f'{self.summary} {floor_in_words(self.record_.floor)}'
 
     def record(self) -> dict:
         """Return what drive.js needs: m and rad, and whole ms and cm (of ranges)."""

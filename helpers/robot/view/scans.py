@@ -12,7 +12,7 @@ from rclpy.time import Time
 
 from helpers.recording import Recording
 from helpers.robot.robot import Robot
-from helpers.ros.session import find
+from helpers.ros import find
 
 
 class ScanRecording(Recording):
