@@ -89,7 +89,8 @@ def test_a_door_has_what_it_names(room):
     door = import_module(f'helpers.{room}')
     assert door.__doc__
     for name in door.__all__:
-        assert getattr(door, name) is not None
+        thing = getattr(door, name)
+        assert not callable(thing) or thing.__doc__, f'{name} needs a docstring.'
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,9 @@ class _Configured(Node):
         super().__init__(
             name, cli_args=arguments, automatically_declare_parameters_from_overrides=True
         )
-        self.given = {key: one.value for key, one in self.get_parameters_by_prefix('').items()}
+        self.given = {
+            key: parameter.value for key, parameter in self.get_parameters_by_prefix('').items()
+        }
 
     def hear(self, kind: type, topic: str, callback, qos=DEPTH) -> None:
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
@@ -170,15 +172,15 @@ class EkfNode(_Configured):
         return ways[0][common[0]] - ways[1][common[0]] if common else None
 
     def _on_static(self, message) -> None:
-        for one in message.transforms:
-            yaw = yaw_of(one.transform.rotation)
-            self._parents[one.child_frame_id] = one.header.frame_id, yaw
+        for stamped in message.transforms:
+            yaw = yaw_of(stamped.transform.rotation)
+            self._parents[stamped.child_frame_id] = stamped.header.frame_id, yaw
 
     def _on_tf(self, message) -> None:
-        for one in message.transforms:
-            if (one.header.frame_id, one.child_frame_id) == ('odom', self.base):
-                place = one.transform.translation
-                self._in_odom = place.x, place.y, yaw_of(one.transform.rotation)
+        for stamped in message.transforms:
+            if (stamped.header.frame_id, stamped.child_frame_id) == ('odom', self.base):
+                place = stamped.transform.translation
+                self._in_odom = place.x, place.y, yaw_of(stamped.transform.rotation)
 
     def _publish(self) -> None:
         ekf = self.ekf
@@ -193,11 +195,11 @@ class EkfNode(_Configured):
             child, yaw = 'odom', yaw - turn
             x -= math.cos(yaw) * far - math.sin(yaw) * left
             y -= math.sin(yaw) * far + math.cos(yaw) * left
-        made = TransformStamped(child_frame_id=child)
-        made.header.stamp, made.header.frame_id = stamp_of(ekf.t), self.world
-        made.transform.translation.x, made.transform.translation.y = x, y
-        made.transform.rotation = quaternion(0, 0, yaw)
-        self._tf.publish(self._tf.msg_type(transforms=[made]))
+        stamped = TransformStamped(child_frame_id=child)
+        stamped.header.stamp, stamped.header.frame_id = stamp_of(ekf.t), self.world
+        stamped.transform.translation.x, stamped.transform.translation.y = x, y
+        stamped.transform.rotation = quaternion(0, 0, yaw)
+        self._tf.publish(self._tf.msg_type(transforms=[stamped]))
 
 
 class NavSatNode(_Configured):
@@ -285,8 +287,8 @@ def localize(
 
     def note(topic: str) -> Callable:
         return lambda message: frames.update(
-            (one.child_frame_id, (one.header.frame_id, one.child_frame_id, topic))
-            for one in message.transforms
+            (stamped.child_frame_id, (stamped.header.frame_id, stamped.child_frame_id, topic))
+            for stamped in message.transforms
         )
 
     with ros_session():

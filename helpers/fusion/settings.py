@@ -19,7 +19,7 @@ def positive(name: str, value, or_zero: bool = False) -> float:
 
 def some_of(name: str, given: Sequence[str], allowed: Iterable[str]) -> None:
     """Raise ValueError unless each name is allowed, and there is one. A str is no list of names."""
-    if isinstance(given, str) or not given or not all(one in allowed for one in given):
+    if isinstance(given, str) or not given or not all(key in allowed for key in given):
         raise ValueError(
             f'{name} must be a list of some of {", ".join(allowed)}, not {shown(given)}.'
         )
@@ -28,6 +28,5 @@ def some_of(name: str, given: Sequence[str], allowed: Iterable[str]) -> None:
 def variances(
     name: str, given: Mapping | None, defaults: Mapping[str, float], or_zero: bool = False
 ) -> dict[str, float]:
-    """Return the default variances, some of them replaced."""
     changed = chosen(name, given, defaults)
     return defaults | {key: positive(f'{name}[{key!r}]', changed[key], or_zero) for key in changed}

@@ -70,7 +70,6 @@ def fuse_with_innovations(
 
 
 def columns_of(table: pd.DataFrame, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return columns as arrays of numbers."""
     names = list(names)
     check_columns(table, names)
     return {name: column_of_numbers(table, name) for name in names}
@@ -118,13 +117,15 @@ def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -
     for sensor, parts in messages:
         values = np.column_stack([table[column] for column in parts.values()])
         noise = np.diag([variances[column] for column in parts.values()])
-        said = ~np.isnan(values).any(axis=1)
-        prepared.append((sensor, tuple(parts), part_of_state(tuple(parts)), noise, values, said))
+        is_complete = ~np.isnan(values).any(axis=1)
+        prepared.append(
+            (sensor, tuple(parts), part_of_state(tuple(parts)), noise, values, is_complete)
+        )
     steps = []
     for row, t in enumerate(table['t'].tolist()):
         heard = []
-        for sensor, names, part, noise, values, said in prepared:
-            if said[row]:
+        for sensor, names, part, noise, values, is_complete in prepared:
+            if is_complete[row]:
                 gate = gates.get(sensor)
                 innovation = ekf.process_unchecked(t, part, values[row], noise, gate)
                 if innovation is not None:
@@ -154,7 +155,6 @@ def _messages(sensors: Iterable[str], config) -> list[tuple[str, dict[str, str]]
 
 
 def _table(measurements: pd.DataFrame, columns: set[str]) -> dict[str, np.ndarray]:
-    """Return `t` and the columns as arrays."""
     if 'vy' in columns:  # no column: the wheels say 0 whenever they say vx
         columns = columns - {'vy'} | {'vx'}
     table = columns_of(measurements, ['t', *sorted(columns)])

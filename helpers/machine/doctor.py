@@ -67,10 +67,9 @@ def checks() -> list[Check]:
 
 
 def check_python() -> Check:
-    """Check the version of this Python."""
-    found = f'{platform.python_implementation()} {platform.python_version()}'
+    python = f'{platform.python_implementation()} {platform.python_version()}'
     fits = sys.implementation.name == 'cpython' and sys.version_info >= (3, 11)
-    return Check('Python', found, '' if fits else 'use CPython 3.11 or newer')
+    return Check('Python', python, '' if fits else 'use CPython 3.11 or newer')
 
 
 def check_platform(has_rclpy: bool) -> Check:
@@ -156,7 +155,6 @@ def _seconds_to_hear() -> float:
 
 
 def check_shared_memory() -> Check:
-    """Check the free space of the memory that Fast DDS shares between processes."""
     name = 'shared memory'
     if not SHARED_MEMORY.is_dir():
         return Check(name, f'no {SHARED_MEMORY} on this system', required=False)
@@ -179,7 +177,6 @@ def _more_shared_memory() -> str:
 
 
 def check_build_tools() -> list[Check]:
-    """Check that what builds packages is there, and runs."""
     rows = []
     for tool in tools_of_a_build():
         found, to_do = tool.found, f'to build packages in the lessons, run `{tool.install}`'

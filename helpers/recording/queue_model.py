@@ -81,7 +81,6 @@ class Explanation:
 
     @property
     def lost(self) -> int:
-        """How many messages were lost."""
         return len(self.losses)
 
     @property

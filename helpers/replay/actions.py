@@ -67,7 +67,7 @@ def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) 
     """
     check_count('threads', threads)
     runs = recording.runs
-    if any(len(runs[one]) != 1 for one in ('execute_callback', 'cancel_goal')):
+    if any(len(runs[name]) != 1 for name in ('execute_callback', 'cancel_goal')):
         raise ValueError('A replay shows one job and its cancel: record the run of one goal.')
     late = runs['cancel_goal'][0].started_s > runs['execute_callback'][0].finished_s
     taken = 'is taken when the job has ended' if late else 'is taken while the job runs'

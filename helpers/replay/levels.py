@@ -59,11 +59,10 @@ class Level:
         return f'A level to play: {self.task}'
 
     def html(self) -> str:
-        """Return the level as a part of a page."""
         record = {
             'goal': self.goal,
             'options': [{'name': name, 'values': of} for name, of in self.options.items()],
-            'variants': [vars(one) for one in self.variants().values()],
+            'variants': [vars(variant) for variant in self.variants().values()],
         }
         return played('level', record, self.task, *SCRIPT)
 

@@ -58,11 +58,9 @@ class Run:
 
     @property
     def words(self) -> str:
-        """What its picture shows, for everybody who does not see it."""
         return self.summary + ROWS_IN_WORDS + (CROSSES_IN_WORDS if self.lost else '')
 
     def record(self) -> dict:
-        """Return what the script needs."""
         return {name: getattr(self, name) for name in ('name', 'setup', 'moves')}
 
 

@@ -63,32 +63,32 @@ def _six_by_six(covariance: np.ndarray) -> np.ndarray:
     return full.ravel()
 
 
-def odometry(header: Header, child_frame: str, pose: Pose, said: dict[str, float]) -> Odometry:
+def odometry(header: Header, child_frame: str, pose: Pose, readings: dict[str, float]) -> Odometry:
     """Return where the wheels think that the robot is, in their own frame, and how fast."""
-    state = *pose, said['vx'], 0.0, said['vyaw']
+    state = *pose, readings['vx'], 0.0, readings['vyaw']
     message = odometry_message(0.0, header.frame_id, state, POSE_COVARIANCE, TWIST_COVARIANCE)
     message.header, message.child_frame_id = header, child_frame
     return message
 
 
-def imu(header: Header, said: dict[str, float]) -> Imu:
+def imu(header: Header, readings: dict[str, float]) -> Imu:
     """Return what the IMU says. At rest it feels gravity, upwards."""
-    message = Imu(header=header, orientation=quaternion(0, 0, said['imu_yaw']))
-    message.angular_velocity.z = said['imu_vyaw']
+    message = Imu(header=header, orientation=quaternion(0, 0, readings['imu_yaw']))
+    message.angular_velocity.z = readings['imu_vyaw']
     acceleration = message.linear_acceleration
-    acceleration.x, acceleration.y, acceleration.z = said['ax'], said['ay'], 9.81
+    acceleration.x, acceleration.y, acceleration.z = readings['ax'], readings['ay'], 9.81
     message.orientation_covariance = VARIANCES['imu_yaw'] * np.eye(3).ravel()
     message.angular_velocity_covariance = VARIANCES['imu_vyaw'] * np.eye(3).ravel()
     message.linear_acceleration_covariance = VARIANCES['ax'] * np.eye(3).ravel()
     return message
 
 
-def fix(header: Header, said: dict[str, float]) -> NavSatFix:
+def fix(header: Header, readings: dict[str, float]) -> NavSatFix:
     """Return where GPS thinks that the robot is: x of the floor is east, y is north."""
     message = NavSatFix(header=header)
     message.status.status = NavSatStatus.STATUS_FIX
     message.status.service = NavSatStatus.SERVICE_GPS
-    place = pymap3d.enu2geodetic(said['gps_x'], said['gps_y'], 0.0, *DATUM)
+    place = pymap3d.enu2geodetic(readings['gps_x'], readings['gps_y'], 0.0, *DATUM)
     message.latitude, message.longitude, message.altitude = map(float, place)
     variances = VARIANCES['gps_x'], VARIANCES['gps_y'], 1.0
     message.position_covariance = np.diag(variances).ravel()

@@ -268,16 +268,19 @@ class Robot(Node):
             stamp_ns = self.get_clock().now().nanoseconds - round(late_s * 1e9)
         self._stamp = Time(nanoseconds=stamp_ns).to_msg()
         record.poses.append(Step(body.t_s, *body.pose, body.v, body.w))
-        said = self._sensors.read(body)
+        readings = self._sensors.read(body)
         if self.sim_time:
             self._clock_topic.publish(ClockMessage(clock=self._stamp))
         self._say(
             'odom',
             lambda: messages.odometry(
-                self._header('odom'), f'{self._prefix}base_footprint', self._sensors.odometry, said
+                self._header('odom'),
+                f'{self._prefix}base_footprint',
+                self._sensors.odometry,
+                readings,
             ),
         )
-        self._say('imu/data', lambda: messages.imu(self._header('imu_link'), said))
+        self._say('imu/data', lambda: messages.imu(self._header('imu_link'), readings))
         self._say('/tf', self._moving_frame)
         if number % SCAN_EVERY == 0:
             ranges = self._sensors.scan(body)
@@ -287,7 +290,7 @@ class Robot(Node):
         if number % PICTURE_EVERY == 0:
             self._say('camera/image_raw', self._picture)
         if number % RATE_HZ == 0:
-            self._say('gps/fix', lambda: messages.fix(self._header('gps_link'), said))
+            self._say('gps/fix', lambda: messages.fix(self._header('gps_link'), readings))
             self._say('battery_state', lambda: messages.battery(self._header(''), body.t_s))
             for topic, sentence in other_types(self, self.get_namespace().strip('/')):
                 self._warn(topic, sentence)
@@ -304,11 +307,11 @@ class Robot(Node):
         return messages.picture(self._header(CAMERA_FRAME), self.floor, looks)
 
     def _moving_frame(self):
-        made = TransformStamped(header=self._header('odom'))
-        made.child_frame_id = f'{self._prefix}base_footprint'
-        place, (x, y, yaw) = made.transform, self._sensors.odometry
+        stamped = TransformStamped(header=self._header('odom'))
+        stamped.child_frame_id = f'{self._prefix}base_footprint'
+        place, (x, y, yaw) = stamped.transform, self._sensors.odometry
         place.translation.x, place.translation.y, place.rotation = x, y, quaternion(0, 0, yaw)
-        return self._topics['/tf'].msg_type(transforms=[made])
+        return self._topics['/tf'].msg_type(transforms=[stamped])
 
     # --- Small things
 
@@ -318,9 +321,9 @@ class Robot(Node):
     def _event(self, kind: str, text: str) -> None:
         self.record.events.append(Event(self.t_s, kind, text))
 
-    def _warn(self, what: str, text: str) -> None:
-        if what not in self._warned:
-            self._warned.add(what)
+    def _warn(self, topic: str, text: str) -> None:
+        if topic not in self._warned:
+            self._warned.add(topic)
             self.get_logger().warning(text)
 
 

@@ -27,7 +27,6 @@ def end_spin(executor: Executor) -> None:
 
 
 def pool_threads(executor: Executor) -> list[threading.Thread]:
-    """Return the threads of the pool of an executor that has one."""
     pool = getattr(executor, '_executor', None)
     return [] if pool is None else list(pool._threads)
 
@@ -74,7 +73,6 @@ def end_lifecycle(node: Node) -> None:
 
 
 def action_name(client: ActionClient) -> str:
-    """Return the name of an action, as its client was given it."""
     return client._action_name
 
 

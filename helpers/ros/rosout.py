@@ -12,8 +12,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 @dataclass
 class Record:
-    """One message of `/rosout`."""
-
     level: str
     node: str
     text: str

@@ -423,7 +423,7 @@ def destroy_nodes(context: rclpy.Context) -> list[Exception]:
     """
     things = _objects(Node, *MADE_BY_NODES)
     nodes = [thing for thing in things if isinstance(thing, Node)]
-    kept = {id(made) for node in nodes if hasattr(node, 'handle') for made in _made_by(node)}
+    kept = {id(end) for node in nodes if hasattr(node, 'handle') for end in _made_by(node)}
     failures: list[Exception] = []
     with one_process_at_a_time():  # the last node ends the participant
         for node in _of(context, nodes):

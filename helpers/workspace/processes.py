@@ -97,7 +97,6 @@ class Process:
 
     @property
     def running(self) -> bool:
-        """Whether it has not ended yet."""
         return self._process.poll() is None
 
     def wait_for(self, text: str, timeout_s: float = 20.0) -> str:
@@ -178,8 +177,8 @@ def _lonely_topics(environment: dict[str, str]) -> Iterator[str]:
     if ros2 is None or 'ROS_DOMAIN_ID' not in environment:
         return
     command = [ros2, 'topic', 'list', '--verbose']
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=20)
-    published, _, subscribed = said.stdout.partition('Subscribed topics:')
+    listing = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=20)
+    published, _, subscribed = listing.stdout.partition('Subscribed topics:')
     sides = [set(re.findall(r'^ \* (/\S+)', part, re.M)) for part in (published, subscribed)]
     for own, others, there in ((*sides, 'publisher'), (*sides[::-1], 'subscription')):
         missing = {'publisher': 'subscription', 'subscription': 'publisher'}[there]

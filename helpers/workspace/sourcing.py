@@ -71,12 +71,12 @@ def use(install: Path, sourced: dict[str, str]) -> None:
 
 def _libraries(install: Path) -> dict[str, list[Path]]:
     """Return the shared libraries of each package, those of `lib` before Python's extensions."""
-    found = {}
+    libraries = {}
     for package in sorted(install.iterdir()):
         files = sorted(package.glob('lib/*.so*')) + sorted(package.glob('**/site-packages/**/*.so'))
         if files:
-            found[package.name] = files
-    return found
+            libraries[package.name] = files
+    return libraries
 
 
 def _load(files: list[Path]) -> None:

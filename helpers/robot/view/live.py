@@ -103,12 +103,12 @@ class LiveView:
         )
         told = speeds(*commands[-1][1:]) if commands else 'nothing yet'
         news = record.events[-1:]
-        said = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
+        event = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
         return (
             f'<div class="replay robot-live">{style(DRIVE_CSS)}'
             f'<div role="img" aria-label="{escape(floor_in_words(record.floor))}">{svg}</div>'
             f'{_row("time", f"{now.t_s:.1f} s")}{_row("robot", speeds(now.v, now.w))}'
-            f'{_row("told", told)}{self._queue()}<p class="replay-says">{escape(said)}</p></div>'
+            f'{_row("told", told)}{self._queue()}<p class="replay-says">{escape(event)}</p></div>'
         )
 
     def _queue(self) -> str:
@@ -126,7 +126,6 @@ class LiveView:
 
 
 def speeds(v: float, w: float) -> str:
-    """Return a speed (m/s) and a turning rate (rad/s) in words."""
     return f'{v:.2f} m/s, {w:.2f} rad/s'
 
 

@@ -118,7 +118,6 @@ def _floor(floor: Floor, scale: float) -> str:
 
 
 def dots(poses: Sequence[Pose]) -> str:
-    """Return a path of dots."""
     return ''.join(f'M{x:.2f} {y:.2f}h0' for x, y, *_ in poses)
 
 
