@@ -30,7 +30,7 @@ PATH = re.compile(
     r'|\b[A-Z]:\\\S+|(?<!\S)(?!python3/)\S*(?:site|dist)-packages\S*|'
     + '|'.join(rf'{re.escape(folder)}\b' for folder in sorted(THIS_MACHINE))
 )
-PRIVATE = re.compile(r'^\s*(?:from|import) (helpers\._\w+)', re.MULTILINE)
+BEHIND_A_DOOR = re.compile(r'^\s*(?:from|import) (helpers\.(\w+)\.\w+)', re.MULTILINE)
 Rule = Callable[[Lesson], Iterator[str]]
 
 
@@ -153,11 +153,12 @@ def pictures_described(lesson: Lesson) -> Iterator[str]:
 # Cells
 
 
-def imports_what_is_public(lesson: Lesson) -> Iterator[str]:
+def imports_from_doors(lesson: Lesson) -> Iterator[str]:
     for cell in code_cells(lesson):
-        if module := PRIVATE.search(cell.source):
+        if found := BEHIND_A_DOOR.search(cell.source):
             yield (
-                f'The cell {called(cell)} imports {module[1]}: a lesson imports what helpers offer.'
+                f'The cell {called(cell)} imports {found[1]}: a lesson imports from the door, '
+                f'helpers.{found[2]}.'
             )
 
 
@@ -322,7 +323,7 @@ RULES: list[Rule] = [
     prints_what_stays,
     compared,
     pictures_described,
-    imports_what_is_public,
+    imports_from_doors,
     names_stay,
     solutions_import_what_they_use,
     steps_begin_cells,
