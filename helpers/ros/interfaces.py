@@ -9,8 +9,7 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
-from helpers.ros2._index import interfaces, packages
-from helpers.ros2.interface import listing
+from ros2_command.api import interface_lines, interfaces, packages
 
 
 def show(name: str) -> None:
@@ -19,7 +18,7 @@ def show(name: str) -> None:
         near = _nearest(str(name))
         hint = f'The nearest: {near}.' if near else '`ros2 interface list` prints all names.'
         raise ValueError(f'There is no interface {name!r}. {hint}')
-    for line in listing(name):
+    for line in interface_lines(name):
         print(line)
 
 

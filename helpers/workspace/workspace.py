@@ -11,12 +11,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
+from ros2_command.api import CommandError, command_of
+
 from helpers.machine.build_tools import build_environment, build_tools, from_wheels
 from helpers.notebook.interrupts import uninterrupted
 from helpers.notebook.progress_bar import ProgressBar, somebody_watches
 from helpers.ros.session import graph_environment
-from helpers.ros2._commands import CommandError
-from helpers.ros2.run import command_of
 from helpers.workspace.build_output import BuildResult, read_result, without_folders
 from helpers.workspace.folders import claim
 from helpers.workspace.processes import POLL_S, Process

@@ -32,8 +32,6 @@ LONGEST_TEXT = 1600
 INSIDE = """
 set -e
 mount -t tmpfs tmpfs /dev/shm
-mkdir -p /tmp/ros2_notebooks_0
-mount -t tmpfs tmpfs /tmp/ros2_notebooks_0
 python=$1
 shift
 status=0
