@@ -42,11 +42,11 @@ def records(folder):
 def test_a_record_says_who_where_and_since_when(folder, monkeypatch):
     monkeypatch.setenv('JPY_SESSION_NAME', 'lesson.ipynb')
     with recorded(VARIABLES, 'reserved'), recorded(VARIABLES | {'ROS_DOMAIN_ID': '42'}, 'open'):
-        found = records(folder)
+        written = records(folder)
         assert folder.stat().st_mode & 0o777 == 0o700
     pid = os.getpid()
-    assert found.keys() == {f'{pid}.reserved.json', f'{pid}.open.json'}
-    record = found[f'{pid}.open.json']
+    assert written.keys() == {f'{pid}.reserved.json', f'{pid}.open.json'}
+    record = written[f'{pid}.open.json']
     ticks = os.sysconf('SC_CLK_TCK')
     started = psutil.boot_time() + int(record.pop('start')) / ticks
     assert started == pytest.approx(psutil.Process().create_time(), abs=2 / ticks)
