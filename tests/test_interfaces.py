@@ -1,5 +1,8 @@
 """An interface is shown as the `ros2` command shows it."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from helpers.ros.interfaces import share_folder, show
@@ -31,3 +34,13 @@ def test_a_wrong_name_gets_the_nearest_one(name, hint):
     with pytest.raises(ValueError, match='^There is no interface') as caught:
         show(name)
     assert str(caught.value) == f'There is no interface {name!r}. {hint}'
+
+
+def test_helpers_import_the_door_of_the_command_only():
+    helpers = Path(__file__).parents[1] / 'helpers'
+    doors = {
+        module
+        for file in helpers.rglob('*.py')
+        for module in re.findall(r'(?m)^ *(?:from|import) (ros2_command\S*)', file.read_text())
+    }
+    assert doors == {'ros2_command.api'}
