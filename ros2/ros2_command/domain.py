@@ -82,7 +82,8 @@ def _of_this_environment(records: list[Record]) -> list[Record]:
 
     A user with two checkouts of a course means the notebooks of the one whose terminal it is.
     """
-    return [record for record in records if record.prefix == sys.prefix] or records
+    own = os.path.realpath(sys.prefix)  # the folder may be reached through a link
+    return [record for record in records if os.path.realpath(record.prefix) == own] or records
 
 
 def _nothing_is_open(records: list[Record]) -> str:
