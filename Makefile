@@ -21,6 +21,9 @@ test: set_up ## the course: style, tests of the helpers, every notebook compared
 		.venv/bin/ruff check --config "$$answers" && .venv/bin/ruff format --check --config "$$answers"
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(lesson) $(PYTEST_ARGS)
 
+test-ros2: set_up ## the `ros2` command, a package of its own in ros2/
+	@$(PYTHON) -m pytest -n 2 --dist loadscope --max-worker-restart 0 -o faulthandler_timeout=600 ros2 $(PYTEST_ARGS)
+
 test-tools: set_up ## the tools: an installation from nothing, a new lesson, two machines
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/tools $(PYTEST_ARGS)
 
@@ -96,11 +99,11 @@ set_up:
 	@mkdir -p .jupyter && tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
-test test-tools test-answers test-browser test-classroom notebooks lesson soak bench lint: groups := test
+test test-ros2 test-tools test-answers test-browser test-classroom notebooks lesson soak bench lint: groups := test
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present card class test test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
+.PHONY: help lab present card class test test-ros2 test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
 	lesson site soak bench release lint lock licences clean set_up
 
 PYTHON := .venv/bin/python

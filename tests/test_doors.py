@@ -12,7 +12,6 @@ import helpers
 ROOT = Path(__file__).resolve().parents[1]
 HELPERS = ROOT / 'helpers'
 ORDER = re.findall(r'^    (\w+)  ', helpers.__doc__, re.MULTILINE)
-COMMAND = 'ros2'  # a package of its own, which knows nothing of the rooms' order
 # Doors below a room.
 BELOW = {
     'helpers.checks.classroom',  # what the class page and the hub must agree on with a notebook
@@ -57,7 +56,7 @@ def room_of(file):
 def mistake(room, module, name):
     """Return why a file of this room must not import this, or ''."""
     other = module.split('.')[1]
-    if COMMAND in (room, other) or other == room:
+    if other == room:
         return ''
     if room and ORDER.index(other) >= ORDER.index(room):
         return f'{other} stands below {room}'
@@ -74,7 +73,7 @@ def mistake(room, module, name):
 
 def test_the_list_names_all_rooms():
     rooms = {file.parent.name for file in HELPERS.glob('*/__init__.py')}
-    assert sorted(rooms - {COMMAND}) == sorted(ORDER)
+    assert sorted(rooms) == sorted(ORDER)
 
 
 def test_imports_go_through_doors_and_upwards_in_the_list():
@@ -108,3 +107,12 @@ def test_a_door_has_what_it_names(room):
 def test_a_wrong_import_is_seen(room, line, reason):
     (found,) = imports(line)
     assert reason in mistake(room, *found)
+
+
+def test_helpers_import_only_the_door_of_the_command():
+    doors = {
+        module
+        for file in HELPERS.rglob('*.py')
+        for module in re.findall(r'(?m)^ *(?:from|import) (ros2_command\S*)', file.read_text())
+    }
+    assert doors == {'ros2_command.api'}

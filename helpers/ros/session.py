@@ -27,7 +27,7 @@ from helpers.ros.domain import (
     share_domain_id,
 )
 from helpers.ros.fields import check_fields
-from helpers.ros2._sessions import recorded
+from helpers.ros.session_record import recorded
 
 try:
     import rclpy
@@ -136,7 +136,7 @@ class Session:
         try:
             with uninterrupted():
                 # For the ros2 command, which looks where a session is open.
-                self._shared.enter_context(recorded(self.environment, is_open=True))
+                self._shared.enter_context(recorded(self.environment, 'open'))
                 self._context = rclpy.get_default_context()
                 _open_session = self
                 self._initialise()

@@ -11,11 +11,11 @@ import time
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
+from ros2_command.api import CommandError, command_of
+
 from helpers.machine import build_environment, from_wheels, tools_of_a_build
 from helpers.notebook import ProgressBar, somebody_watches, uninterrupted
 from helpers.ros import graph_environment
-from helpers.ros2._commands import CommandError
-from helpers.ros2.run import command_of
 from helpers.workspace.build_output import BuildResult, read_result, without_folders
 from helpers.workspace.folders import claim
 from helpers.workspace.processes import POLL_S, Process

@@ -49,7 +49,7 @@ class Checkout:
         put(self.bin, 'python3.14', 'echo "pyenv: python3.14: command not found" >&2; exit 127')
         self.root = folder / 'élève one'
         self.root.mkdir()
-        for name in ('tools', 'helpers'):
+        for name in ('tools', 'helpers', 'ros2'):
             shutil.copytree(ROOT / name, self.root / name)
         for name in ('pyproject.toml', 'LICENSE'):
             shutil.copy(ROOT / name, self.root)
@@ -112,7 +112,7 @@ def checkout(tmp_path_factory):
     return checkout
 
 
-ALL = ['iniconfig', 'pluggy', 'ros2-notebooks']
+ALL = ['iniconfig', 'pluggy', 'ros2-command', 'ros2-notebooks']
 
 
 def test_set_up_from_nothing_then_only_what_changed(checkout):
@@ -144,7 +144,7 @@ def test_set_up_from_nothing_then_only_what_changed(checkout):
     third = checkout.set_up()
     assert third.returncode == 0, third.stderr
     assert 'Making' not in third.stderr
-    assert checkout.installed() == ['iniconfig', 'ros2-notebooks']
+    assert checkout.installed() == ['iniconfig', 'ros2-command', 'ros2-notebooks']
     assert (folder / 'iniconfig/__init__.py').exists()
 
 
@@ -152,7 +152,7 @@ def test_a_group_is_kept_once_it_was_asked_for(checkout):
     checkout.lock('iniconfig')
     checkout.lock('pluggy', group='test')
     assert checkout.set_up().returncode == 0
-    assert checkout.installed() == ['iniconfig', 'ros2-notebooks']
+    assert checkout.installed() == ['iniconfig', 'ros2-command', 'ros2-notebooks']
     for arguments in (['test'], []):
         answer = checkout.set_up(*arguments)
         assert answer.returncode == 0, answer.stderr

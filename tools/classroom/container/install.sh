@@ -9,7 +9,7 @@ if [ -f /opt/ros/jazzy/setup.sh ]; then
         ros-jazzy-domain-coordinator ros-jazzy-ros-base ros-jazzy-test-msgs
     rm -rf /var/lib/apt/lists/*
     python3 -m venv --system-site-packages .venv
-    .venv/bin/python -m pip install --no-cache-dir --editable . 'numpy<2' \
+    .venv/bin/python -m pip install --no-cache-dir --editable . --editable ros2 'numpy<2' \
         "$(sed -n 's/^\(jupyterhub==[^ ]*\).*/\1/p' requirements-hub.lock)"
 else
     tools/set_up.sh hub
