@@ -31,7 +31,8 @@ COPYLEFT = re.compile('GPL|MPL|EPL|CDDL|Mozilla|General Public')
 
 def locked() -> list[str]:
     """Return the names of all Python packages in the lock files."""
-    text = ''.join(file.read_text() for file in ROOT.glob('requirements*.lock'))
+    files = [*ROOT.glob('requirements*.lock'), *ROOT.glob('classroom/*.lock')]
+    text = ''.join(file.read_text() for file in files)
     return sorted(set(re.findall(r'^([a-z][\w.-]*)==', text, re.MULTILINE)))
 
 

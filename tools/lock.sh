@@ -44,10 +44,12 @@ echo "requirements.lock: $(grep -c '^[a-z].*==' requirements.lock) pins, Python$
 
 constraints='--constraint requirements.lock'
 for group in uv test browser site hub licences; do
-    resolve "requirements-$group.lock" --group "$group" $constraints "$@"
+    lock=requirements-$group.lock
+    [ "$group" != hub ] || lock=classroom/$lock # an annex has its own
+    resolve "$lock" --group "$group" $constraints "$@"
     {
         echo "# Made by \`make lock\` from the group \`$group\` of pyproject.toml. Do not edit."
         cat "$new"
-    } > "requirements-$group.lock"
-    constraints="$constraints --constraint requirements-$group.lock" # .venv may hold all of them
+    } > "$lock"
+    constraints="$constraints --constraint $lock" # .venv may hold all of them
 done

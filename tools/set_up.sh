@@ -22,7 +22,9 @@ for group in test browser site hub licences; do
         *" $group "*) ;;
         *) [ -f ".venv/with_$group" ] || continue ;;
     esac
-    locks="$locks requirements-$group.lock" with="$with .venv/with_$group"
+    lock=requirements-$group.lock
+    [ "$group" != hub ] || lock=classroom/$lock # an annex has its own
+    locks="$locks $lock" with="$with .venv/with_$group"
 done
 
 # The stamp is written last. It holds all that .venv depends on, so that a changed lock, a moved

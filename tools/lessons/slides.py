@@ -18,7 +18,7 @@ from tools.lessons.lesson import tags
 SENTENCE = 16.0  # a text below this height has no slide of its own
 
 # The sizes of deck.css, in hundredths of the slide's height. Letters are taken a little wider than
-# in most fonts. tests/classroom measures what they really are.
+# in most fonts. classroom/tests measures what they really are.
 SLIDE, WIDTH = 90.0, 165.0
 LARGEST = 101.0  # with the smallest letters
 FOLDED, BORDER = 4.2, 2.0

@@ -1,0 +1,528 @@
+// The deck of `make present`: the copies of lessons in the folder `presentation` as slides whose
+// cells run. Which cell starts a slide is in the copies (tools/lessons/slides.py). The server keeps
+// the place (classroom/notes_window), for a reload, the notes window and the class page.
+//
+// JupyterLab loads this file as it is, in the form of a prebuilt extension. It hands over its own
+// packages, so that neither webpack nor npm is needed, and nothing of it that is not public.
+
+const LESSON_S = 4 * 3600; // a deck that was left open longer begins anew
+const TWICE_MS = 2000; // I I, 0 0, R R and Escape Escape come within this time
+const SAVE_MS = 300;
+const SCALES = [1, 0.95, 0.9]; // of a slide: what does not fit in the smallest letters is scrolled
+const TYPED = 'textarea, select, [contenteditable], input:not([type=range], [type=number], [type=button])';
+// What works with the focus in a replay, a level or a list, too: its other keys are its own.
+const EVERYWHERE = ['pagedown', 'pageup', 'b', '.', 'n', 'escape', 'f5', 'Control s', 'Control r'];
+
+let packages; // of JupyterLab, by name
+let server; // { baseUrl, ask, open }
+let deck; // the notebook's panel that is shown as slides, or nothing
+let kept = { places: {}, began: {} }; // by the notebook's path; `began` in seconds
+let twice = {}; // a key that does something at its second press
+
+async function packageOf(name) {
+  const [found] = Object.values(packages[`@jupyterlab/${name}`]);
+  return (await found.get())();
+}
+
+async function extension() {
+  const [notebook, services, apputils] = await Promise.all(['notebook', 'services', 'apputils'].map(packageOf));
+  const activate = (app, tracker) => begin(app, tracker, notebook.NotebookActions, services.ServerConnection, apputils.Dialog);
+  const plugin = { id: 'presenter:plugin', autoStart: true, requires: [notebook.INotebookTracker], activate };
+  return () => ({ __esModule: true, default: plugin });
+}
+
+// --- The page ------------------------------------------------------------------------------------
+
+const element = (tag, properties) => Object.assign(document.createElement(tag), properties);
+const head = element('header', { id: 'deck-head', innerHTML: '<b></b><span></span><progress></progress>' });
+const line = element('p', { id: 'deck-says', role: 'status' });
+const back = element('button', { id: 'deck-back', textContent: 'Slides (F5)' });
+
+function say(text) {
+  line.textContent = text;
+}
+
+async function begin(app, tracker, actions, { makeRequest }, dialog) {
+  const { serverSettings } = app.serviceManager;
+  const { baseUrl } = serverSettings;
+  const ask = async (what, body) => {
+    const init = body === undefined ? {} : { method: 'POST', body: JSON.stringify(body) };
+    const answer = await makeRequest(baseUrl + what, init, serverSettings);
+    if (!answer.ok) throw new Error(answer.statusText);
+    return answer;
+  };
+  server = { baseUrl, ask, open: path => app.commands.execute('docmanager:open', { path }) };
+  for (const file of ['notes/look.css', 'lab/extensions/presenter/deck.css'])
+    document.head.append(element('link', { rel: 'stylesheet', href: baseUrl + file }));
+  document.body.append(head, line, back);
+  back.onclick = () => show(tracker.currentWidget);
+  const fetched = ask('deck/state').then(async answer => (kept = { ...kept, ...(await answer.json()) })).catch(console.warn);
+  const open = async panel => {
+    if (!panel?.context.path.startsWith('presentation/')) return;
+    await Promise.all([fetched, panel.context.ready, panel.revealed]);
+    if (!panel.isDisposed && tracker.currentWidget === panel && deck !== panel) {
+      prepare(panel);
+      show(panel);
+    }
+  };
+  tracker.currentChanged.connect((_, panel) => void open(panel));
+  void app.restored.then(() => open(tracker.currentWidget));
+  for (const signal of [actions.executionScheduled, actions.executed])
+    signal.connect((_, { notebook }) => {
+      if (notebook !== deck?.content) return;
+      update();
+      deck.deckChanges();
+    });
+  window.addEventListener('keydown', event => onKey(event, tracker, actions), true);
+  window.addEventListener('dblclick', event => {
+    // A text would show its Markdown.
+    if (deck && event.target.closest?.('.jp-MarkdownCell')) event.stopImmediatePropagation();
+  }, true);
+  window.addEventListener('message', onGuesses);
+  window.addEventListener('resize', () => deck && fit());
+  // A dialog has no place on a projector, and would take the keys: a line says what it says.
+  new MutationObserver(() => {
+    const found = deck && document.querySelector('.jp-Dialog');
+    if (!found) return;
+    say([...found.querySelectorAll('.jp-Dialog-header, .jp-Dialog-body')].map(part => part.textContent).join('. '));
+    dialog.flush();
+  }).observe(document.body, { childList: true });
+}
+
+// --- A notebook ----------------------------------------------------------------------------------
+
+const prepared = new WeakSet();
+
+function prepare(panel) {
+  if (prepared.has(panel)) return;
+  prepared.add(panel);
+  keepSaved(panel);
+  const { content } = panel;
+  content.activeCellChanged.connect(() => panel === deck && update());
+  content.model.contentChanged.connect(() => panel === deck && update());
+  // The end of an output comes into view, until somebody scrolls.
+  const grown = new ResizeObserver(() => panel === deck && fit());
+  grown.observe(content.viewportNode);
+  for (const kind of ['wheel', 'touchmove'])
+    content.node.addEventListener(kind, () => (panel.deckFollows = false), { passive: true });
+}
+
+// What was typed or run is saved at once. Two saves must not overlap: JupyterLab takes the file of the
+// first one for somebody else's, and asks about "File Changed". And after a save it takes a notebook
+// for unchanged that was changed meanwhile, so what has changed is known here.
+function keepSaved(panel) {
+  const { context } = panel;
+  const save = context.save.bind(context);
+  let last = Promise.resolve();
+  let timer = null;
+  let changed = false;
+  context.save = options => (last = last.catch(() => {}).then(() => save(options)));
+  const now = () => {
+    clearTimeout(timer);
+    timer = null;
+    if (!changed || context.isDisposed) return;
+    changed = false;
+    context.save().catch(() => (changed = true));
+  };
+  panel.deckChanges = () => {
+    changed = true;
+    timer ??= setTimeout(now, SAVE_MS);
+  };
+  context.model.contentChanged.connect(panel.deckChanges);
+  for (const kind of ['beforeunload', 'pagehide', 'blur']) window.addEventListener(kind, now);
+  document.addEventListener('visibilitychange', now);
+}
+
+function show(panel) {
+  if (!panel) return;
+  if (deck && deck !== panel) deck.removeClass('jp-Deck');
+  deck = panel;
+  panel.addClass('jp-Deck');
+  document.body.dataset.jpDeckMode = 'presenting';
+  panel.fit();
+  const { path } = panel.context;
+  const place = panel.content.activeCellIndex || kept.places[path] || 0;
+  goTo(slideOf(place), place);
+  if (kept.used?.[path]) say(`Used on ${kept.used[path]}, with what was typed and run. R R: a fresh one.`);
+}
+
+function leave() {
+  const { content } = deck;
+  document.body.removeAttribute('data-jp-deck-mode');
+  deck.removeClass('jp-Deck');
+  deck.fit();
+  deck = null;
+  say('');
+  content.activate();
+  void content.scrollToItem(content.activeCellIndex, 'center');
+}
+
+// --- Slides --------------------------------------------------------------------------------------
+
+const kindOf = ({ model }) => model.getMetadata('slideshow')?.slide_type;
+
+const isNew = ({ model }) => model.executionCount === null;
+
+const hasRun = ({ model }) => model.executionCount > 0 || model.executionState === 'running';
+
+const isSolution = ({ model }) => model.getMetadata('tags')?.includes('solution');
+
+// Return the slides: the indices of their cells.
+function slides() {
+  const found = [];
+  deck.content.widgets.forEach((cell, index) => {
+    const kind = kindOf(cell);
+    if (kind === 'skip') return;
+    if (kind || !found.length) found.push([]);
+    found.at(-1).push(index);
+  });
+  return found;
+}
+
+function slideOf(place) {
+  return Math.max(slides().findLastIndex(([first]) => first <= place), 0);
+}
+
+const here = () => slideOf(deck.content.activeCellIndex);
+
+// A text that follows what has not run would tell too early what comes out. So it is shown after the
+// run, or with the next press.
+function shownOn(slide) {
+  const { widgets } = deck.content;
+  const isText = index => widgets[index].model.type !== 'code';
+  const waits = index => !isText(index) && !hasRun(widgets[index]) && !isSolution(widgets[index]);
+  const opened = slide.findLastIndex(index => deck.deckOpened?.has(widgets[index].model.id));
+  const end = slide.findIndex((index, i) => i > opened && isText(index) && slide.slice(0, i).some(waits));
+  return end < 0 ? slide : slide.slice(0, end);
+}
+
+// Show a slide, and choose a cell of it: this one, or the first that runs.
+function goTo(number, cell) {
+  const all = slides();
+  const slide = all[Math.min(Math.max(number, 0), all.length - 1)];
+  const { content } = deck;
+  const runs = shownOn(slide).filter(index => content.widgets[index].model.type === 'code');
+  const waits = index => isNew(content.widgets[index]) && !isSolution(content.widgets[index]);
+  content.mode = 'command';
+  content.activeCellIndex = slide.includes(cell) ? cell : (runs.find(waits) ?? runs[0] ?? slide[0]);
+  content.deselectAll();
+  deck.deckFollows = false;
+  update();
+  scroller().scrollTop = 0;
+  focusCell();
+}
+
+// Out of an editor, a replay or a list.
+const focusCell = () => deck.content.activeCell.node.focus({ preventScroll: true });
+const scroller = () => deck.content.outerNode;
+
+let shownPlace = '';
+
+function update() {
+  const { content, context: { path } } = deck;
+  const { widgets, activeCellIndex } = content;
+  const all = slides();
+  const number = here();
+  const slide = shownOn(all[number]);
+  widgets.forEach(({ node, model }, index) => {
+    node.classList.toggle('deck-on', slide.includes(index));
+    node.classList.toggle('deck-runs', model.executionState === 'running');
+  });
+  const sourceOf = index => widgets[index].model.sharedModel.getSource();
+  const step = all.slice(0, number + 1).map(([first]) => first).findLast(first => widgets[first].model.type === 'markdown' && /^##? /.test(sourceOf(first)));
+  const [title, count, progress] = head.children;
+  title.textContent = step === undefined ? '' : sourceOf(step).split('\n')[0].replace(/^#+ |[`*]/g, '');
+  count.textContent = `${number + 1} / ${all.length}`;
+  Object.assign(progress, { max: all.length, value: number + 1 });
+  fit();
+  const place = `${path} ${activeCellIndex}`;
+  if (place === shownPlace) return;
+  shownPlace = place;
+  const now = Date.now() / 1000;
+  if (number > 0 && !(now - kept.began[path] < LESSON_S)) kept.began[path] = now;
+  kept.current = path;
+  kept.places[path] = activeCellIndex;
+  keep();
+  const about = [activeCellIndex, ...slide].map(index => widgets[index]).find(hasGuess);
+  document.getElementById('deck-guesses')?.remove();
+  if (about) void showGuesses(about, place);
+}
+
+let sent = Promise.resolve();
+
+function keep() {
+  const { current, places, began } = kept;
+  const body = { current, places, began };
+  sent = sent.then(() => server.ask('deck/state', body)).catch(console.warn);
+}
+
+// The letters are as large as the slide has room for. What grows below it comes into view.
+function fit() {
+  const { node, viewportNode } = deck.content;
+  const outer = scroller();
+  for (const scale of SCALES) {
+    node.style.setProperty('--deck-scale', scale);
+    if (viewportNode.getBoundingClientRect().height <= outer.clientHeight) break;
+  }
+  const cell = deck.content.activeCell?.node;
+  const end = cell && cell.getBoundingClientRect().bottom - outer.getBoundingClientRect().bottom;
+  if (deck.deckFollows && end > 0) outer.scrollTop += end;
+}
+
+// --- The class page ------------------------------------------------------------------------------
+
+function hasGuess({ model }) {
+  const source = model.sharedModel.getSource();
+  return model.getMetadata('tags')?.includes('predict') || source.includes('compare_prediction(');
+}
+
+async function showGuesses({ model, node }, place) {
+  const page = await server.ask('class').then(answer => answer.text());
+  const reached = page && (await fetch(page, { mode: 'no-cors' }).catch(() => null));
+  if (!reached || place !== shownPlace) return;
+  document.getElementById('deck-guesses')?.remove(); // of a second call
+  const src = `${page}#cell=${model.id}`;
+  node.append(element('iframe', { id: 'deck-guesses', title: 'Guesses of the class', src }));
+}
+
+function onGuesses({ source, data }) {
+  const frame = document.getElementById('deck-guesses');
+  if (!deck || source !== frame?.contentWindow) return;
+  frame.style.height = `${Number(data)}px`;
+  frame.scrollIntoView({ block: 'nearest' }); // many bars are more than the slide has room for
+  // A click on "Show" took the focus: the keys of the deck want it back.
+  if (document.activeElement === frame) focusCell();
+}
+
+// --- Keys ----------------------------------------------------------------------------------------
+
+const KEYS = {
+  ' ': next,
+  pagedown: next,
+  'Shift  ': previous,
+  pageup: previous,
+  arrowright: () => toStep(1),
+  arrowleft: () => toStep(-1),
+  arrowdown: () => byCell(1),
+  arrowup: () => byCell(-1),
+  home: first,
+  end: () => goTo(Infinity),
+  enter,
+  'Control enter': run,
+  'Shift enter': run,
+  i: () => again('i', 'I again: interrupt the cell', () => deck.sessionContext.session?.kernel?.interrupt()),
+  0: () => again('0', '0 again: restart the kernel', restart),
+  r: () => kept.used?.[deck.context.path] && again('r', 'R again: throw away what was typed and run', fresh),
+  b: () => document.body.classList.add('deck-black'),
+  '.': () => document.body.classList.add('deck-black'),
+  n: () => void window.open(`${server.baseUrl}notes/`, 'notes', 'popup'),
+  escape,
+  f5: () => void deck.context.save(),
+  'Control s': () => void deck.context.save(),
+  'Control r': () => deck.context.save().finally(() => location.reload()),
+};
+
+function onKey(event, tracker, actions) {
+  const modifiers = ['Control', 'Alt', 'Shift', 'Meta'].filter(key => event.getModifierState(key));
+  const low = event.key.toLowerCase();
+  const letter = low.length === 1 && low !== ' ';
+  const key = [...modifiers.filter(name => name !== 'Shift' || !letter && low !== 'f5'), low].join(' ');
+  if (!deck) {
+    // A clicker's start button is F5, as in other programs for slides.
+    if (key !== 'f5' || !prepared.has(tracker.currentWidget)) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    show(tracker.currentWidget);
+    return;
+  }
+  const { target } = event;
+  const cell = deck.content.activeCell.node;
+  if (target.closest?.('iframe') || !deck.node.contains(target) && target !== document.body) return;
+  if (['control', 'shift', 'alt', 'meta', 'altgraph', 'capslock'].includes(low)) return;
+  const black = document.body.classList.contains('deck-black');
+  const edits = target.closest?.('.jp-InputArea-editor');
+  const inside = !edits && target !== cell && cell.contains(target);
+  if (black) return take(event, () => document.body.classList.remove('deck-black'));
+  if (edits) {
+    const wanted = ['Control enter', 'Shift enter', 'f5', 'Control s', 'Control r'];
+    const completes = document.querySelector('.jp-Completer:not(.lm-mod-hidden)');
+    if (key === 'escape' && !completes) return take(event, escape);
+    // These would make new cells.
+    if (['Alt enter', 'Control Shift -', 'Control _', 'Control -'].includes(key)) return take(event);
+    if (key === 'pagedown' || key === 'pageup') escape(actions, false, { edits }); // a clicker
+    else if (!wanted.includes(key)) return;
+  } else if (inside) {
+    if (target.matches(TYPED) ? !['pagedown', 'pageup', 'escape', 'f5'].includes(key) : !EVERYWHERE.includes(key)) return;
+  }
+  // The browser's own keys, such as F11 and Ctrl and +, still work.
+  if (!KEYS[key]) return event.stopImmediatePropagation();
+  take(event, () => KEYS[key](actions, low === 'enter' && modifiers.includes('Shift'), { edits, inside, key }));
+}
+
+function take(event, does) {
+  event.preventDefault();
+  event.stopImmediatePropagation();
+  const before = line.textContent;
+  does?.();
+  // What was said is over with the next key.
+  if (line.textContent === before) say('');
+}
+
+function again(key, text, does) {
+  if (twice.key === key && Date.now() - twice.at < TWICE_MS) {
+    twice = {};
+    does();
+  } else {
+    twice = { key, at: Date.now() };
+    say(text);
+  }
+}
+
+function next() {
+  const { content } = deck;
+  const number = here();
+  const slide = slides()[number];
+  const shown = shownOn(slide);
+  const outer = scroller();
+  // A replay shows its first loss, and then its end.
+  for (const index of shown)
+    for (const replay of content.widgets[index].node.querySelectorAll('.replay-on:not(.level)'))
+      if (!replay.dispatchEvent(new CustomEvent('next-stop', { cancelable: true }))) {
+        replay.scrollIntoView({ block: 'nearest' });
+        return;
+      }
+  // If one cell of this slide has run, none of its cells is left out.
+  if (hasRun(content.activeCell)) {
+    const left = shown.find(index => index > content.activeCellIndex && isNew(content.widgets[index]));
+    if (left !== undefined) return toCell(left);
+  }
+  if (outer.scrollTop + outer.clientHeight < outer.scrollHeight - 4) {
+    outer.scrollTop += 0.8 * outer.clientHeight;
+  } else if (shown.length < slide.length) {
+    (deck.deckOpened ??= new Set()).add(content.widgets[slide[shown.length]].model.id);
+    goTo(number);
+    scroller().scrollTop = scroller().scrollHeight;
+  } else if (number < slides().length - 1) {
+    goTo(number + 1);
+  } else {
+    say('The end. Enter opens the next lesson.');
+  }
+  used();
+}
+
+function previous() {
+  const outer = scroller();
+  if (outer.scrollTop > 4) outer.scrollTop -= 0.8 * outer.clientHeight;
+  else goTo(here() - 1);
+}
+
+// A copy in which something was typed before is from now on the one that is shown.
+function used() {
+  if (kept.used) delete kept.used[deck.context.path];
+}
+
+function toStep(way) {
+  const all = slides();
+  const starts = [...all.keys()].filter(number => kindOf(deck.content.widgets[all[number][0]]) === 'slide');
+  const number = way > 0
+    ? starts.find(start => start > here()) ?? all.length - 1
+    : starts.findLast(start => start < here()) ?? 0;
+  goTo(number);
+  used();
+}
+
+function byCell(way) {
+  const { content } = deck;
+  const runs = shownOn(slides()[here()]).filter(index => content.widgets[index].model.type === 'code');
+  const index = runs[runs.indexOf(content.activeCellIndex) + way];
+  if (index === undefined || content.activeCell.model.type !== 'code')
+    scroller().scrollTop += 0.2 * way * scroller().clientHeight;
+  else toCell(index);
+}
+
+function toCell(index) {
+  const { content } = deck;
+  content.activeCellIndex = index;
+  focusCell();
+  content.activeCell.node.scrollIntoView({ block: 'nearest' });
+}
+
+function first() {
+  delete kept.began[deck.context.path]; // the minutes begin again
+  shownPlace = '';
+  deck.deckOpened = new Set();
+  goTo(0);
+}
+
+function enter() {
+  const { content } = deck;
+  const cell = content.activeCell;
+  if (cell.model.type === 'code') {
+    cell.inputHidden = false;
+    content.mode = 'edit';
+    content.activate();
+    return;
+  }
+  const sources = shownOn(slides()[here()]).map(index => content.widgets[index].model.sharedModel.getSource());
+  const [, file] = sources.at(-1).match(/^Next: \[.*\]\((\S+\.ipynb)\)$/m) ?? [];
+  if (file) void server.open(`presentation/${file}`);
+}
+
+function escape(_actions, _on, from = { edits: true }) {
+  const { content } = deck;
+  if (from.edits || from.inside) {
+    content.mode = 'command';
+    focusCell();
+  } else {
+    again('escape', 'Escape again: to the notebook', leave);
+  }
+}
+
+const waiting = new Set(); // cells that wait for the kernel
+
+// Without a kernel JupyterLab would start a second one, or ask for one on the projector.
+async function run(actions, on) {
+  const panel = deck;
+  const { content, sessionContext } = panel;
+  const cell = content.activeCell;
+  if (cell.model.type !== 'code') return on ? next() : undefined;
+  const { id } = cell.model;
+  content.mode = 'command';
+  focusCell();
+  if (waiting.has(id)) return;
+  if (cell.model.executionState === 'running') return say('It runs already. I I interrupts it.');
+  waiting.add(id);
+  const isReady = () => Boolean(sessionContext.session?.kernel);
+  if (!isReady()) {
+    say('The cell runs as soon as the kernel is there.');
+    await sessionContext.ready;
+  }
+  waiting.delete(id);
+  if (!isReady()) return say('There is no kernel: press 0 twice.');
+  say('');
+  panel.deckFollows = true;
+  void actions.runCells(content, [cell], sessionContext);
+  if (on && panel === deck) byCell(1);
+}
+
+async function restart() {
+  const { sessionContext, context } = deck;
+  say('The kernel is restarted. What was defined is gone.');
+  if (sessionContext.session?.kernel) await sessionContext.restartKernel();
+  else await sessionContext.changeKernel({ name: context.model.defaultKernelName || 'python3' });
+}
+
+async function fresh() {
+  const { context, sessionContext } = deck;
+  await context.save();
+  await server.ask('deck/fresh', { path: context.path });
+  await context.revert();
+  used();
+  deck.deckOpened = new Set();
+  first();
+  say('');
+  await sessionContext.session?.kernel?.restart();
+}
+
+window._JUPYTERLAB ??= {};
+window._JUPYTERLAB.presenter = { init: scope => (packages = scope), get: extension };
