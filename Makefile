@@ -8,10 +8,7 @@ lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, OUT
 
 present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02, or PLAN=90, a timetable; NEW=yes makes it anew
 	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" $(if $(filter yes,$(NEW)),--new) \
-		$(if $(filter no,$(FRESH)),--saved-outputs) $(server) -- $(LAB_ARGS)
-
-card: set_up ## one page to print for a timetable of teaching.md: PLAN=90
-	@$(PYTHON) -m classroom.card $(PLAN)
+		$(server) -- $(LAB_ARGS)
 
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join over the network; PORT=8765, BROWSER=no
 	@exec $(PYTHON) -m classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
@@ -96,7 +93,7 @@ test test-tools test-answers test-browser test-classroom notebooks lesson soak b
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present card class test test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
+.PHONY: help lab present class test test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
 	lesson site soak bench release lint lock licences clean set_up
 
 PYTHON := .venv/bin/python

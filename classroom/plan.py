@@ -57,10 +57,3 @@ def plan_of(name: str) -> Plan:
         names = ', '.join(repr(plan.title) for plan in known)
         raise ValueError(f'There is no single timetable {name!r}. Give a word of one: {names}.')
     return found[0]
-
-
-def keys() -> list[tuple[str, str]]:
-    """Return the rows of the table of keys in teaching.md."""
-    text = (ROOT / 'teaching.md').read_text(encoding='utf-8')
-    table = text.partition('### Slides')[2].partition('| | |\n|---|---|\n')[2].partition('\n\n')[0]
-    return re.findall(r'^\| (.+?) \| (.+) \|$', table, re.MULTILINE)

@@ -1,4 +1,8 @@
-"""A class that sees itself: `make class`. teaching.md says how to use it and what is kept."""
+"""A class that sees itself: `make class`. teaching.md says how to use it and what is kept.
+
+helpers/checks/classroom.py says what students' computers ask of it, web.py what its page and the
+deck do.
+"""
 
 from pathlib import Path
 
@@ -11,5 +15,5 @@ def folder() -> Path:
 
 
 def page_file() -> Path:
-    """Return the file in which the server of `make present` finds the address of the page."""
+    """Return the file that holds the address of the page as long as the class is open."""
     return folder() / 'page'

@@ -40,7 +40,7 @@ async def hold(store: ClassStore, options: argparse.Namespace) -> None:
         room.over = True
         over.set()
 
-    room = Room(store, end, options.root)
+    room = Room(store, end)
     asyncio.get_running_loop().add_signal_handler(signal.SIGINT, end)
     address = '0.0.0.0' if options.lan else '127.0.0.1'
     sockets = bind_sockets(options.port, address, socket.AF_INET)
@@ -61,7 +61,7 @@ async def hold(store: ClassStore, options: argparse.Namespace) -> None:
         print('Only this machine can join. LAN=yes lets the networks of this machine in.')
     if store.went_on:
         print('The class that was broken off goes on, with what it was told.')
-    print('Ctrl+C ends the class and deletes what it was told. Save the CSV before.', flush=True)
+    print('Ctrl+C ends the class and deletes what it was told.', flush=True)
     page_file().write_text(page)
     if options.browser:
         # One that lives in the terminal ends when it is closed.

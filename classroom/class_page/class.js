@@ -1,6 +1,6 @@
 // Shows what the server sends. What students wrote is put into the page as text, never as HTML.
 //
-// #wall shows the guesses and how to join only. #cell=ID shows the guesses of one cell, for a slide.
+// #wall shows how to join only. #cell=ID shows the guesses of one cell, for a slide.
 
 const find = id => document.getElementById(id);
 const shown = {}; // by the id of an element: what was put there last, as JSON
@@ -112,7 +112,7 @@ find('lessons').onchange = event => ask('go', { lesson: event.target.value, step
 find('forget').onclick = () =>
   confirm('Delete all guesses, tasks, hands and names?') && ask('forget');
 find('end').onclick = async () => {
-  if (!confirm('End the class, and delete what it was told? Save the CSV before.')) return;
+  if (!confirm('End the class, and delete what it was told?')) return;
   await ask('end');
   end();
 };

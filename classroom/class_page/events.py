@@ -1,4 +1,4 @@
-"""What a student's computer may send. Everything else is refused with one sentence."""
+"""What a class may be told. Everything else is refused with one sentence."""
 
 import json
 
@@ -34,6 +34,17 @@ KINDS = {
     'cell': _form(**EVENT, cell=TEXT),
     'hand': _form(**EVENT, up={'type': 'boolean'}),
 }
+MINUTES = {'type': 'integer', 'minimum': 0}
+# What the deck of `make present` tells: the id of a cell, since when the minutes run, and those
+# that are planned for this step, to its end, and in all.
+SLIDE = _form(
+    lesson=TEXT,
+    cell=TEXT,
+    began_s={'type': ['number', 'null']},
+    own=MINUTES,
+    planned=MINUTES,
+    all=MINUTES,
+)
 EVENTS = _form(events={'type': 'array', 'maxItems': BATCH})
 JOIN = _form(code=TEXT, name=TEXT | {'maxLength': 40})
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from nbformat import NotebookNode
 
-from classroom.notes import of_step
+from classroom.class_page.notes import of_step
+from classroom.deck.slides import heading
 from tools.lessons.code import guess_of
 from tools.lessons.lesson import Lesson, first_heading
-from tools.lessons.slides import heading
 
 
 class Guess(NamedTuple):

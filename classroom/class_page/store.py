@@ -5,13 +5,10 @@ counts once: its id and its seat are its key. Of guesses, the last one of a seat
 order in which the events came: no clock of a student's computer is asked.
 """
 
-import csv
 import hashlib
-import io
 import json
 import secrets
 import sqlite3
-import time
 from collections import Counter
 from pathlib import Path
 
@@ -27,14 +24,14 @@ PRAGMA journal_mode = WAL;
 CREATE TABLE IF NOT EXISTS class (code TEXT, secret TEXT);
 CREATE TABLE IF NOT EXISTS seats (seat INTEGER PRIMARY KEY, token TEXT UNIQUE, name TEXT);
 CREATE TABLE IF NOT EXISTS events (
-    n INTEGER PRIMARY KEY, seat INTEGER, id TEXT, at_s REAL, lesson TEXT, kind TEXT, what TEXT,
-    value TEXT, UNIQUE (seat, id)
+    n INTEGER PRIMARY KEY, seat INTEGER, id TEXT, lesson TEXT, kind TEXT, what TEXT, value TEXT,
+    UNIQUE (seat, id)
 );
 CREATE INDEX IF NOT EXISTS by_kind ON events (kind, lesson, what);
 """
 INSERT = """
-INSERT OR IGNORE INTO events (seat, id, at_s, lesson, kind, what, value)
-VALUES (?, ?, ?, ?, ?, ?, ?)
+INSERT OR IGNORE INTO events (seat, id, lesson, kind, what, value)
+VALUES (?, ?, ?, ?, ?, ?)
 """
 # The last event of a kind of each seat, in their order: of all lessons, or of one question.
 LATEST = """
@@ -102,7 +99,7 @@ class ClassStore:
             problem = self._problem(event)
             refused = refused or problem
             if not problem:
-                rows.append((seat, event['id'], time.time(), event['lesson'], *_content(event)))
+                rows.append((seat, event['id'], event['lesson'], *_content(event)))
         with self._db:
             self._db.executemany(INSERT, rows)
         return refused
@@ -195,17 +192,6 @@ class ClassStore:
     def busiest(self) -> tuple[str, int] | None:
         """Return the lesson and the step at which most students are, None if nobody is."""
         return next((place for place, _ in self._places().most_common(1)), None)
-
-    def as_csv(self) -> str:
-        """Return all events as CSV, texts as JSON: so no program takes one for a formula."""
-        text = io.StringIO()
-        rows = csv.writer(text)
-        rows.writerow(['number', 'time_utc', 'seat', 'name', 'lesson', 'kind', 'what', 'value'])
-        wanted = 'SELECT n, at_s, seat, name, lesson, kind, what, value FROM events LEFT JOIN seats'
-        for n, at_s, seat, name, *rest in self._db.execute(f'{wanted} USING (seat) ORDER BY n'):
-            when = time.strftime('%Y-%m-%dT%H:%M:%SZ', time.gmtime(at_s))
-            rows.writerow([n, when, seat, json.dumps(name or ''), *rest])
-        return text.getvalue()
 
     # Its end
 

@@ -1,5 +1,10 @@
 """The two doors of a class: students tell, and hear no more than that; the instructor sees.
 
+    POST join, events, leave   of students: helpers/checks/classroom.py documents them
+    GET  SECRET/               the instructor's page, its files, and `live`, its changes
+    POST SECRET/slide          of the deck, when it goes on: events.SLIDE is what it tells
+    POST SECRET/show, hide, go, lower, forget, end     the buttons of the page
+
 The instructor's page is below a secret. It asks for nothing again and again: the server sends it
 each change as a server-sent event, at most four times a second.
 """
@@ -20,10 +25,7 @@ from tornado.iostream import StreamClosedError
 from classroom.class_page import events
 from classroom.class_page.events import parse
 from classroom.class_page.store import ClassStore
-from classroom.notes import of_step
-from classroom.present import deck, shown_cell
 from helpers.notebook.look import LOOK_CSS
-from tools.lessons.lesson import ROOT
 
 HERE = Path(__file__).resolve().parent
 FILES = {'': 'text/html', 'class.css': 'text/css', 'class.js': 'text/javascript'}
@@ -37,23 +39,22 @@ HEADERS = {
 }
 PAGE_EVERY_S = 0.25
 TOO_FAST = 'Too much at once: wait a minute.'
-WRONG_A_MINUTE = 10  # codes from an address
+# Codes from an address. A whole class may have one address, behind a router, and mistype a few.
+WRONG_A_MINUTE = 120
 EVENTS_A_MINUTE = 1200  # of a seat
 
 
 class Room:
     """What all handlers share: the class, where it is in the lesson, and how fast one may ask."""
 
-    def __init__(self, store: ClassStore, stop=lambda: None, root: Path = ROOT) -> None:
-        self.store, self.stop, self._root = store, stop, root
+    def __init__(self, store: ClassStore, stop=lambda: None) -> None:
+        self.store, self.stop = store, stop
         self.over = False  # the pages say it
         self.joins: list[str] = []  # what students type, for the wall
         self.present = next(iter(store.lessons)), 0
-        self.follows_students = True  # until a deck or the instructor says where the class is
-        # Slides of another day may be there. Those of a class that was broken off are its own.
-        self._deck = None if store.went_on else self._place_of(deck())
+        self.follows_students = True  # until the deck or the instructor says where the class is
         self._minutes: dict[tuple[str, int], dict] = {}  # of the step that the deck shows
-        self._began_s: dict[str, float | None] = {}  # by lesson, as the slides say, or when shown
+        self._began_s: dict[str, float | None] = {}  # by lesson, as the deck says, or when shown
         self._counts, self._until_s = Counter(), 0.0
 
     def count(self) -> Counter:
@@ -67,31 +68,19 @@ class Room:
         self.store.lessons[lesson].starts[step]
         self.present, self.follows_students = (lesson, step), False
 
-    def _place_of(self, slides: dict) -> tuple[str, int, float | None] | None:
-        """Return lesson and step of the slides, and since when: None on the first slide."""
-        path = slides.get('current', '')
-        known = self.store.lessons.get(Path(path).stem[3:])
-        if not known:
-            return None
-        # The slides of a timetable have fewer cells than the lesson.
-        copy = shown_cell(self._root, slides)
-        at = slides['places'].get(path, 0)
-        step = known.step_of.get(copy[0][copy[1]].id, 0) if copy else known.step_at(at)
-        return known.lesson.name, step, slides['began'].get(path)
+    def show_slide(self, slide: dict) -> None:
+        """Show the step of the deck's slide. Raises LookupError for an unknown lesson.
+
+        The minutes are those of the deck: the slides of a timetable have fewer steps.
+        """
+        lesson = slide['lesson']
+        self.go_to(lesson, self.store.lessons[lesson].step_of.get(slide['cell'], 0))
+        self._began_s[lesson] = slide['began_s']
+        self._minutes = {self.present: {key: slide[key] for key in ('own', 'planned', 'all')}}
 
     def view(self) -> dict:
-        """Return all that the page shows: where the slides have gone, or most students are."""
-        slides = deck()
-        place = self._place_of(slides)
-        if place and place != self._deck:
-            lesson, step, began_s = self._deck = place
-            self.go_to(lesson, step)
-            self._began_s[lesson], self._minutes = began_s, {}
-            if copy := shown_cell(self._root, slides):
-                notes = of_step(*copy)
-                minutes = {key: notes[key] for key in ('own', 'planned', 'all')}
-                self._minutes = {self.present: minutes}
-        elif self.follows_students:
+        """Return all that the page shows."""
+        if self.follows_students:
             self.present = self.store.busiest() or self.present
         lesson, step = self.present
         began_s = self._began_s.setdefault(lesson, time.time())
@@ -185,17 +174,13 @@ class Instructor(Handler):
             raise web.HTTPError(404)
 
     async def get(self, _secret: str, name: str) -> None:
-        """Answer with the page, one of its files, its changes as they come, or all as CSV."""
+        """Answer with the page, one of its files, or its changes as they come."""
         if name in FILES:
             self.set_header('Content-Type', f'{FILES[name]}; charset=UTF-8')
             look = LOOK_CSS if name == 'class.css' else ''
             self.finish(look + (HERE / (name or 'class.html')).read_text('utf-8'))
         elif name == 'live':
             await self._send_changes()
-        elif name == 'class.csv':
-            self.set_header('Content-Type', 'text/csv; charset=UTF-8')
-            self.set_header('Content-Disposition', 'attachment; filename="class.csv"')
-            self.finish(self.room.store.as_csv())
         else:
             raise web.HTTPError(404)
 
@@ -211,7 +196,7 @@ class Instructor(Handler):
                 await asyncio.sleep(PAGE_EVERY_S)
 
     def post(self, _secret: str, name: str) -> None:
-        """Do what a button of the page says."""
+        """Do what a button of the page says, or follow the deck."""
         store = self.room.store
         try:
             wanted = json.loads(self.request.body)
@@ -221,6 +206,8 @@ class Instructor(Handler):
                     change((self.room.present[0], str(wanted['question'])))
                 case 'go':
                     self.room.go_to(wanted['lesson'], int(wanted['step']))
+                case 'slide':
+                    self.room.show_slide(parse(self.request.body, events.SLIDE))
                 case 'lower':
                     store.lower(int(wanted['seat']))
                 case 'forget':

@@ -61,7 +61,7 @@ class HubInstructor(HubOAuthenticated, Instructor):
 
     @web.authenticated
     async def get(self, secret: str, name: str) -> None:
-        """Answer with the page, one of its files, its changes as they come, or all as CSV."""
+        """Answer with the page, one of its files, or its changes as they come."""
         self.xsrf_token  # noqa: B018 - sets the cookie that the page sends back
         await super().get(secret, name)
 

@@ -1,6 +1,5 @@
 """The class: what its server takes, what it refuses, and what its page says."""
 
-import csv
 import json
 import os
 import re
@@ -54,7 +53,7 @@ def test_the_last_guess_of_a_seat_counts_once(opened):
     assert opened.tell(bob, event(number=1, value=3)) == ''
     assert opened.tell(ada, event(number=1, value=99)) == ''  # replayed, with another value
     assert opened.bars() == {'3': 1, '5': 1}
-    assert len(opened.csv()) == 4
+    assert len(opened.events()) == 3
 
 
 def test_only_what_the_lesson_has_is_counted(opened):
@@ -68,7 +67,7 @@ def test_only_what_the_lesson_has_is_counted(opened):
     for what, message in unknown.items():
         assert opened.tell(ada, message).endswith(f'no such {what}.')
     assert opened.tell(ada, unknown['cell'], event(number=1)).endswith('no such cell.')
-    assert len(opened.csv()) == 2
+    assert len(opened.events()) == 1
 
 
 def test_hidden_answers_do_not_leave_the_server(opened):
@@ -110,42 +109,47 @@ def test_a_guess_is_shown_until_it_is_compared(opened):
     assert opened.bars(OTHER) == {}
 
 
-def walk(opened, place):
-    """Write what presenter.js writes when the deck comes to a cell."""
-    path = f'presentation/02_{NAME}.ipynb'
-    began = {path: time.time() - 600} if place else {}  # the minutes begin after the first slide
-    deck = {'current': path, 'places': {path: place}, 'began': began}
-    file = opened.folder / 'jupyter/deck.json'
-    file.parent.mkdir(exist_ok=True)
-    file.write_text(json.dumps(deck))
+def walk(opened, cell, began_s):
+    """Tell what the deck tells when it comes to a cell."""
+    minutes = {'own': 4, 'planned': 6, 'all': 9}
+    slide = {'lesson': NAME, 'cell': cell, 'began_s': began_s, **minutes}
+    assert opened.do('slide', **slide) == 200
 
 
 def test_the_page_follows_the_deck_and_the_instructor(opened):
-    walk(opened, 7)
-    opened.wait_for(lambda view: view['step'] == '2. Look')
-    assert opened.view()['gone'] == 10
+    began_s = time.time() - 600
+    walk(opened, LATER, began_s)
+    view = opened.view()
+    assert (view['step'], view['gone']) == ('2. Look', 10)
+    assert [view[name] for name in ('own', 'planned', 'all')] == [4, 6, 9]
     opened.go(0)
     assert opened.view()['step'] == '02 Lose messages'
-    walk(opened, 0)
-    opened.wait_for(lambda view: view['gone'] == 0)
-    walk(opened, 2)
-    opened.wait_for(lambda view: view['step'] == '1. Count')
+    assert opened.view()['all'] == 4  # of the lesson
+    walk(opened, 'title', None)
+    assert opened.view()['gone'] == 0
+    walk(opened, STEP, began_s)
+    assert opened.view()['step'] == '1. Count'
+
+
+@pytest.mark.parametrize(
+    'wrong', [{}, {'lesson': 'lose_keys'}, {'began_s': 'now'}, {'own': -1}, {'more': 1}]
+)
+def test_a_slide_of_another_form_is_refused(opened, wrong):
+    opened.go(1)
+    minutes = {'own': 4, 'planned': 6, 'all': 9}
+    slide = {'lesson': NAME, 'cell': LATER, 'began_s': None, **minutes} | wrong
+    if not wrong:
+        del slide['cell']
+    assert opened.do('slide', **slide) == 400
+    assert opened.view()['step'] == '1. Count'
 
 
 def test_a_seat_that_leaves_is_forgotten(opened):
     ada = opened.join(name='Ada')
     opened.tell(ada, event(), event('hand', 1, up=True))
     assert opened.post('leave', {}, ada) == (200, {})
-    assert opened.csv()[1:] == opened.view()['hands'] == []
+    assert opened.events() == opened.view()['hands'] == []
     assert opened.post('events', {'events': [event()]}, ada)[0] == 403
-
-
-def test_the_csv_is_no_formula(opened):
-    ada = opened.join(name='=1+1')
-    opened.tell(ada, event(value='=HYPERLINK("http://192.0.2.1")'), event(number=1, value=-1))
-    rows = list(csv.reader(opened.csv()))
-    assert [row[3] for row in rows[1:]] == ['"=1+1"'] * 2
-    assert [row[-1] for row in rows[1:]] == ['"=HYPERLINK(\\"http://192.0.2.1\\")"', '-1']
 
 
 @given(st.lists(st.integers() | st.floats(allow_nan=False, allow_infinity=False)))
@@ -185,8 +189,8 @@ def test_attacks_on_the_form_of_an_event(store):
     for attack in ATTACKS:
         said = store.take(seat, [attack])
         assert re.fullmatch(r'[A-Z][^.]*\.', said), attack
-    assert len(store.as_csv().splitlines()) == 1
     assert store.view(NAME, 1)['guesses'][0]['answered'] == 0
+    assert store.view(NAME, 1)['hands'] == []
 
 
 def test_attacks_on_the_form_of_a_message(opened):
@@ -196,7 +200,7 @@ def test_attacks_on_the_form_of_a_message(opened):
         assert (status, list(answer)) == (400, ['error']), body
         assert answer['error'].startswith('This is no message to a class: it '), body
         assert opened.post('join', body)[0] == 400
-    assert opened.csv()[1:] == []
+    assert opened.events() == []
     assert opened.tell(ada, event()) == ''
 
 
@@ -214,7 +218,7 @@ def test_no_answer_tells_one_student_about_another(opened):
 
 def test_the_page_needs_the_secret(opened):
     own, secret, _ = opened.page.rsplit('/', 2)
-    for path in ('', 'live', 'class.csv', 'class.js'):
+    for path in ('', 'live', 'slide', 'class.js'):
         for wrong in (secret[:-1], secret + 'x', secret.upper() + 'A', 'x', opened.code):
             answer = WEB.get(f'{own}/{wrong}/{path}')
             assert answer.json() == {'error': 'This cannot be answered (404).'}

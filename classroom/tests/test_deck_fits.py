@@ -1,4 +1,4 @@
-"""Each deck: every slide is reached with Space, and nothing of it is cut off.
+"""Each deck: with Space every slide is reached and seen to its end, and nothing of it is cut off.
 
 All sizes are parts of the slide's height: what fits one projector of a shape fits each.
 """
@@ -8,12 +8,13 @@ import pytest
 from support.lab_page import PANEL
 from support.lab_server import NOTEBOOKS
 
+from classroom.deck.slides import slide_types
 from classroom.tests.support.deck_page import CUT_OFF
-from tools.lessons.slides import slide_types
 
 PROJECTORS = [(1280, 720), (1024, 768)]  # 16:9 and 4:3
 # This goes through a whole lesson, with the keys of the deck: from here, each slide would cost
-# several times as much. It says what is cut off, also when the answers of a quiz are open.
+# several times as much. It says what is cut off, also when the answers of a quiz are open, and
+# which slides are left before their end was seen.
 WALK = f"""async () => {{
     const cutOff = {CUT_OFF}, notebook = {PANEL}.content, found = [], visited = [];
     const frames = () => new Promise(done => requestAnimationFrame(() => setTimeout(done, 20)));
@@ -21,14 +22,17 @@ WALK = f"""async () => {{
     const press = key => notebook.activeCell.node.dispatchEvent(
         new KeyboardEvent('keydown', {{ key, bubbles: true, cancelable: true }}));
     const outer = notebook.outerNode;
-    for (let before = -1; ; press(' ')) {{
+    let end = 0;
+    for (let before = ''; ; press(' ')) {{
         await frames();
-        const cell = notebook.activeCellIndex, same = visited.at(-1) === number();
-        if (same && before === cell && document.querySelector('#deck-says').textContent) break;
-        before = cell;
-        if (!same) visited.push(number());
-        const over = outer.scrollHeight - outer.clientHeight;
-        if (over > 4) found.push(`slide ${{number()}} is ${{over}} px too high`);
+        const state = [number(), notebook.activeCellIndex, outer.scrollTop].join();
+        if (state === before && document.querySelector('#deck-says').textContent) break;
+        before = state;
+        if (visited.at(-1) !== number()) {{
+            if (end > 4) found.push(`slide ${{visited.at(-1)}} is left ${{end}} px before its end`);
+            visited.push(number());
+        }}
+        end = outer.scrollHeight - outer.clientHeight - outer.scrollTop;
         found.push(...cutOff());
         for (const answer of document.querySelectorAll('.deck-on details')) {{
             const title = answer.closest('.jp-Cell').querySelector('h3')?.textContent;

@@ -6,9 +6,9 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 
-from classroom.card import card
+from classroom.deck.copies import Copies
 from classroom.plan import plan_of, plans
-from classroom.present import MADE, Copies, main
+from classroom.present import main
 from tools import lab
 from tools.lessons.lesson import ROOT, lessons, minutes_of_note
 
@@ -26,10 +26,10 @@ def root(tmp_path):
     return tmp_path
 
 
-def copy_of(root, number=2, new=False, **how):
+def copy_of(root, number=2, new=False):
     """Make the copies, and return the path of one."""
     path = root / 'notebooks' / FILES[number - 1]
-    Copies(root, '', **how).make([path], new)
+    Copies(root).make([path], new)
     return root / 'presentation' / path.name
 
 
@@ -49,7 +49,6 @@ def test_a_copy_has_no_outputs_and_the_lesson_keeps_its_own(root):
     assert code(copy).outputs == []
     assert code(copy).execution_count is None
     assert code(copy).metadata.slideshow.slide_type == 'slide'
-    assert code(copy_of(root, outputs=True)).outputs[0].text == 'lost: 3\n'
     assert (root / 'notebooks/02_lose.ipynb').read_bytes() == before
 
 
@@ -59,11 +58,42 @@ def test_what_was_typed_is_kept_until_thrown_away(root):
     change(copy, 'typed()')
     change(other, 'typed()')
     change(root / 'notebooks/02_lose.ipynb', 'newer()')
-    (root / 'presentation' / MADE).write_text('')  # it was broken off
     assert code(copy_of(root)).source == 'typed()'
     assert Copies(root).used(copy.name)
+    assert nbformat.read(copy, as_version=4).metadata.deck.used  # the deck says it
     assert code(copy_of(root, new=True)).source == 'newer()'
     assert code(other).source == 'typed()'
+
+
+def test_what_was_run_is_kept_too(root):
+    copy = copy_of(root)
+    notebook = nbformat.read(copy, as_version=4)
+    notebook.cells[0].execution_count = 1
+    nbformat.write(notebook, copy)
+    change(root / 'notebooks/02_lose.ipynb', 'newer()')
+    assert code(copy_of(root)).source == 'run()'
+    assert Copies(root).used(copy.name)
+
+
+def test_a_copy_that_cannot_be_read_is_kept_until_thrown_away(root):
+    copy = copy_of(root)
+    copy.write_text('{ broken off')
+    copy_of(root)
+    assert copy.read_text() == '{ broken off'
+    assert Copies(root).used(copy.name)
+    assert code(copy_of(root, new=True)).source == 'run()'
+
+
+def test_the_place_of_the_deck_is_no_use(root):
+    copy = copy_of(root)
+    notebook = nbformat.read(copy, as_version=4)
+    notebook.metadata.deck |= {'place': notebook.cells[0].id, 'began': 1.5}
+    nbformat.write(notebook, copy)
+    assert Copies(root).used(copy.name) == ''
+    copy_of(root)
+    assert nbformat.read(copy, as_version=4).metadata.deck.began == 1.5
+    copy_of(root, new=True)
+    assert 'began' not in nbformat.read(copy, as_version=4).metadata.deck
 
 
 def test_an_untouched_copy_follows_its_lesson(root):
@@ -88,14 +118,6 @@ def test_a_timetable_has_its_steps_and_minutes_only(tmp_path, plan):
     assert minutes == {name: known[name].minutes_of(steps) for name, steps in plan.steps.items()}
     for name, following in zip(plan.steps, [*plan.steps][1:], strict=False):
         assert f']({following})' in shown[name].cells[-1].source
-
-
-@pytest.mark.parametrize('plan', plans(), ids=[plan.title for plan in plans()])
-def test_a_card_takes_as_long_as_its_timetable(plan):
-    minutes = sum(int(own) for own, _ in plan.rows)
-    page = card(plan)
-    assert f'{plan.title}: {minutes // 60} h {minutes % 60} min</h1>' in page
-    assert 'black; any key brings the slide back' in page
 
 
 def test_a_timetable_is_named_by_a_word():

@@ -114,8 +114,7 @@ ADDED = [
     ('tasks_are_checked', code('run()', 'check')),
     ('tagged', note('Ask first.')),
     ('tagged', new_raw_cell('For the instructor: ask')),
-    ('fits_a_slide', code('\n'.join(['run()'] * (rules.MAX_CODE_LINES + 1)))),
-    ('fits_a_slide', printed('line\n' * 40)),
+    ('fits_a_screen', code('\n'.join(['run()'] * (rules.MAX_CODE_LINES + 1)))),
     ('links_lead_somewhere', new_markdown_cell('[there](nowhere.ipynb)')),
 ]
 

@@ -1,6 +1,7 @@
 // The deck of `make present`: the copies of lessons in the folder `presentation` as slides whose
-// cells run. Which cell starts a slide is in the copies (tools/lessons/slides.py). The server keeps
-// the place (classroom/notes_window), for a reload, the notes window and the class page.
+// cells run. Which cell starts a slide is in the copies (../slides.py), and the deck keeps its place
+// there, in the metadata `deck`. It tells its place to the notes window (notes.js), which it opens,
+// and to the class page (README.md), if a class is open.
 //
 // JupyterLab loads this file as it is, in the form of a prebuilt extension. It hands over its own
 // packages, so that neither webpack nor npm is needed, and nothing of it that is not public.
@@ -15,8 +16,8 @@ const EVERYWHERE = ['pagedown', 'pageup', 'b', '.', 'n', 'escape', 'f5', 'Contro
 
 let packages; // of JupyterLab, by name
 let server; // { baseUrl, ask, open }
+let markdown; // JupyterLab's parser
 let deck; // the notebook's panel that is shown as slides, or nothing
-let kept = { places: {}, began: {} }; // by the notebook's path; `began` in seconds
 let twice = {}; // a key that does something at its second press
 
 async function packageOf(name) {
@@ -25,9 +26,14 @@ async function packageOf(name) {
 }
 
 async function extension() {
-  const [notebook, services, apputils] = await Promise.all(['notebook', 'services', 'apputils'].map(packageOf));
-  const activate = (app, tracker) => begin(app, tracker, notebook.NotebookActions, services.ServerConnection, apputils.Dialog);
-  const plugin = { id: 'presenter:plugin', autoStart: true, requires: [notebook.INotebookTracker], activate };
+  const names = ['notebook', 'services', 'apputils', 'rendermime'];
+  const [notebook, services, apputils, rendermime] = await Promise.all(names.map(packageOf));
+  const activate = (app, tracker, parser) => {
+    markdown = parser;
+    begin(app, tracker, notebook.NotebookActions, services.ServerConnection, apputils.Dialog);
+  };
+  const requires = [notebook.INotebookTracker, rendermime.IMarkdownParser];
+  const plugin = { id: 'presenter:plugin', autoStart: true, requires, activate };
   return () => ({ __esModule: true, default: plugin });
 }
 
@@ -42,7 +48,7 @@ function say(text) {
   line.textContent = text;
 }
 
-async function begin(app, tracker, actions, { makeRequest }, dialog) {
+function begin(app, tracker, actions, { makeRequest }, dialogs) {
   const { serverSettings } = app.serviceManager;
   const { baseUrl } = serverSettings;
   const ask = async (what, body) => {
@@ -52,14 +58,13 @@ async function begin(app, tracker, actions, { makeRequest }, dialog) {
     return answer;
   };
   server = { baseUrl, ask, open: path => app.commands.execute('docmanager:open', { path }) };
-  for (const file of ['notes/look.css', 'lab/extensions/presenter/deck.css'])
+  for (const file of ['deck/look.css', 'lab/extensions/presenter/deck.css'])
     document.head.append(element('link', { rel: 'stylesheet', href: baseUrl + file }));
   document.body.append(head, line, back);
   back.onclick = () => show(tracker.currentWidget);
-  const fetched = ask('deck/state').then(async answer => (kept = { ...kept, ...(await answer.json()) })).catch(console.warn);
   const open = async panel => {
     if (!panel?.context.path.startsWith('presentation/')) return;
-    await Promise.all([fetched, panel.context.ready, panel.revealed]);
+    await Promise.all([panel.context.ready, panel.revealed]);
     if (!panel.isDisposed && tracker.currentWidget === panel && deck !== panel) {
       prepare(panel);
       show(panel);
@@ -79,13 +84,16 @@ async function begin(app, tracker, actions, { makeRequest }, dialog) {
     if (deck && event.target.closest?.('.jp-MarkdownCell')) event.stopImmediatePropagation();
   }, true);
   window.addEventListener('message', onGuesses);
+  window.addEventListener('message', onNotesWindow);
   window.addEventListener('resize', () => deck && fit());
-  // A dialog has no place on a projector, and would take the keys: a line says what it says.
+  // A dialog has no place on a projector, and would take the keys: a line says what it says, and its
+  // answer is that of Escape. JupyterLab cannot be told to ask elsewhere.
   new MutationObserver(() => {
-    const found = deck && document.querySelector('.jp-Dialog');
-    if (!found) return;
-    say([...found.querySelectorAll('.jp-Dialog-header, .jp-Dialog-body')].map(part => part.textContent).join('. '));
-    dialog.flush();
+    const asks = deck && dialogs.tracker.find(({ isAttached }) => isAttached);
+    if (!asks) return;
+    const parts = asks.node.querySelectorAll('.jp-Dialog-header, .jp-Dialog-body');
+    say([...parts].map(part => part.textContent).join('. '));
+    asks.reject();
   }).observe(document.body, { childList: true });
 }
 
@@ -103,34 +111,44 @@ function prepare(panel) {
   // The end of an output comes into view, until somebody scrolls.
   const grown = new ResizeObserver(() => panel === deck && fit());
   grown.observe(content.viewportNode);
+  content.outerNode.addEventListener('scroll', () => panel === deck && showMore(), { passive: true });
   for (const kind of ['wheel', 'touchmove'])
     content.node.addEventListener(kind, () => (panel.deckFollows = false), { passive: true });
 }
 
-// What was typed or run is saved at once. Two saves must not overlap: JupyterLab takes the file of the
-// first one for somebody else's, and asks about "File Changed". And after a save it takes a notebook
-// for unchanged that was changed meanwhile, so what has changed is known here.
+// What was typed or run is saved at once, one save after the other: of two that overlap, JupyterLab
+// takes the file of the first one for somebody else's, and asks about "File Changed". So its own
+// timer is off (SETTINGS in present.py). After a save JupyterLab takes a notebook for unchanged that
+// was changed meanwhile, so what has changed is known here.
 function keepSaved(panel) {
   const { context } = panel;
-  const save = context.save.bind(context);
   let last = Promise.resolve();
   let timer = null;
   let changed = false;
-  context.save = options => (last = last.catch(() => {}).then(() => save(options)));
-  const now = () => {
+  panel.deckSaves = () => {
     clearTimeout(timer);
     timer = null;
-    if (!changed || context.isDisposed) return;
     changed = false;
-    context.save().catch(() => (changed = true));
+    last = last.then(() => (context.isDisposed ? undefined : context.save())).catch(() => (changed = true));
+    return last;
   };
+  const now = () => changed && void panel.deckSaves();
   panel.deckChanges = () => {
     changed = true;
-    timer ??= setTimeout(now, SAVE_MS);
+    timer ??= setTimeout(panel.deckSaves, SAVE_MS);
   };
   context.model.contentChanged.connect(panel.deckChanges);
   for (const kind of ['beforeunload', 'pagehide', 'blur']) window.addEventListener(kind, now);
   document.addEventListener('visibilitychange', now);
+}
+
+// What the copy keeps: `place`, the id of a cell; `began`, since when the minutes run, in seconds;
+// `used`, when something was typed or run before the server started.
+const kept = (panel = deck) => panel.model.getMetadata('deck') ?? {};
+
+function keep(changes) {
+  // What is undefined is not in the file.
+  deck.model.setMetadata('deck', JSON.parse(JSON.stringify({ ...kept(), ...changes })));
 }
 
 function show(panel) {
@@ -140,10 +158,11 @@ function show(panel) {
   panel.addClass('jp-Deck');
   document.body.dataset.jpDeckMode = 'presenting';
   panel.fit();
-  const { path } = panel.context;
-  const place = panel.content.activeCellIndex || kept.places[path] || 0;
-  goTo(slideOf(place), place);
-  if (kept.used?.[path]) say(`Used on ${kept.used[path]}, with what was typed and run. R R: a fresh one.`);
+  const { place, used } = kept();
+  const saved = panel.content.widgets.findIndex(({ model }) => model.id === place);
+  const index = panel.content.activeCellIndex || Math.max(saved, 0);
+  goTo(slideOf(index), index);
+  if (used) say(`Used on ${used}, with what was typed and run. R R: a fresh one.`);
 }
 
 function leave() {
@@ -239,21 +258,13 @@ function update() {
   if (place === shownPlace) return;
   shownPlace = place;
   const now = Date.now() / 1000;
-  if (number > 0 && !(now - kept.began[path] < LESSON_S)) kept.began[path] = now;
-  kept.current = path;
-  kept.places[path] = activeCellIndex;
-  keep();
+  const { began } = kept();
+  const begins = number > 0 && !(now - began < LESSON_S);
+  keep({ place: widgets[activeCellIndex].model.id, ...(begins ? { began: now } : {}) });
+  void tell(place);
   const about = [activeCellIndex, ...slide].map(index => widgets[index]).find(hasGuess);
   document.getElementById('deck-guesses')?.remove();
   if (about) void showGuesses(about, place);
-}
-
-let sent = Promise.resolve();
-
-function keep() {
-  const { current, places, began } = kept;
-  const body = { current, places, began };
-  sent = sent.then(() => server.ask('deck/state', body)).catch(console.warn);
 }
 
 // The letters are as large as the slide has room for. What grows below it comes into view.
@@ -264,12 +275,89 @@ function fit() {
     node.style.setProperty('--deck-scale', scale);
     if (viewportNode.getBoundingClientRect().height <= outer.clientHeight) break;
   }
+  showMore();
   const cell = deck.content.activeCell?.node;
   const end = cell && cell.getBoundingClientRect().bottom - outer.getBoundingClientRect().bottom;
   if (deck.deckFollows && end > 0) outer.scrollTop += end;
 }
 
+// Whether something is below.
+function showMore() {
+  const { scrollTop, scrollHeight, clientHeight } = scroller();
+  deck.toggleClass('deck-more', scrollTop + clientHeight < scrollHeight - 4);
+}
+
+// --- The notes window ----------------------------------------------------------------------------
+
+const NOTES = 'lab/extensions/presenter/notes.html';
+let told = null; // what the notes window shows
+let notesWindow = null; // the last one that has asked
+
+// Each of the two may be reloaded, so the window asks, again and again.
+function onNotesWindow({ origin, source, data }) {
+  if (origin !== location.origin || data !== 'notes?') return;
+  notesWindow = source;
+  source.postMessage(told, origin);
+}
+
+const minutesOf = source => Number(/^For the instructor: (\d+) minutes/.exec(source)?.[1] ?? 0);
+
+// Of a note, lines stay lines.
+const htmlOf = ({ type, source, isNote }) =>
+  type === 'code'
+    ? element('pre', { textContent: source }).outerHTML
+    : markdown.render(isNote ? source.replace(/(?<=\S)\n(?=\S)/g, '  \n') : source);
+
+// Tell the notes of this step, the next slide, and the minutes, to the notes window and the class.
+async function tell(place) {
+  const { content, context } = deck;
+  const cells = content.widgets.map(({ model }) => ({
+    id: model.id,
+    type: model.type,
+    source: model.sharedModel.getSource(),
+    isNote: Boolean(model.getMetadata('tags')?.includes('notes')),
+  }));
+  const at = content.activeCellIndex;
+  const starts = index => cells[index].type === 'markdown' && /^##? /.test(cells[index].source);
+  const indices = [...cells.keys()];
+  const step = indices.findLast(index => index <= at && starts(index)) ?? 0;
+  const end = indices.find(index => index > at && starts(index)) ?? cells.length;
+  const notesIn = (from, to) => cells.slice(from, to).filter(({ isNote }) => isNote);
+  const minutesIn = (from, to) => notesIn(from, to).reduce((sum, { source }) => sum + minutesOf(source), 0);
+  const titleOf = ({ source }) => source.split('\n')[0].replace(/^#+ /, '');
+  const all = slides();
+  const { began } = kept();
+  const minutes = { own: minutesIn(step, end), planned: minutesIn(0, end), all: minutesIn(0) };
+  const path = context.path;
+  void tellClass({ lesson: path.match(/\d\d_(\w+)\.ipynb$/)?.[1], cell: cells[at].id, began_s: began ?? null, ...minutes });
+  const following = (all[here() + 1] ?? []).map(index => cells[index]);
+  const state = {
+    lesson: titleOf(cells[0]),
+    step: titleOf(cells[step]),
+    slide: here() + 1,
+    slides: all.length,
+    began,
+    ...minutes,
+    notes: (await Promise.all(notesIn(step, end).map(htmlOf))).join(''),
+    next: (await Promise.all(following.map(htmlOf))).join(''),
+  };
+  if (place !== shownPlace) return; // the deck has gone on meanwhile
+  told = state;
+  notesWindow?.postMessage(told, location.origin);
+}
+
 // --- The class page ------------------------------------------------------------------------------
+
+let page; // a promise of its address: no text if no class is open
+
+const pageOfClass = () => (page = server.ask('deck/class').then(answer => answer.text()).catch(() => ''));
+
+// The answer of another server cannot be read, and need not be.
+async function tellClass(slide) {
+  const address = await pageOfClass();
+  const init = { method: 'POST', mode: 'no-cors', body: JSON.stringify(slide) };
+  if (address) await fetch(`${address}slide`, init).catch(() => {}); // it is over
+}
 
 function hasGuess({ model }) {
   const source = model.sharedModel.getSource();
@@ -277,11 +365,11 @@ function hasGuess({ model }) {
 }
 
 async function showGuesses({ model, node }, place) {
-  const page = await server.ask('class').then(answer => answer.text());
-  const reached = page && (await fetch(page, { mode: 'no-cors' }).catch(() => null));
+  const address = await page;
+  const reached = address && (await fetch(address, { mode: 'no-cors' }).catch(() => null));
   if (!reached || place !== shownPlace) return;
   document.getElementById('deck-guesses')?.remove(); // of a second call
-  const src = `${page}#cell=${model.id}`;
+  const src = `${address}#cell=${model.id}`;
   node.append(element('iframe', { id: 'deck-guesses', title: 'Guesses of the class', src }));
 }
 
@@ -312,14 +400,14 @@ const KEYS = {
   'Shift enter': run,
   i: () => again('i', 'I again: interrupt the cell', () => deck.sessionContext.session?.kernel?.interrupt()),
   0: () => again('0', '0 again: restart the kernel', restart),
-  r: () => kept.used?.[deck.context.path] && again('r', 'R again: throw away what was typed and run', fresh),
+  r: () => kept().used && again('r', 'R again: throw away what was typed and run', fresh),
   b: () => document.body.classList.add('deck-black'),
   '.': () => document.body.classList.add('deck-black'),
-  n: () => void window.open(`${server.baseUrl}notes/`, 'notes', 'popup'),
+  n: () => void window.open(server.baseUrl + NOTES, 'notes', 'popup'),
   escape,
-  f5: () => void deck.context.save(),
-  'Control s': () => void deck.context.save(),
-  'Control r': () => deck.context.save().finally(() => location.reload()),
+  f5: () => void deck.deckSaves(),
+  'Control s': () => void deck.deckSaves(),
+  'Control r': () => deck.deckSaves().then(() => location.reload()),
 };
 
 function onKey(event, tracker, actions) {
@@ -329,10 +417,12 @@ function onKey(event, tracker, actions) {
   const key = [...modifiers.filter(name => name !== 'Shift' || !letter && low !== 'f5'), low].join(' ');
   if (!deck) {
     // A clicker's start button is F5, as in other programs for slides.
-    if (key !== 'f5' || !prepared.has(tracker.currentWidget)) return;
+    const panel = tracker.currentWidget;
+    const does = { f5: () => show(panel), 'Control s': () => void panel.deckSaves() }[key];
+    if (!does || !prepared.has(panel)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    show(tracker.currentWidget);
+    does();
     return;
   }
   const { target } = event;
@@ -418,7 +508,7 @@ function previous() {
 
 // A copy in which something was typed before is from now on the one that is shown.
 function used() {
-  if (kept.used) delete kept.used[deck.context.path];
+  if (kept().used) keep({ used: undefined });
 }
 
 function toStep(way) {
@@ -448,7 +538,7 @@ function toCell(index) {
 }
 
 function first() {
-  delete kept.began[deck.context.path]; // the minutes begin again
+  keep({ began: undefined }); // the minutes begin again
   shownPlace = '';
   deck.deckOpened = new Set();
   goTo(0);
@@ -514,10 +604,9 @@ async function restart() {
 
 async function fresh() {
   const { context, sessionContext } = deck;
-  await context.save();
+  await deck.deckSaves();
   await server.ask('deck/fresh', { path: context.path });
   await context.revert();
-  used();
   deck.deckOpened = new Set();
   first();
   say('');

@@ -7,6 +7,7 @@ import json
 import os
 import re
 import signal
+import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -151,9 +152,12 @@ class RunningClass:
         [found] = [one for one in self.view()['guesses'] if one['question'] == question]
         return {bar['label']: bar['count'] for bar in found['bars']}
 
-    def csv(self) -> list[str]:
-        """Return the lines of the CSV, the heading first."""
-        return WEB.get(f'{self.page}class.csv', timeout=LIMIT_S).text.splitlines()
+    def events(self) -> list[tuple]:
+        """Return what the class keeps: kind, what it is about, and the value, in their order."""
+        file = self.folder / 'jupyter/class/class.sqlite'
+        with contextlib.closing(sqlite3.connect(file)) as db:
+            rows = db.execute('SELECT kind, what, value FROM events ORDER BY n').fetchall()
+        return [(kind, what, json.loads(value)) for kind, what, value in rows]
 
     def wait_for(self, condition) -> dict:
         """Wait until the page shows what fulfils a condition, and return it."""

@@ -17,13 +17,13 @@ SLIDE_DRAWN = f"""index => {{
         && slide.every(cell => [...cell.node.querySelectorAll('img')].every(img => img.complete));
 }}"""
 SLIDES_SHOWN = "() => document.querySelector('.jp-Deck .deck-on')?.isConnected"
-# What of a slide is cut off, or needs a scroll bar.
+# What of a slide is cut off at a side, or needs a scroll bar of its own.
 CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
     if (!cell.node.classList.contains('deck-on')) return [];
     const found = [];
     const box = cell.node.getBoundingClientRect();
-    if (box.top < 0 || box.bottom > innerHeight || box.left < 0 || box.right > innerWidth)
-        found.push(`cell ${{index}} ends at ${{box.right.toFixed()}}, ${{box.bottom.toFixed()}}`);
+    if (box.left < 0 || box.right > innerWidth)
+        found.push(`cell ${{index}} ends at ${{box.right.toFixed()}}`);
     for (const part of cell.node.querySelectorAll(
         '.cm-scroller, .jp-RenderedMarkdown, .jp-OutputArea-output, pre, table, img')) {{
         const inner = part.getBoundingClientRect();
@@ -53,6 +53,15 @@ class DeckPage(LabPage):
     def press(self, key: str) -> int:
         """Press a key that leads to another cell, and return its index once it is shown."""
         active = self.leave_with(key)
+        self.wait_for_slide(active)
+        return active
+
+    def go_on(self) -> int:
+        """Press Space until the next slide is shown, and return its active cell."""
+        number = self.page.text_content('#deck-head span')
+        while self.page.text_content('#deck-head span') == number:
+            self.page.keyboard.press('Space')
+        active = self.active()
         self.wait_for_slide(active)
         return active
 

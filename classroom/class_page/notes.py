@@ -5,8 +5,8 @@ import re
 from nbconvert.filters import markdown2html
 from nbformat import NotebookNode
 
+from classroom.deck.slides import heading
 from tools.lessons.lesson import first_heading, minutes_of_note, tags
-from tools.lessons.slides import heading
 
 
 def of_step(cells: list[NotebookNode], at: int) -> dict:
