@@ -21,10 +21,9 @@ def main() -> None:
     parser.add_argument('more', nargs='*', help="JupyterHub's own options, after --")
     options = parser.parse_args()
     if options.containers:
-        from classroom.hub.service import service, take_address  # only they need docker
+        from classroom.hub.service import service  # only this needs docker
 
         os.environ |= {'DOCKER_HOST': service(), 'CONTAINERS': 'yes'}
-        take_address()
     command = [sys.executable, '-m', 'jupyterhub', '--config', str(HERE / 'jupyterhub_config.py')]
     os.execv(sys.executable, [*command, *options.more])
 

@@ -88,7 +88,8 @@ async def hold(store: ClassStore) -> None:
         log_function=lambda handler: None,
     )
     where = urlsplit(os.environ['JUPYTERHUB_SERVICE_URL'])
-    serve(application, bind_sockets(where.port, where.hostname, socket.AF_INET))
+    address = os.environ.get('CLASS_LISTEN', where.hostname)
+    serve(application, bind_sockets(where.port, address, socket.AF_INET))
     await over.wait()
 
 

@@ -4,11 +4,10 @@ Everybody who has an account on this machine may log in, with its password. With
 student's server runs in a container of the image of `make image`, with limits of its own.
 """
 
-import asyncio
 import os
 import socket
-import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -18,13 +17,28 @@ from helpers.checks.classroom import HUB_VARIABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 STATE = ROOT / '.jupyter/hub'
-FIRST_PORT = 20000
+FIRST_PORT, LAST_PORT = 20000, 32767  # of the students' servers
+
+
+def is_free(port: int, address: str = '') -> bool:
+    """Return whether a server could have this port now; 0 stands for any."""
+    with suppress(OSError), socket.create_server((address, port)):
+        return True
+    return False
+
+
+def port_of(wanted: int) -> int:
+    """Return a port that is free: the wanted one, or one of those that follow."""
+    return next(filter(is_free, range(wanted, LAST_PORT)))
+
 
 STATE.mkdir(mode=0o700, parents=True, exist_ok=True)
 c = get_config()  # noqa: F821
 
 c.JupyterHub.bind_url = 'http://127.0.0.1:8000'
-c.JupyterHub.hub_bind_url = 'http://127.0.0.1:8081'
+HUB_PORT, CLASS_PORT = port_of(8081), port_of(8764)
+c.JupyterHub.hub_bind_url = f'http://127.0.0.1:{HUB_PORT}'
+c.ConfigurableHTTPProxy.api_url = f'http://127.0.0.1:{port_of(8001)}'
 c.JupyterHub.db_url = f'sqlite:///{STATE}/jupyterhub.sqlite'
 c.JupyterHub.cookie_secret_file = str(STATE / 'cookie_secret')
 c.ConfigurableHTTPProxy.pid_file = str(STATE / 'proxy.pid')
@@ -73,19 +87,22 @@ c.Spawner.args = [
 
 
 def choose_port(spawner) -> None:
-    """Give each student's server a port that no other one takes."""
-    spawner.port = FIRST_PORT + spawner.user.id
+    """Give each student's server a port of its own: many start at the same moment."""
+    ports = range(FIRST_PORT + spawner.user.id % 1000, LAST_PORT, 1000)
+    spawner.port = next(filter(is_free, ports))
 
 
 c.Spawner.pre_spawn_hook = choose_port
 
 # The class that sees itself. The kernels of the students tell it; its page is for administrators.
-CLASS_URL = 'http://127.0.0.1:8764'
+CLASS_URL = f'http://127.0.0.1:{CLASS_PORT}'
 c.JupyterHub.services = [
     {
         'name': 'class',
         'url': CLASS_URL,
-        'command': [sys.executable, '-m', 'classroom.hub.class_service'],
+        # It ends with the hub, also if that is killed.
+        'command': ['setpriv', '--pdeathsig', 'TERM', sys.executable]
+        + ['-m', 'classroom.hub.class_service'],
         'cwd': str(ROOT),
         'environment': {'CLASS_FOLDER': str(STATE)},
         'oauth_no_confirm': True,
@@ -112,85 +129,35 @@ c.JupyterHub.load_roles.append(
 
 # --- Each student in a container -----------------------------------------------------------------
 
-STUDENT = 1000  # the user of the image
-DISK = '1G'  # what a student may fill
-
-
-def mount_disk(name: str) -> Path:
-    """Return the student's home, on a disk of their own. Raises RuntimeError.
-
-    All its room is taken from the machine's disk at once: that one cannot become full in a lesson.
-    """
-    home, disk = STATE / 'homes' / name, STATE / 'disks' / name
-    if not disk.exists():
-        disk.parent.mkdir(exist_ok=True)
-        new = disk.with_suffix('.new')
-        options = f'nodiscard,root_owner={STUDENT}:{STUDENT}'
-        try:
-            for command in (
-                ['fallocate', f'--length={DISK}', new],
-                ['mkfs.ext4', '-q', '-F', '-m', '0', '-E', options, new],
-            ):
-                subprocess.run(command, check=True, capture_output=True, text=True)
-        except subprocess.CalledProcessError as problem:
-            new.unlink(missing_ok=True)
-            # The student sees this, too.
-            raise RuntimeError(
-                f'There is no room for your disk of {DISK}: tell your teacher '
-                f'({problem.stderr.strip()}).'
-            ) from None
-        new.rename(disk)
-    home.mkdir(parents=True, exist_ok=True)
-    if not home.is_mount():
-        subprocess.run(['mount', '-o', 'loop,nosuid,nodev', disk, home], check=True)
-    return home
-
-
-def make_network(name: str) -> None:
-    """Make a network if there is none with this name."""
-    import docker
-
-    networks = docker.from_env().networks
-    if name not in {one.name for one in networks.list()}:
-        networks.create(name, driver='bridge')
-
-
-async def prepare_container(spawner) -> None:
-    """Give a student a disk of their own, which cannot fill the machine's, and a network."""
-    spawner.port = 8888
-    name = spawner.escaped_name
-    spawner.network_name = f'ros2-{name}'
-    # In threads: meanwhile the hub answers others.
-    home = await asyncio.to_thread(mount_disk, name)
-    await asyncio.to_thread(make_network, spawner.network_name)
-    spawner.volumes = {str(home): '/home/student'}
-
-
 if os.environ.get('CONTAINERS') == 'yes':
     from docker.types import Ulimit
 
-    from classroom.hub.service import HUB, IMAGE
+    from classroom.hub.service import IMAGE, gateway
 
-    # An address of this machine that its containers reach, and no other machine knows: not the
-    # network's. The hub asks for the students' tokens there.
-    c.JupyterHub.hub_bind_url = f'http://{HUB}:8081'
-    CLASS_URL = f'http://{HUB}:8764'
-    c.JupyterHub.services[0]['url'] = CLASS_URL
+    # The address of this machine in the network of the containers. Podman has it only while one of
+    # them runs: then the hub listens at all addresses.
+    HOST = gateway(os.environ['DOCKER_HOST'])
+    LISTEN, LOCAL = (HOST, HOST) if is_free(0, HOST) else ('0.0.0.0', '127.0.0.1')
+    c.JupyterHub.hub_bind_url = f'http://{LISTEN}:{HUB_PORT}'
+    c.JupyterHub.hub_connect_url = f'http://{LOCAL}:{HUB_PORT}'
+    c.Spawner.hub_connect_url = f'http://{HOST}:{HUB_PORT}'
+    c.JupyterHub.services[0]['url'] = f'http://{LOCAL}:{CLASS_PORT}'
+    c.JupyterHub.services[0]['environment']['CLASS_LISTEN'] = LISTEN
     c.JupyterHub.spawner_class = 'dockerspawner.DockerSpawner'
-    c.Spawner.pre_spawn_hook = prepare_container
+    c.Spawner.pre_spawn_hook = None
+    c.Spawner.port = 8888
     c.Spawner.cmd = ['/opt/ros2_notebooks/classroom/container/start_student.sh']
     c.Spawner.notebook_dir = '/home/student/ros2_notebooks'
-    # A trash on a full disk would keep it full.
-    c.Spawner.args.append('--FileContentsManager.delete_to_trash=False')
     c.Spawner.mem_limit, c.Spawner.cpu_limit = '2G', 2
     c.DockerSpawner.image = IMAGE
     c.DockerSpawner.pull_policy = 'never'
     c.DockerSpawner.remove = True
+    c.DockerSpawner.volumes = {'ros2_notebooks_{username}': '/home/student'}
     c.DockerSpawner.extra_host_config = {
         'shm_size': '256m',
         'pids_limit': 400,
         # Podman's own are more than some machines allow. `nproc` counts all students together:
-        # what one may have is pids_limit.
+        # what each student may have is pids_limit.
         'ulimits': [
             Ulimit(name='nofile', soft=4096, hard=4096),
             Ulimit(name='nproc', soft=30000, hard=30000),
@@ -202,6 +169,6 @@ if os.environ.get('CONTAINERS') == 'yes':
         'tmpfs': {'/tmp': 'size=64m,mode=1777'},
     }
     c.Spawner.environment = {
-        HUB_VARIABLE: f'{CLASS_URL}/services/class',
-        'TMPDIR': '/home/student/.tmp',  # builds and temporary files go to the student's disk
+        HUB_VARIABLE: f'http://{HOST}:{CLASS_PORT}/services/class',
+        'TMPDIR': '/home/student/.tmp',  # builds and temporary files go to the student's volume
     }

@@ -29,8 +29,8 @@ NO_NETWORK = ('Temporary failure', 'Could not connect', 'Failed to fetch', 'chec
 def folder():
     folder = Path(tempfile.mkdtemp(prefix='container-', dir='/var/tmp'))
     yield folder
-    # The disks of students, and where podman has mounted its images. Podman may mount these once
-    # more, in the process that cleans up after a container.
+    # Where podman has mounted its images. It may mount these once more, in the process that cleans
+    # up after a container.
     limit = time.monotonic() + END_S
     while folder.exists() and time.monotonic() < limit:
         for line in reversed(Path('/proc/self/mounts').read_text().splitlines()):
