@@ -175,6 +175,24 @@ def test_a_clone_follows_its_origin(tmp_path, capsys):
     assert read(clone / 'notebooks', '03_lose.ipynb') == before
 
 
+@pytest.mark.parametrize('name', ['../mine/helper.py', '/tmp/helper.py', 'link/helper.py', 'pipe'])
+def test_an_archive_that_writes_elsewhere_is_refused(tmp_path, mine, capsys, name):
+    file = tmp_path / 'a.tar'
+    with tarfile.open(file, 'w') as archive:
+        if name.startswith('link'):
+            link = tarfile.TarInfo('link')
+            link.type, link.linkname = tarfile.SYMTYPE, str(mine)
+            archive.addfile(link)
+        member = tarfile.TarInfo(name)
+        if name == 'pipe':
+            member.type = tarfile.FIFOTYPE
+        archive.addfile(member)
+    assert update.main([str(file), '--to', str(mine)]) == 1
+    assert 'is no archive of `make handout`' in capsys.readouterr().err
+    assert (mine / 'helper.py').read_text() == 'old'
+    assert len(list(mine.iterdir())) == 4
+
+
 def test_an_unreadable_archive_gives_one_sentence(tmp_path, mine, capsys):
     text, other = tmp_path / 'a.tar.gz', tmp_path / 'b.tar.gz'
     text.write_text('no archive')
