@@ -26,7 +26,7 @@ test-browser: ## the real JupyterLab and the site in Chromium, as students use t
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/browser $(PYTEST_ARGS)
 
-test-classroom: ## deck, notes and class page; then a class of 12 on a JupyterHub, and the container; it takes minutes
+test-classroom: ## slides, notes and class page; then a class of 12 on a JupyterHub, and the container; it takes minutes
 	@tools/set_up.sh browser && { classroom/hub/set_up.sh || echo 'LEFT OUT: the hub.'; }
 	@failed=0; \
 	$(PYTHON) -m pytest -n 2 $(slow) --ignore classroom/tests/hub classroom/tests $(PYTEST_ARGS) || failed=$$?; \

@@ -228,6 +228,7 @@ def into_a_cell(deck):
     deck.key('Space')
     place = deck.page.active()
     assert place > 0
+    deck.tab.wait_for_function(SAVED)
     deck.tab.reload()
     deck.page.wait_for_notebook(f'presentation/{following.file}')
     deck.page.wait_for_slide(place)

@@ -48,7 +48,7 @@ def code(lines=3, *tags, **metadata):
             ['slide', '', 'subslide', '', '', ''],
         ),
         # Questions start slides, also without code between them.
-        ([STEP, QUESTION, QUESTION], ['slide', '', 'subslide']),
+        ([STEP, QUESTION, new_markdown_cell('### Question 2')], ['slide', '', 'subslide']),
         # Much code is on two slides; what is folded does not count.
         ([STEP, code(LINES), code(1)], ['slide', '', 'subslide']),
         ([STEP, code(LINES), code(99, 'harness'), code(1)], ['slide', '', '', 'subslide']),
