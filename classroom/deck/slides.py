@@ -70,7 +70,7 @@ def folded(cell: NotebookNode) -> bool:
     """Return whether a slide shows of a cell only the first line and the outputs."""
     if cell.cell_type != 'code':
         return False
-    if tags(cell) & {'check', 'harness'} or cell.metadata.get('jupyter', {}).get('source_hidden'):
+    if cell.metadata.get('jupyter', {}).get('source_hidden'):
         return True
     try:
         statements = ast.parse(cell.source).body

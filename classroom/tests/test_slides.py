@@ -9,6 +9,7 @@ TITLE = new_markdown_cell('# 02 Lose messages\n\n**You need** lesson 01.')
 STEP = new_markdown_cell('## 1. Build\n\nA node.')
 TASK = new_markdown_cell('### ✎ Task 1')
 QUESTION = new_markdown_cell('### Question 1')
+FOLDED = {'source_hidden': True}
 
 
 def text(source='Look at the output.', *tags):
@@ -37,21 +38,14 @@ def code(lines=3, *tags, **metadata):
         # A task starts a slide, but joins a text before it. All that belongs to it is on one slide.
         ([STEP, TASK, code()], ['slide', '', '']),
         (
-            [
-                STEP,
-                code(),
-                TASK,
-                code(9),
-                code(40, 'check'),
-                code(40, 'solution', jupyter={'source_hidden': True}),
-            ],
+            [STEP, code(), TASK, code(9), code(1, 'check'), code(40, jupyter=FOLDED)],
             ['slide', '', 'subslide', '', '', ''],
         ),
         # Questions start slides, also without code between them.
         ([STEP, QUESTION, new_markdown_cell('### Question 2')], ['slide', '', 'subslide']),
         # Much code is on two slides; what is folded does not count.
         ([STEP, code(LINES), code(1)], ['slide', '', 'subslide']),
-        ([STEP, code(LINES), code(99, 'harness'), code(1)], ['slide', '', '', 'subslide']),
+        ([STEP, code(LINES), code(99, jupyter=FOLDED), code(1)], ['slide', '', '', 'subslide']),
         ([STEP, code(LINES + 9)], ['slide', '']),
         ([TITLE, text(), text('', 'deck-break'), code()], ['slide', '', 'subslide', '']),
         ([TITLE, code(), code(1, 'deck-break')], ['slide', '', 'subslide']),
@@ -67,9 +61,7 @@ def test_the_rule(cells, types):
 @pytest.mark.parametrize(
     ('cell', 'is_folded'),
     [
-        (code(1, 'check'), True),
-        (code(1, 'harness'), True),
-        (code(1, jupyter={'source_hidden': True}), True),
+        (code(1, jupyter=FOLDED), True),
         (new_code_cell('import math\nfrom pathlib import Path'), True),
         (new_code_cell('import math\nmath.pi'), False),
         (new_code_cell('%%write setup.py\nimport math'), False),
