@@ -10,7 +10,7 @@ from helpers.checks.progress import FILE_VARIABLE
 from support.processes import running
 
 LESSON = '02_lose_messages.ipynb'
-BEGIN = 'import sys\nfrom helpers.checks import checks, classroom\nfrom helpers.checks import *\n'
+BEGIN = 'import sys\nfrom helpers.checks import classroom\nfrom helpers.checks import *\n'
 GUESSES = """
 import time
 for value in range({}, {}):
