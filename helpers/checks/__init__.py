@@ -1,10 +1,9 @@
 """Guesses and tasks: what is right, what the student's code did, and a hint."""
 
-from helpers.checks.checks import check, compare_prediction
 from helpers.checks.classroom import guess, join_class, leave_class, lower_hand, raise_hand
+from helpers.checks.guesses import compare_prediction
 
 __all__ = [
-    'check',
     'compare_prediction',
     'guess',
     'join_class',

@@ -7,8 +7,6 @@ is gone, and another one that no other module touches any.
 from __future__ import annotations
 
 import ctypes
-import gc
-import sys
 import threading
 import warnings
 from concurrent.futures import thread as thread_pool
@@ -18,6 +16,8 @@ from rclpy.action import ActionClient
 from rclpy.client import Client
 from rclpy.executors import Executor
 from rclpy.node import Node
+
+from helpers.notebook.threads import frames
 
 # What has the name: the name, and the versions in which it was read.
 NAMES = {
@@ -122,20 +122,6 @@ def _state(frame: FrameType) -> str:
     if idle_in_pool or code is Executor._wait_for_ready_callbacks.__code__:
         return 'free'
     return 'working'
-
-
-def frames(threads: list[threading.Thread]) -> list[tuple[threading.Thread, FrameType]]:
-    """Return the innermost frame of each thread. A thread that has ended has none."""
-    collects = gc.isenabled()
-    try:
-        # Before Python 3.11.9, a collection that frees a threading.local hangs in the next call:
-        # https://github.com/python/cpython/issues/106883
-        gc.disable()
-        current = sys._current_frames()
-    finally:
-        if collects:
-            gc.enable()
-    return [(thread, current[thread.ident]) for thread in threads if thread.ident in current]
 
 
 def end_wait(thread: threading.Thread, longer_than_s: float) -> None:

@@ -18,6 +18,7 @@ from itertools import chain
 from traceback import clear_frames
 
 from helpers.notebook.interrupts import at_each_signal, uninterrupted
+from helpers.notebook.threads import frames as frames
 from helpers.ros.domain import (
     check_domain,
     configure_discovery,
@@ -43,8 +44,7 @@ try:
 
     from helpers.notebook.progress_bar import ProgressBar
     from helpers.ros import connections, private
-    from helpers.ros.private import frames as frames
-    from helpers.ros.rosout import Rosout
+    from helpers.ros.rosout import Record, Rosout
 except ImportError as error:
     raise ImportError(
         f'rclpy cannot be imported in this Python ({error}): start JupyterLab with `make lab`, '
@@ -248,6 +248,8 @@ class Session:
         with ProgressBar(progress) as bar:
             while not predicate():
                 self._raise_failure()
+                if not (self._context.ok() or predicate()):
+                    raise RuntimeError('rclpy was shut down: nothing can come any more.')
                 waited_s = time.monotonic() - started
                 if waited_s > timeout_s:
                     raise TimeoutError(self._why(f'Gave up after {timeout_s:g} s.', status))
@@ -265,8 +267,8 @@ class Session:
     def _findings(self) -> list[str]:
         nodes = [node for node in find(Node, self._context) if is_used(node)]
         nodes = [node for node in nodes if node.get_name() != LOG_NODE]
-        frames = [frame for _, frame in private.frames(self._threads())]
-        return connections.findings(nodes, self._spinning, frames)
+        places = [frame for _, frame in frames(self.threads())]
+        return connections.findings(nodes, self._spinning, places)
 
     def wait_until_quiet(self, executor: Executor, timeout_s: float = 30.0) -> bool:
         """Wait until nothing happens in an executor any more, timers and time-outs apart.
@@ -303,6 +305,10 @@ class Session:
     def print_log(self, node: str | None = None) -> None:
         """Print the records of `/rosout` so far, oldest first, of one node or of all."""
         self._rosout.print(node)
+
+    def records(self) -> list[Record]:
+        """Return the records of `/rosout` so far, oldest first."""
+        return self._rosout.take()
 
     # --- Closing
 
@@ -367,9 +373,9 @@ class Session:
             self._join(thread, deadline)
         for executor in self._spinning:
             private.end_pool(executor)
-        for thread in self._threads():
+        for thread in self.threads():
             self._join(thread, deadline)
-        self._endless = [thread for thread in self._threads() if thread.is_alive()]
+        self._endless = [thread for thread in self.threads() if thread.is_alive()]
         for thread in self._endless:
             private.break_off(thread, SessionClosedError)
             thread.join(BREAK_OFF_S)
@@ -393,7 +399,8 @@ class Session:
                 private.end_wait(thread, longer_than_s=left_s - CLOSE_TIMEOUT_S / 2)
             thread.join(25 * POLL_S)  # less often than POLL_S: to look for calls takes long
 
-    def _threads(self) -> list[threading.Thread]:
+    def threads(self) -> list[threading.Thread]:
+        """Return the threads that run callbacks."""
         pools = [private.pool_threads(executor) for executor in self._spinning]
         return [*self._spinning.values(), *(thread for pool in pools for thread in pool)]
 

@@ -15,6 +15,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
+
 from helpers.notebook.interrupts import uninterrupted
 from helpers.ros.connections import NOT_OF_A_LESSON, nearly
 from helpers.workspace.folders import locks
@@ -68,6 +70,7 @@ class Process:
         self._output = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
         if 'IPython' in sys.modules and (shell := sys.modules['IPython'].get_ipython()):
             shell.events.register('post_run_cell', _after_cell)  # once, however often this is said
+        self._owner = os.getpid()
         with uninterrupted():
             self._process = subprocess.Popen(
                 command,
@@ -98,6 +101,8 @@ class Process:
     @property
     def running(self) -> bool:
         """Whether it has not ended yet."""
+        if os.getpid() != self._owner:  # in a check, which runs in a copy of the kernel
+            return psutil.pid_exists(self._process.pid) and not _is_zombie(self._process.pid)
         return self._process.poll() is None
 
     def wait_for(self, text: str, timeout_s: float = 20.0) -> str:
@@ -170,6 +175,12 @@ class Process:
 
     def __exit__(self, *exception) -> None:
         self.stop()
+
+
+def _is_zombie(pid: int) -> bool:
+    with contextlib.suppress(psutil.NoSuchProcess):
+        return psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
+    return True
 
 
 def _lonely_topics(environment: dict[str, str]) -> Iterator[str]:

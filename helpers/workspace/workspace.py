@@ -71,7 +71,8 @@ class Workspace:
         self.path = underlay.path / name if underlay else claim(name)
         self._processes: dict[tuple[str, ...], Process] = {}
         self.terminals: dict[str, Process] = {}
-        self._sourced: dict[str, str] | None = None
+        # What the last sourcing gave, and the state of the folder `install` then.
+        self._sourced: tuple[object, dict[str, str]] | None = None
         self._parts: dict[Path, list[str]] = {}  # of the files that several cells write
         if self.path.exists():
             with uninterrupted():  # rmtree makes an OSError of an Interrupt
@@ -201,9 +202,10 @@ class Workspace:
 
         Raises RuntimeError if nothing has been built.
         """
-        if self._sourced is None:
-            self._sourced = source(self.path)
-        return dict(self._sourced)
+        state = _state(self.path / 'install')  # a check, a process apart, may have built, too
+        if self._sourced is None or self._sourced[0] != state:
+            self._sourced = state, source(self.path)
+        return dict(self._sourced[1])
 
     def use(self) -> None:
         """Make what was built importable in this kernel, as `source install/setup.bash` would.
@@ -295,6 +297,10 @@ class Workspace:
             process.stop()
         self._processes.clear()
         self.terminals.clear()
+
+
+def _state(install: Path) -> list[int]:
+    return [path.stat().st_mtime_ns for path in (install, install / 'setup.bash') if path.exists()]
 
 
 def _print_below(folder: Path, hide: Sequence[str], indent: str) -> None:

@@ -5,6 +5,8 @@ from pathlib import Path
 import nbformat
 from nbclient import NotebookClient
 
+from helpers.checks.verdict import KEY
+
 NOTEBOOKS = Path(__file__).resolve().parents[2] / 'notebooks'
 
 
@@ -27,8 +29,19 @@ class Kernel(NotebookClient):
         self._open.__exit__(*why)
 
     def run(self, source: str) -> str:
-        """Run a cell, and return what it prints and the sentence of its error."""
+        """Run a cell, and return what it prints and shows as text, and the sentence of its error.
+
+        The verdicts of its checks, as data, are then in `verdicts`.
+        """
         cell = nbformat.v4.new_code_cell(source)
         self.nb.cells.append(cell)
         self.execute_cell(cell, len(self.nb.cells) - 1)
-        return ''.join(one.get('text') or one.get('evalue', '') for one in cell.outputs)
+        data = [output.get('metadata', {}).get(KEY) for output in cell.outputs]
+        self.verdicts = [verdict for verdict in data if verdict]
+        return ''.join(map(_text, cell.outputs))
+
+
+def _text(output: dict) -> str:
+    if 'data' in output:
+        return output['data'].get('text/plain', '') + '\n'
+    return output.get('text') or output.get('evalue', '')

@@ -1,0 +1,276 @@
+"""The bench on which a check tries the student's nodes: it spins them, speaks to them, and listens.
+
+    with Bench() as bench:
+        speeds = bench.hear('cmd_vel', Twist)
+        bench.spin(Driver(0.5, 0.0))
+        bench.wait(lambda: len(speeds) >= 3)
+    return [twist.linear.x for twist in speeds[:3]] == [0.5] * 3 or f'it published {speeds}'
+
+A bench is a `ros_session` with a tester in it. It belongs into the test of a point (see tasks.py),
+which runs in a process apart. What the student's callbacks raise is raised by `wait`, `quiet`,
+`call` and at the end of the `with` block. Waiting itself raises nothing: `wait` says whether it
+came.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+
+import rclpy
+from action_msgs.msg import GoalStatus
+from rclpy.action import ActionClient
+from rclpy.clock import ClockType
+from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
+
+from helpers.checks.errors import Failed, own_line, places
+from helpers.notebook.threads import frames
+from helpers.ros.session import ros_session
+
+WAIT_S = 2.0  # for what a right answer does at once
+QUIET_S = 10.0
+CALLBACK_S = 3.0  # for a callback to end
+POLL_S = 0.005
+ALL = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)  # hears every publisher
+STATUS = {
+    GoalStatus.STATUS_SUCCEEDED: 'SUCCEEDED',
+    GoalStatus.STATUS_CANCELED: 'CANCELED',
+    GoalStatus.STATUS_ABORTED: 'ABORTED',
+}
+
+
+class Bench:
+    """A session with the student's nodes and a tester. Use it as `with Bench() as bench:`."""
+
+    def __init__(self) -> None:
+        self._exit = ExitStack()
+        self._executors: list[Executor] = []  # of the student's nodes
+        self._own_executor: SingleThreadedExecutor | None = None
+        self._publishers: dict[tuple[str, type, object], object] = {}
+        self._clients: dict[tuple[str, type], object] = {}
+        self._clock_s = 0.0
+
+    def __enter__(self) -> Bench:
+        self.session = self._exit.enter_context(ros_session())
+        self._exit.enter_context(_refused_spins())
+        self.tester = Node('tester')
+        self._own_executor = SingleThreadedExecutor()
+        self._own_executor.add_node(self.tester)
+        self.session.spin(self._own_executor)
+        return self
+
+    def __exit__(self, kind, error, traceback) -> bool | None:
+        if error is None:
+            self._check_that_callbacks_end()
+            if not rclpy.ok():
+                self._exit.close()
+                raise Failed('your code has shut rclpy down: nothing can run after that')
+        return self._exit.__exit__(kind, error, traceback)
+
+    # --- The student's nodes
+
+    def spin(self, *nodes: Node, executor: Executor | None = None, threads: int = 1) -> Node:
+        """Spin nodes together, by default in an executor with one thread. Return the first one.
+
+        With `threads` of 2 and more it is a MultiThreadedExecutor.
+        """
+        for node in nodes:
+            if not isinstance(node, Node):
+                raise Failed(f'a node is wanted here, and this is {_kind_of(node)}')
+        if executor is None:
+            executor = MultiThreadedExecutor(threads) if threads > 1 else SingleThreadedExecutor()
+        for node in nodes:
+            executor.add_node(node)
+        self._executors.append(executor)
+        self.session.spin(executor)
+        return nodes[0]
+
+    def spin_each(self, *nodes: Node) -> None:
+        """Spin each node in an executor of its own."""
+        for node in nodes:
+            self.spin(node)
+
+    # --- The tester
+
+    def say(self, topic: str, *messages, qos: QoSProfile | int = 10, at_once: bool = False) -> None:
+        """Publish messages of one type. Each but the first waits until the one before was handled.
+
+        With `at_once` they are published without a pause, so that queues fill. The QoS offers
+        RELIABLE, which serves every subscription.
+        """
+        publisher = self.publisher(topic, type(messages[0]), qos)
+        for message in messages:
+            publisher.publish(message)
+            if not at_once:
+                self.quiet()
+
+    def publisher(self, topic: str, kind: type, qos: QoSProfile | int = 10):
+        """Return the tester's publisher on a topic; the same one for the same QoS."""
+        key = topic, kind, qos if isinstance(qos, int) else id(qos)
+        if key not in self._publishers:
+            self._publishers[key] = self.tester.create_publisher(kind, topic, qos)
+        return self._publishers[key]
+
+    def hear(self, topic: str, kind: type, qos: QoSProfile | int = ALL) -> list:
+        """Return a list to which each message of a topic is appended, from now on."""
+        heard: list = []
+        self.tester.create_subscription(kind, topic, heard.append, qos)
+        return heard
+
+    def call(self, service: str, kind: type, request=None, limit_s: float = WAIT_S):
+        """Call a service. Return its response, or None if no answer came within the limit."""
+        client = self._client(service, kind)
+        if not self.wait(client.service_is_ready, limit_s):
+            return None
+        future = client.call_async(kind.Request() if request is None else request)
+        return future.result() if self.wait(future.done, limit_s) else None
+
+    def _client(self, service: str, kind: type):
+        if (service, kind) not in self._clients:
+            self._clients[service, kind] = self.tester.create_client(kind, service)
+        return self._clients[service, kind]
+
+    def send_goal(self, action: str, kind: type, goal, limit_s: float = WAIT_S) -> Goal:
+        """Send a goal, and wait for the answer: was it accepted? See `Goal`."""
+        if (action, kind) not in self._clients:
+            self._clients[action, kind] = ActionClient(self.tester, kind, action)
+        client = self._clients[action, kind]
+        if not self.wait(client.server_is_ready, limit_s):
+            raise Failed(f'nobody serves the action {action}')
+        return Goal(self, client, goal, limit_s)
+
+    # --- Time
+
+    def advance(self, seconds: float, step_s: float = 0.1) -> None:
+        """Let simulated time go on, for nodes with `use_sim_time`, and wait after each step."""
+        for _ in range(max(1, round(seconds / step_s))):
+            self._clock_s += step_s
+            clock = Time(seconds=self._clock_s, clock_type=ClockType.ROS_TIME).to_msg()
+            self.publisher('/clock', Clock).publish(Clock(clock=clock))
+            self.quiet()
+
+    def wait(self, condition: Callable[[], object], limit_s: float = WAIT_S) -> bool:
+        """Wait until a condition holds, at most `limit_s` seconds. Return whether it holds.
+
+        Raises what a callback of the student has raised.
+        """
+        try:
+            self.session.wait_until(lambda: bool(condition()), limit_s)
+        except TimeoutError:
+            return False
+        return True
+
+    def quiet(self, limit_s: float = QUIET_S) -> bool:
+        """Wait until all that was sent is handled, in the student's nodes and in the tester.
+
+        Return whether a thread of each executor is free: False if callbacks hold all of them.
+        """
+        free = True
+        for executor in [*self._executors, self._own_executor]:
+            try:
+                free &= self.session.wait_until_quiet(executor, limit_s)
+            except TimeoutError:
+                self._check_that_callbacks_end()
+                raise Failed('it is never quiet: callbacks come without end') from None
+        return free
+
+    # --- What was logged
+
+    def log(self, node: str | None = None) -> list[str]:
+        """Return the lines of the log so far, `[INFO] [talker]: Hello`, of one node or of all."""
+        return [
+            f'[{record.level}] [{record.node}]: {record.text}'
+            for record in self.session.records()
+            if node in (None, record.node)
+        ]
+
+    # --- At the end
+
+    def _check_that_callbacks_end(self) -> None:
+        """Raise Failed if a callback of the student runs on, with the line that it is at."""
+        end = time.monotonic() + CALLBACK_S
+        while place := _place_of_callback(self.session.threads()):
+            if time.monotonic() > end:
+                raise Failed(f'a callback does not end. {place}')
+            time.sleep(POLL_S)
+
+
+class Goal:
+    """A goal that was sent: `accepted`, its `feedback` so far, and later its `status`."""
+
+    def __init__(self, bench: Bench, client: ActionClient, goal, limit_s: float) -> None:
+        self._bench, self._limit_s = bench, limit_s
+        self.feedback: list = []
+        sent = client.send_goal_async(goal, lambda message: self.feedback.append(message.feedback))
+        if not bench.wait(sent.done, limit_s):
+            raise Failed('the goal gets no answer')
+        self._handle = sent.result()
+        self.accepted: bool = self._handle.accepted
+        self._result = self._handle.get_result_async() if self.accepted else None
+
+    def cancel(self) -> bool:
+        """Ask for cancellation. Return whether the server agreed."""
+        answer = self._handle.cancel_goal_async()
+        return self._bench.wait(answer.done, self._limit_s) and bool(
+            answer.result().goals_canceling
+        )
+
+    def ended(self, limit_s: float | None = None) -> tuple[str, object]:
+        """Wait for the end. Return 'SUCCEEDED', 'CANCELED', 'ABORTED' or 'RUNNING', and the result.
+
+        Of a goal that was not accepted it is ('REJECTED', None).
+        """
+        if self._result is None:
+            return 'REJECTED', None
+        if not self._bench.wait(self._result.done, limit_s or self._limit_s):
+            return 'RUNNING', None
+        answer = self._result.result()
+        return STATUS.get(answer.status, str(answer.status)), answer.result
+
+
+def _kind_of(value: object) -> str:
+    return f'the class {value.__name__}' if isinstance(value, type) else repr(value)
+
+
+def _place_of_callback(threads: list[threading.Thread]) -> str:
+    for _, frame in frames(threads):
+        if place := own_line(places(frame)):
+            return place
+    return ''
+
+
+class _refused_spins:  # noqa: N801 - a context manager, named as a function
+    """Let a spin inside a callback say what is wrong, in place of waiting for ever.
+
+    `rclpy.spin...(node)` takes the node out of the executor that runs the callback. This process
+    ends with the check, so it may replace functions of rclpy.
+    """
+
+    NAMES = 'spin', 'spin_once', 'spin_until_future_complete'
+
+    def __enter__(self) -> None:
+        self._before = {name: getattr(rclpy, name) for name in self.NAMES}
+        for name, function in self._before.items():
+            setattr(rclpy, name, _refuse_in_callback(name, function))
+
+    def __exit__(self, *exception) -> None:
+        for name, function in self._before.items():
+            setattr(rclpy, name, function)
+
+
+def _refuse_in_callback(name: str, function: Callable) -> Callable:
+    def spin(*arguments, **options):
+        if threading.current_thread() is not threading.main_thread():
+            raise Failed(
+                f'rclpy.{name} inside a callback takes the node out of its executor: the callback '
+                'must return, or wait in another way'
+            )
+        return function(*arguments, **options)
+
+    return spin

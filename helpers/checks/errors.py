@@ -1,0 +1,80 @@
+"""What an error of a student's code says: its type, its text, and the student's own line."""
+
+from __future__ import annotations
+
+import linecache
+import os
+import re
+import sys
+import sysconfig
+import traceback
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from types import FrameType
+
+HELPERS = str(Path(__file__).resolve().parents[1]) + os.sep
+INSTALLED = tuple(
+    os.path.realpath(sysconfig.get_path(name)) + os.sep for name in ('stdlib', 'purelib', 'platlib')
+)
+CELL = re.compile(r'[/\\]ipykernel_\d+[/\\]|^<(?:ipython-input|cell)')
+
+
+class Failed(Exception):  # noqa: N818 - a verdict, and no error
+    """What a check has found: raised by the bench, shown as it is."""
+
+
+def is_students(filename: str) -> bool:
+    """Return whether a file holds code of the student: a cell, or a file of the workspace."""
+    if CELL.search(filename):
+        return True
+    if filename.startswith('<') or not os.path.isabs(filename):
+        return False
+    path = os.path.realpath(filename)
+    return not path.startswith((HELPERS, *INSTALLED)) and not filename.startswith(sys.prefix)
+
+
+def own_line(frames: Iterable[tuple[str, int]]) -> str:
+    """Return the first of these places that is the student's, as `Line 7: x = 1`, or nothing."""
+    for filename, number in frames:
+        if is_students(filename):
+            line = linecache.getline(filename, number).strip()
+            where = '' if CELL.search(filename) else f' of {os.path.basename(filename)}'
+            if line:
+                return f'Line {number}{where}: {line}'
+    return ''
+
+
+def places(frame: FrameType | None) -> Iterator[tuple[str, int]]:
+    """Yield file and line of a frame and of those that called it, the innermost first."""
+    while frame is not None:
+        yield frame.f_code.co_filename, frame.f_lineno
+        frame = frame.f_back
+
+
+def sentence(error: BaseException) -> str:
+    """Say in one sentence or two what an error says, and in which line of the student."""
+    if isinstance(error, Failed):
+        return str(error)
+    if isinstance(error, SystemError) and error.__cause__:  # pybind11 hides a wrong field in one
+        error = error.__cause__
+    frames = traceback.extract_tb(error.__traceback__)
+    place = own_line((frame.filename, frame.lineno or 0) for frame in reversed(frames))
+    text = ' '.join(str(error).split('\n\n')[0].split())
+    text = re.sub(r' at 0x[0-9a-fA-F]+', '', text)
+    name = type(error).__name__
+    if isinstance(error, SyntaxError):
+        place = f'Line {error.lineno}: {(error.text or "").strip()}' if error.lineno else place
+    elif isinstance(error, RecursionError):
+        text = 'a function calls itself without end'
+    elif isinstance(error, SystemExit):
+        text = 'your code ends the program'
+    elif isinstance(error, NameError) and error.name:
+        text += '. Is it defined in the cell of the task, or in a cell above that has not run?'
+    elif re.match(r'[A-Z]\w*\.\w+\(\) missing 1 required positional argument', text):
+        text += '. Did you forget () after a class, or write () after a callback?'
+    elif "'NoneType' object is not callable" in text:
+        text += '. Are there () after the name of a callback that is only handed over?'
+    said = f'{name}: {text}' if text else name
+    if not place:
+        return said
+    return f'{said}{"" if said[-1] in ".!?" else "."} {place}'

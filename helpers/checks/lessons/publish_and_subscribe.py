@@ -1,0 +1,251 @@
+"""What the tasks of the lesson "Publish and subscribe" are judged by."""
+
+import math
+import sys
+
+from geometry_msgs.msg import Twist
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+
+from helpers.checks.bench import Bench
+from helpers.checks.tasks import Tasks, once
+from helpers.robot import EMPTY, Robot
+from helpers.ros.session import ros_session
+
+tasks = Tasks()
+check = tasks.check
+
+
+@tasks.add(1)
+def hear_the_text(MinimalSubscriber):
+    def keeps(*texts):
+        with Bench() as bench:
+            node = bench.spin(MinimalSubscriber())
+            bench.say('topic', *(String(data=text) for text in texts))
+        return node.heard == [*texts] or f'of {[*texts]}, self.heard has {node.heard}'
+
+    def logs(*texts):
+        with Bench() as bench:
+            bench.spin(MinimalSubscriber())
+            bench.say('topic', *(String(data=text) for text in texts))
+            log = bench.log('minimal_subscriber')
+        right = [f'[INFO] [minimal_subscriber]: I heard: "{text}"' for text in texts]
+        return log == right or f'its log is: {" / ".join(log) or "empty"}'
+
+    quotes = 'The text has quotation marks: I heard: "..."'
+    return [
+        ('it keeps one text', lambda: keeps('Hello World: 7'), 'A list has .append(...).'),
+        ('it keeps two texts', lambda: keeps('one', 'two'), 'Append message.data.'),
+        ('it logs one text', lambda: logs('Hello World: 7'), "self.get_logger().info(f'...')"),
+        ('it logs two texts', lambda: logs('one', 'two'), quotes),
+    ]
+
+
+@tasks.add(2)
+def one_executor_for_all(spin_together):
+    def all_tick(count):
+        ticked = set()
+        with Bench() as bench:
+            nodes = [Node(f'node_{number}') for number in range(count)]
+            for number, node in enumerate(nodes):
+                node.create_timer(0.01, lambda number=number: ticked.add(number))
+            spin_together(bench.session, *nodes)
+            bench.wait(lambda: len(ticked) == count)
+            executors = {node.executor for node in nodes}
+        if len(ticked) < count:
+            return f'{count - len(ticked)} of {count} nodes: their timers never fired'
+        return len(executors) == 1 or f'the {count} nodes are in {len(executors)} executors'
+
+    hint = 'One executor before the loop, add_node(node) in the loop, session.spin after it.'
+    return [
+        ('two nodes spin in one executor', lambda: all_tick(2), hint),
+        ('four nodes spin in one executor', lambda: all_tick(4), hint),
+    ]
+
+
+@tasks.add(3)
+def a_driver(Driver):
+    def drives(speed, turn):
+        with Bench() as bench:
+            commands = bench.hear('cmd_vel', Twist)
+            bench.spin(Driver(speed, turn))
+            bench.wait(lambda: len(commands) >= 3)
+        if not commands:
+            return f'Driver({speed}, {turn}) published nothing on cmd_vel'
+        right = Twist()
+        right.linear.x, right.angular.z = speed, turn
+        wrong = [twist for twist in commands[:3] if twist != right]
+        if wrong:
+            return f'Driver({speed}, {turn}) published {fields(wrong[0])}'
+        return len(commands) >= 3 or f'in 2 s it published {len(commands)} messages'
+
+    hint = 'message = Twist(), message.linear.x = ..., message.angular.z = ..., and publish it.'
+    return [
+        ('Driver(0.5, 1.0)', lambda: drives(0.5, 1.0), hint),
+        ('Driver(-0.2, -0.7)', lambda: drives(-0.2, -0.7), hint),
+    ]
+
+
+def fields(twist):
+    """Name the fields of a Twist that are not 0."""
+    parts = {'linear': twist.linear, 'angular': twist.angular}
+    set_fields = [
+        f'{name}.{axis} = {getattr(part, axis):g}'
+        for name, part in parts.items()
+        for axis in 'xyz'
+        if getattr(part, axis)
+    ]
+    return ', '.join(set_fields) or 'only zeros'
+
+
+@tasks.add(4)
+def measure_the_distance(Odometer):
+    def measures(distance, *places):
+        messages = [Odometry() for _ in places]
+        for message, (x, y) in zip(messages, places, strict=True):
+            message.pose.pose.position.x, message.pose.pose.position.y = float(x), float(y)
+        with Bench() as bench:
+            node = bench.spin(Odometer())
+            bench.say('odom', *messages)
+        found = node.distance
+        return abs(found - distance) < 0.001 or f'from {places} it measures {found:g} m'
+
+    return [
+        ('3 m', lambda: measures(3, (1, 1), (1, 2), (3, 2)), 'math.dist((0, 0), (3, 4)) is 5.0.'),
+        ('there and back: 10 m', lambda: measures(10, (0, 0), (3, 4), (0, 0)), 'Keep each place.'),
+        ('one message: 0 m', lambda: measures(0, (5, 5)), 'If self.place is None, add nothing.'),
+    ]
+
+
+@tasks.add(5)
+def drive_a_square(Square):
+    def drive(side):
+        """Drive in simulated time: the timers fire as fast as they can, and in the same order."""
+        with ros_session():
+            robot, node = Robot(EMPTY, sim_time=True), Square(side)
+            timers = list(node.timers)
+            while robot.t_s < 20 and (live := [t for t in node.timers if not t.is_canceled()]):
+                period_s = live[0].timer_period_ns / 1e9
+                for timer in live:
+                    timer.callback()
+                robot.run(max(0.02, period_s))
+            running = sum(not timer.is_canceled() for timer in node.timers)
+            commands = [(command.v, command.w) for command in robot.record.commands]
+            robot.run(1.0)
+        path = [(pose.x - 5, pose.y - 5) for pose in robot.record.poses]
+        return path, commands, timers, running
+
+    small, large = once(lambda: drive(0.6)), once(lambda: drive(1.0))
+
+    def corners(path, side):
+        for corner in (side, 0), (side, side), (0, side), (0, 0):
+            near = [number for number, place in enumerate(path) if math.dist(place, corner) < 0.1]
+            if not near:
+                return f'the robot does not come to the corner {corner}'
+            path = path[near[0] :]
+        return math.dist(path[-1], (0, 0)) < 0.1 or 'it does not end where it started'
+
+    def length(path, side):
+        driven = sum(map(math.dist, path, path[1:]))
+        return abs(driven - 4 * side) < 0.2 or f'it drives {driven:.1f} m, not {4 * side:g} m'
+
+    def stops():
+        _, commands, timers, running = small()
+        if not timers:
+            return 'it has no timer'
+        if running:
+            return 'after 20 s its timer still runs'
+        last = commands[-1:]
+        return last == [(0.0, 0.0)] or f'the last speed that it published is {last or "none"}'
+
+    tick = 'self.ticks % (self.side_ticks + 10) is the number of the tick in this side and turn.'
+    end = 'After 4 * (self.side_ticks + 10) ticks: publish Twist(), and self.timer.cancel().'
+    return [
+        ('side 1 m: it comes to the corners, and back', lambda: corners(large()[0], 1.0), tick),
+        ('side 0.6 m: it comes to the corners, and back', lambda: corners(small()[0], 0.6), tick),
+        ('side 1 m: it drives 4 m', lambda: length(large()[0], 1.0), 'Count self.ticks.'),
+        ('it stops the robot and its timer', stops, end),
+    ]
+
+
+@tasks.add(6)
+def mirror_the_robot(Mirror):
+    def mirrors(*speeds):
+        messages = [Odometry() for _ in speeds]
+        for message, (v, w) in zip(messages, speeds, strict=True):
+            message.twist.twist.linear.x, message.twist.twist.angular.z = v, w
+        with Bench() as bench:
+            commands = bench.hear('two/cmd_vel', Twist)
+            bench.spin(Mirror())
+            bench.say('odom', *messages)
+        found = [(twist.linear.x, twist.angular.z) for twist in commands]
+        right = [(v, -w) for v, w in speeds]
+        return found == right or f'of {[*speeds]} it made {found[:3] or "nothing"}'
+
+    def name():
+        with ros_session():
+            name = Mirror().get_name()
+        return name == 'mirror' or f'its name is {name}'
+
+    hint = 'A callback that makes a Twist, sets two fields, and publishes it. Compare Driver.'
+    return [
+        ('one message', lambda: mirrors((0.5, 1.0)), hint),
+        ('two messages', lambda: mirrors((0.0, -0.25), (0.5, 0.0)), hint),
+        ('the node is called mirror', name, "super().__init__('mirror')"),
+    ]
+
+
+@tasks.add(7)
+def hear_the_laser(asked):
+    def hears(reliability):
+        heard = []
+        offered = QoSProfile(depth=10, reliability=reliability)
+        with Bench() as bench:
+            node = Node('minimal_subscriber')
+            node.create_subscription(String, 'topic', heard.append, asked)
+            bench.spin(node)
+            bench.say('topic', *(String(data=str(number)) for number in range(4)), qos=offered)
+        return len(heard) == 4 or f'of four messages, {len(heard)} were heard'
+
+    def has_depth():
+        with ros_session():
+            node = Node('minimal_subscriber')
+            subscription = node.create_subscription(String, 'topic', print, asked)
+            depth = subscription.qos_profile.depth
+        return depth == 10 or f'the depth is {depth}'
+
+    hint = 'Above, a QoSProfile has a depth and a reliability. Ask for less.'
+    return [
+        ('it hears BEST_EFFORT', lambda: hears(ReliabilityPolicy.BEST_EFFORT), hint),
+        ('it hears RELIABLE', lambda: hears(ReliabilityPolicy.RELIABLE), hint),
+        ('its depth is 10', has_depth, 'QoSProfile(depth=10, ...)'),
+    ]
+
+
+@tasks.add(8, limit_s=60)
+def a_program_of_its_own(workspace, file):
+    def is_program(team):
+        with Bench() as bench:
+            heard = bench.hear('topic', String)
+            start = f'exec {sys.executable} {file} {team} --ros-args --disable-external-lib-logs'
+            with workspace.start(start, team) as process:
+                bench.wait(lambda: len(heard) >= 2 or not process.running, 8)
+                went_on = process.running
+        teams = {message.data for message in heard}
+        if not went_on:
+            return f'the program ended by itself. {(["It printed nothing", *process.lines])[-1]}'
+        if teams != {team}:
+            return f'team {team}: the listener heard {", ".join(teams) or "nothing"}'
+        if not any(f'[talker]: {team} talks' in line for line in process.lines):
+            return f'its log has no line "[talker]: {team} talks"'
+        ends = not any('Traceback' in line for line in process.lines)
+        return ends or 'Ctrl+C ends it with a traceback'
+
+    hint = 'rclpy.init(), then in a try: rclpy.spin(Talker()). The class is like MinimalPublisher.'
+    caught = 'except (KeyboardInterrupt, ExternalShutdownException): pass'
+    return [
+        ('red talks, until Ctrl+C ends it', lambda: is_program('red'), hint),
+        ('blue talks, until Ctrl+C ends it', lambda: is_program('blue'), caught),
+    ]

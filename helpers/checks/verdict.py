@@ -1,0 +1,114 @@
+"""A verdict: what a check has found, as data, as text, and as a card.
+
+The data stand in the metadata of the cell's output, under `ros2_notebooks`:
+
+    {'task': 3, 'of': 'answer', 'solved': False,
+     'points': [{'what': 'it turns', 'ok': False, 'found': 'it published (0.5, 0.0)'}]}
+
+`of` is 'answer', or 'solution' if the lesson's own solution was judged. `found`, `hint` and `note`
+are there if something was found, if a hint was shown, and if the answer could not be judged.
+Progress, class page, tests, slides and site read these, and never the text.
+"""
+
+from __future__ import annotations
+
+import html
+from dataclasses import asdict, dataclass, field
+
+from helpers.notebook.text import wrap
+
+KEY = 'ros2_notebooks'
+AGAIN = 'Try again, or go on with the solution below.'
+CARD = 'border-left:4px solid {};padding:.1em .8em;margin:.2em 0;line-height:1.45'
+INDENTED = 'margin-left:1.5em'
+GREEN, AMBER = '#2e7d32', '#b26a00'
+
+
+@dataclass
+class Point:
+    """One thing that a task asks for: is it so, what was found instead, and what helps?"""
+
+    what: str
+    ok: bool = False
+    found: str = ''
+    hint: str = ''
+
+
+@dataclass
+class Verdict:
+    """What a check says of a task. `seconds` is how long the check took."""
+
+    task: int
+    points: list[Point] = field(default_factory=list)
+    of: str = 'answer'
+    note: str = ''
+    seconds: float = 0.0
+
+    @property
+    def solved(self) -> bool:
+        """Whether every point is met."""
+        return bool(self.points) and not self.note and all(point.ok for point in self.points)
+
+    def data(self) -> dict:
+        """Return the verdict as data, for the output's metadata. Its time would move."""
+        data = {'task': self.task, 'of': self.of, 'solved': self.solved, 'note': self.note}
+        points = [asdict(point) for point in self.points]
+        return _without_empty(data) | {'points': [_without_empty(point) for point in points]}
+
+    def title(self) -> str:
+        """Return the last line: how many points are met."""
+        name = f'Solution of task {self.task}' if self.of == 'solution' else f'Task {self.task}'
+        if not self.points:
+            return f'{name}: not judged.'
+        count = f'{name}: {sum(point.ok for point in self.points)} of {len(self.points)}.'
+        if self.of == 'solution':
+            return count
+        return f'{count} {"All done." if self.solved else AGAIN}'
+
+    def text(self) -> str:
+        """Return the verdict as lines of text."""
+        lines = []
+        for point in self.points:
+            lines += wrap(f'[{"ok" if point.ok else "not yet"}] {point.what}', rest=' ' * 10)
+            if point.found:
+                lines += wrap(f'    Found: {point.found}', rest=' ' * 10)
+            if point.hint:
+                lines += wrap(f'    Hint: {point.hint}', rest=' ' * 10)
+        if self.note:
+            lines += wrap(self.note)
+        return '\n'.join([*lines, self.title()])
+
+    def card(self) -> str:
+        """Return the verdict as HTML: solved is seen at a glance, and what is missing is indented.
+
+        Its colours are those of the page, so that it fits a dark one, too.
+        """
+        rows = []
+        for point in self.points:
+            mark, colour = ('✔', GREEN) if point.ok else ('○', AMBER)
+            rows.append(
+                f'<div><span style="color:{colour}">{mark}</span> {html.escape(point.what)}</div>'
+            )
+            for name, text in (('Found', point.found), ('Hint', point.hint)):
+                if text:
+                    rows.append(f'<div style="{INDENTED}"><b>{name}</b> {html.escape(text)}</div>')
+        if self.note:
+            rows.append(f'<div>{html.escape(self.note)}</div>')
+        title, colour = html.escape(self.title()), GREEN if self.solved else AMBER
+        if self.solved:
+            rows = [f'<div><b>✔ {title}</b></div>', *rows]
+        else:
+            rows.append(f'<div><b>{title}</b></div>')
+        return f'<div style="{CARD.format(colour)}">{"".join(rows)}</div>'
+
+
+def _without_empty(data: dict) -> dict:
+    return {key: value for key, value in data.items() if value != ''}
+
+
+def bundle(verdict: Verdict) -> tuple[dict, dict]:
+    """Return the data and the metadata of the output that shows a verdict."""
+    return (
+        {'text/plain': verdict.text(), 'text/html': verdict.card()},
+        {KEY: verdict.data()},
+    )

@@ -1,0 +1,211 @@
+"""The bench: it speaks to a student's nodes, listens, and says what is wrong with them."""
+
+import threading
+import time
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+from test_msgs.action import Fibonacci
+
+from helpers.checks.bench import Bench
+from helpers.checks.errors import Failed
+from helpers.checks.tasks import Tasks
+
+
+class Doubler(Node):
+    """Publishes twice what it hears."""
+
+    def __init__(self, depth=10, **options):
+        super().__init__('doubler', **options)
+        self.publisher = self.create_publisher(Int32, 'twice', 10)
+        self.create_subscription(Int32, 'number', self.number_callback, depth)
+
+    def number_callback(self, message):
+        self.get_logger().info(f'I heard {message.data}')
+        self.publisher.publish(Int32(data=2 * message.data))
+
+
+def numbers(*values):
+    return [Int32(data=value) for value in values]
+
+
+@pytest.mark.parametrize('depth', [1, 10])
+def test_what_is_said_one_by_one_is_heard_whatever_the_depth(depth):
+    with Bench() as bench:
+        twice = bench.hear('twice', Int32)
+        bench.spin(Doubler(depth))
+        bench.say('number', *numbers(1, 2, 3))
+        log = bench.log('doubler')
+    assert [message.data for message in twice] == [2, 4, 6]
+    assert log == [f'[INFO] [doubler]: I heard {number}' for number in (1, 2, 3)]
+
+
+def test_messages_at_once_fill_a_queue():
+    with Bench() as bench:
+        node = Doubler(2)
+        twice = bench.hear('twice', Int32)
+        bench.say('number', *numbers(*range(9)), at_once=True)
+        bench.spin(node)
+        assert bench.quiet()
+    assert [message.data for message in twice] == [14, 16]
+
+
+def test_a_service_answers_or_not():
+    def answer(request, response):
+        response.message = 'yes'
+        return response
+
+    with Bench() as bench:
+        node = Node('server')
+        node.create_service(Trigger, 'ask', answer)
+        bench.spin(node)
+        assert bench.call('ask', Trigger).message == 'yes'
+        assert bench.call('nobody', Trigger, limit_s=0.2) is None
+
+
+def test_goals_are_sent_and_cancelled():
+    gate = threading.Event()
+
+    def execute(goal):
+        goal.publish_feedback(Fibonacci.Feedback(sequence=[1]))
+        gate.wait(5)
+        if goal.is_cancel_requested:
+            goal.canceled()
+        else:
+            goal.succeed()
+        return Fibonacci.Result(sequence=[1, 2])
+
+    with Bench() as bench:
+        node = Node('server')
+        options = {
+            'callback_group': ReentrantCallbackGroup(),
+            'cancel_callback': lambda goal: CancelResponse.ACCEPT,
+        }
+        ActionServer(node, Fibonacci, 'count', execute, **options)
+        bench.spin(node, threads=3)
+        goal = bench.send_goal('count', Fibonacci, Fibonacci.Goal(order=1))
+        assert goal.accepted
+        assert goal.ended(0.1) == ('RUNNING', None)
+        assert goal.cancel()
+        gate.set()
+        status, result = goal.ended()
+        assert (status, list(result.sequence)) == ('CANCELED', [1, 2])
+        assert bench.wait(lambda: goal.feedback)
+        with pytest.raises(Failed, match='nobody serves the action other'):
+            bench.send_goal('other', Fibonacci, Fibonacci.Goal(), limit_s=0.2)
+
+
+def test_simulated_time_goes_on_only_when_it_is_told():
+    ticks = []
+    with Bench() as bench:
+        node = Node('clock', parameter_overrides=[Parameter('use_sim_time', value=True)])
+        node.create_timer(1.0, lambda: ticks.append(node.get_clock().now().nanoseconds / 1e9))
+        bench.spin(node)
+        bench.advance(3.5)
+    assert [round(tick) for tick in ticks] in ([1, 2, 3], [0, 1, 2, 3])
+
+
+def test_a_class_in_place_of_a_node_is_said():
+    with (
+        Bench() as bench,
+        pytest.raises(Failed, match='^a node is wanted here.* the class Doubler'),
+    ):
+        bench.spin(Doubler)
+
+
+# --- What a verdict says of mistakes
+
+
+def verdict_on(make_node, capsys, act=lambda bench: bench.say('number', *numbers(1))):
+    tasks = Tasks()
+
+    @tasks.add(1)
+    def task(answer):
+        def judged():
+            with Bench() as bench:
+                bench.spin(answer())
+                act(bench)
+            return True
+
+        return [('it works', judged, '')]
+
+    tasks.check(1, make_node)
+    return ' '.join(capsys.readouterr().out.split())
+
+
+def node_with(callback):
+    class Tried(Doubler):
+        number_callback = callback
+
+    return Tried
+
+
+def raises(self, message):
+    message.dat = 1
+
+
+def loops(self, message):
+    while True:
+        try:  # noqa: SIM105
+            time.sleep(0.001)
+        except BaseException:
+            pass
+
+
+def computes(self, message):
+    while True:
+        pass
+
+
+def shuts_down(self, message):
+    rclpy.shutdown()
+
+
+def spins(self, message):
+    rclpy.spin_once(self)
+
+
+def answers_itself(self, message):
+    time.sleep(0.02)
+    self.create_publisher(Int32, 'number', 10).publish(message)
+
+
+@pytest.mark.parametrize(
+    ('callback', 'found'),
+    [
+        (raises, "AttributeError: 'Int32' object has no attribute 'dat'. Line"),
+        (loops, 'does not end. Line'),
+        (
+            computes,
+            'it did not end. Is there an endless loop, or a spin() that never returns? Line',
+        ),
+        (shuts_down, 'rclpy was shut down: nothing can come any more. Line'),
+        (spins, 'rclpy.spin_once inside a callback takes the node out of its executor'),
+        (answers_itself, 'it is never quiet: callbacks come without end'),
+    ],
+    ids=lambda value: getattr(value, '__name__', ''),
+)
+def test_a_mistake_in_a_callback_is_named_with_its_line(callback, found, capsys):
+    said = verdict_on(node_with(callback), capsys)
+    assert found in said
+    assert not list(Path('/dev/shm').glob(f'fastrtps_*{__name__}'))
+    if 'Line' in found:
+        assert 'of test_bench.py:' in said
+
+
+def test_a_node_that_nobody_destroys_leaves_nothing(capsys):
+    kept = []
+
+    def make():
+        kept.append(Doubler())
+        return kept[-1]
+
+    assert '[ok] it works' in verdict_on(make, capsys)
+    assert kept == []
