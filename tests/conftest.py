@@ -3,6 +3,7 @@
 import gc
 
 import pytest
+import support.examples  # noqa: F401
 
 
 def pytest_collection_finish() -> None:

@@ -2,6 +2,7 @@
 
 import nbformat
 import pytest
+import support.examples  # noqa: F401
 from support.browser import *  # noqa: F403
 from support.lab_server import NOTEBOOKS, server
 
