@@ -17,6 +17,15 @@ CELLS = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4).cells
 QUESTION = re.search(r"guess\('(.*)', ", CELLS[GUESS].source)[1]
 # The line for the wall, and the address of the page.
 STARTED = r"(join_class\('.*', '.*'\))[\s\S]*?(http://localhost:\d+/\w+/)[\s\S]*Ctrl\+C"
+# A task that everybody solves.
+TASK = """
+from helpers.checks.tasks import Tasks
+
+tasks = Tasks()
+tasks.add(1)(lambda: [('it is so', lambda: True, '')])
+tasks.check(1)
+raise_hand()
+"""
 
 
 def write_lesson_of(folder, name, join):
@@ -29,7 +38,7 @@ def write_lesson_of(folder, name, join):
         f"import os\nos.environ['ROS2_NOTEBOOKS_PROGRESS'] = {own!r}\n"
         f'from helpers.checks import *\n{join}',
         f'compare_prediction({QUESTION!r}, my_guess, 14)',
-        "check(1, ('it is so', True, ''))\nraise_hand()",
+        TASK,
     ]
     made = [nbformat.v4.new_code_cell(source) for source in sources]
     notebook.cells = [made[0], *cells, *made[1:]]

@@ -12,6 +12,7 @@ import pytest
 
 from classroom.tests.support.containers import IMAGE, LIMITS
 from classroom.tests.support.hubs import free_ports
+from helpers.checks.verdict import KEY
 from tools.lessons.lesson import tags
 
 # One that compiles, for the class in containers runs others.
@@ -55,11 +56,17 @@ def test_size_and_user(image):
     assert '8888/tcp' in image['Config']['ExposedPorts']
 
 
-def judged(notebook: Path) -> list[str]:
-    """Return what each check of a lesson has printed, in however many pieces it came."""
+def judged(notebook: Path) -> list:
+    """Return the verdicts of a lesson's checks: as data, of an older check as text."""
     cells = nbformat.read(notebook, as_version=4).cells
-    checks = [cell for cell in cells if {'check', 'solution'} & tags(cell)]
-    return [''.join(out.get('text', '') for out in cell.outputs) for cell in checks]
+    outputs = [
+        cell.outputs
+        for cell in cells
+        if cell.cell_type == 'code' and {'check', 'solution'} & tags(cell)
+    ]
+    data = [out.metadata[KEY] for outs in outputs for out in outs if KEY in out.get('metadata', {})]
+    # In however many pieces the text came.
+    return data or [''.join(out.get('text', '') for out in outs) for outs in outputs]
 
 
 def test_a_lesson(podman, image, make):
