@@ -17,6 +17,7 @@ BELOW = {
     'helpers.checks.classroom',  # what the class page and the hub must agree on with a notebook
     'helpers.checks.progress',  # which tasks are solved: lesson 00 and the tools ask
     'helpers.checks.tasks',  # what a lesson of one's own needs, and slow to load
+    'helpers.checks.bench',
     'helpers.checks.verdict',  # the data of a verdict, which the rules and the tests read
     'helpers.machine.doctor',  # a program, which runs where no ROS is
 }
@@ -38,7 +39,7 @@ def imports(text):
 
 def files():
     """Yield each Python file that is no test, and each notebook, with its code."""
-    for folder in ('helpers', 'tools'):
+    for folder in ('helpers', 'tools', 'classroom'):
         for file in sorted((ROOT / folder).rglob('*.py')):
             yield file, file.read_text()
     for file in sorted((ROOT / 'notebooks').glob('*.ipynb')):

@@ -16,9 +16,9 @@ from helpers.checks.verdict import KEY
 from tools.lessons.code import guess_of, names_of
 from tools.lessons.comparison import comment_markers, metadata_tags
 from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, called, tags
-from tools.lessons.slides import LARGEST, PICTURE, height
 
-MAX_CODE_LINES = 24  # what a slide has room for
+MAX_CODE_LINES = 24  # what a screen has room for
+PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 MIN_WORDS = 6  # of an alternative text
 TASK = ('exercise', 'check', 'solution')
 FOLDED = {'solution': '%%solution ', 'harness': '# ', 'notes': NOTE}
@@ -197,7 +197,7 @@ def solutions_import_what_they_use(lesson: Lesson) -> Iterator[str]:
 
 
 def steps_begin_cells(lesson: Lesson) -> Iterator[str]:
-    """The title of a step is the first line of its cell: there its slide begins."""
+    """The title of a step is the first line of its cell: there a slide begins."""
     for cell in lesson.notebook.cells:
         if cell.cell_type == 'markdown' and (title := re.search(r'\n## (.*)', cell.source)):
             yield f'The step "{title[1]}" is inside a cell: let a cell of its own begin with it.'
@@ -223,7 +223,7 @@ def tagged(lesson: Lesson) -> Iterator[str]:
             )
 
 
-def fits_a_slide(lesson: Lesson) -> Iterator[str]:
+def fits_a_screen(lesson: Lesson) -> Iterator[str]:
     for cell in lesson.notebook.cells:
         lines = len(cell.source.splitlines())
         hidden = tags(cell) & FOLDED.keys()
@@ -233,8 +233,6 @@ def fits_a_slide(lesson: Lesson) -> Iterator[str]:
                 'make two cells of it. A file can stand in two: `%%write PATH part 1`, then '
                 '`part 2`.'
             )
-        if (percent := height(cell)) > LARGEST:
-            yield f'The cell {called(cell)} with its outputs takes {percent:.0f} % of the height.'
 
 
 # The lesson
@@ -329,7 +327,7 @@ RULES: list[Rule] = [
     solutions_import_what_they_use,
     steps_begin_cells,
     tagged,
-    fits_a_slide,
+    fits_a_screen,
     named,
     links_lead_somewhere,
     guesses_are_compared,
