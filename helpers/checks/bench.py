@@ -235,6 +235,20 @@ class Goal:
         return STATUS.get(answer.status, str(answer.status)), answer.result
 
 
+def must_have(thing: object, *names: str) -> None:
+    """Raise Failed if an object of the student lacks one of these attributes."""
+    for name in names:
+        if not hasattr(thing, name):
+            raise Failed(f'there is no self.{name} yet')
+
+
+def must_define(a_class: type, *methods: str) -> None:
+    """Raise Failed if the student's class does not define one of these methods itself."""
+    for method in methods:
+        if method not in vars(a_class):
+            raise Failed(f'the class has no {method} yet')
+
+
 def let(written: type | Callable, **constants: object) -> None:
     """Give constants that the student's code reads another value: `let(Driver, PERIOD_S=0.1)`.
 
