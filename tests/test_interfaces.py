@@ -2,8 +2,8 @@
 
 import pytest
 
-from helpers.ros.interfaces import share_folder, show
-from helpers.ros2._index import interfaces
+from helpers.ros2._index import interfaces, packages
+from helpers.ros2.interface import listing
 
 INSTALLED = interfaces()
 
@@ -59,50 +59,20 @@ def prefix(tmp_path, monkeypatch):
     return Prefix(tmp_path / 'install', monkeypatch)
 
 
-@pytest.fixture
-def listing(capsys):
-    def listing(name):
-        capsys.readouterr()
-        show(name)
-        return capsys.readouterr().out
-
-    return listing
-
-
-# --- show ---
-
-
 @pytest.mark.parametrize(('line', 'bare'), CORNERS)
-def test_lines_are_shown_as_the_command_does(prefix, listing, line, bare):
+def test_lines_are_shown_as_the_command_does(prefix, line, bare):
     prefix.add('corner_msgs/msg/Inner', f'{line}\nbool end')
     prefix.add('corner_msgs/msg/Outer', 'Inner inner # here\n')
-    assert listing('corner_msgs/msg/Inner').splitlines() == [line.rstrip(), 'bool end']
+    assert list(listing('corner_msgs/msg/Inner')) == [line.rstrip(), 'bool end']
     below = [f'\t{text}' for text in (bare, 'bool end') if text is not None]
-    assert listing('corner_msgs/msg/Outer').splitlines() == ['Inner inner # here', *below]
+    assert list(listing('corner_msgs/msg/Outer')) == ['Inner inner # here', *below]
 
 
 @pytest.mark.parametrize('package', sorted({name.split('/')[0] for name in INSTALLED}))
-def test_each_installed_interface_is_shown_whole(package, listing):
+def test_each_installed_interface_is_shown_whole(package):
     for name in (name for name in INSTALLED if name.startswith(f'{package}/')):
         kind, short = name.split('/')[1:]
-        file = share_folder(package) / kind / f'{short}.{kind}'
-        text = listing(name)
+        file = packages()[package] / 'share' / package / kind / f'{short}.{kind}'
         # The file itself is there, line by line, with the nested messages between its lines.
         own = [line.rstrip() for line in file.read_text(encoding='utf-8').splitlines()]
-        assert [line for line in text.splitlines() if not line.startswith('\t')] == own
-
-
-@pytest.mark.parametrize(
-    ('name', 'hint'),
-    [
-        ('sensor_msgs/Image', 'The nearest: sensor_msgs/msg/Image.'),
-        ('sensor_msg/msg/Imagge', 'The nearest: sensor_msgs/msg/Image.'),
-        ('custom_interfaces/msg/Twist', 'The nearest: geometry_msgs/msg/Twist.'),
-        ('qqq', '`ros2 interface list` prints all names.'),
-        (int, '`ros2 interface list` prints all names.'),
-    ],
-)
-def test_a_wrong_name_gets_the_nearest_one(name, hint):
-    with pytest.raises(ValueError, match='^There is no interface') as caught:
-        show(name)
-    assert str(caught.value) == f'There is no interface {name!r}. {hint}'
+        assert [line for line in listing(name) if not line.startswith('\t')] == own

@@ -279,7 +279,7 @@ import sys
 from pathlib import Path
 from helpers.ros2 import _sessions
 _sessions.FOLDER = Path(sys.argv[1])
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 from rclpy.node import Node
 with ros_session() as session:
     node = Node(sys.argv[2])

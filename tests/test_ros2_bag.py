@@ -18,7 +18,7 @@ from std_msgs.msg import String
 from support.commands import ros2
 from support.waits import LIMIT_S, START_LIMIT_S, wait_for
 
-from helpers.ros.session import graph_environment, ros_session
+from helpers.ros import graph_environment, ros_session
 from helpers.ros2.main import main
 
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from helpers.checks import progress
-from helpers.notebook.text import wrap
+from helpers.notebook import wrap
 
 __all__ = ['guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand']
 

@@ -21,10 +21,10 @@ KERNELS = """async () => {
     await kernels.refreshRunning();
     return [...kernels.running()].length;
 }"""
-REPLAY = """from helpers.recording.queue_model import predict
+REPLAY = """from helpers.recording import predict
 from helpers.replay import replay
 replay(predict(0.05, 0.2, 10, 1, 41), 10)"""
-LEVEL = """from helpers.replay.levels import level
+LEVEL = """from helpers.replay import level
 level('depth')"""
 # The smallest letters in these parts of the slide, in pixels of a slide of 1280 x 720.
 LETTERS = """parts => {

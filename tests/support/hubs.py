@@ -313,7 +313,7 @@ async def log_in(hub: Hub) -> list[Student]:
 
 # Everybody talks on one topic until everybody has heard something.
 TALK = """
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String

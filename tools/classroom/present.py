@@ -19,7 +19,7 @@ import nbformat
 from jupyter_core.paths import jupyter_config_dir
 from nbformat.v4 import new_markdown_cell
 
-from helpers.notebook.fresh import MARK
+from helpers.notebook import MARK
 from tools.classroom.plan import NO_PLAN, Plan, plan_of
 from tools.lab import open_lab, parser
 from tools.lessons import lesson

@@ -19,7 +19,7 @@ from helpers import plots
 from helpers.checks.bench import Bench, must_define, must_have
 from helpers.checks.tasks import Tasks
 from helpers.recording import explain, predict
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check

@@ -16,7 +16,7 @@ from std_msgs.msg import Empty, Int32
 from helpers.checks.bench import Bench, must_define
 from helpers.checks.errors import Failed, sentence
 from helpers.checks.tasks import Tasks, once
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check

@@ -17,7 +17,7 @@ from helpers.checks.bench import Bench, let, must_have
 from helpers.checks.errors import Failed, sentence
 from helpers.checks.tasks import Tasks
 from helpers.recording import explain, predict
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check

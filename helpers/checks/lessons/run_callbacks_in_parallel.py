@@ -12,7 +12,7 @@ from std_msgs.msg import Int32, String
 from helpers.checks.bench import Bench, must_define, must_have
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check

@@ -2,7 +2,7 @@
 
 from helpers.checks.tasks import Tasks
 from helpers.robot import Floor, Robot
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check

@@ -17,7 +17,7 @@ from tornado import web
 from tornado.httpserver import HTTPServer
 from tornado.iostream import StreamClosedError
 
-from helpers.notebook.look import LOOK_CSS
+from helpers.notebook import LOOK_CSS
 from tools.classroom.class_page import events
 from tools.classroom.class_page.events import parse
 from tools.classroom.class_page.store import ClassStore

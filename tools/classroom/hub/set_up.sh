@@ -23,5 +23,5 @@ if ! cmp -s tools/classroom/hub/package-lock.json "$proxy/package-lock.json"; th
 fi
 
 # The first build of a lesson would do this, and the first import, but a student may not write here.
-.venv/bin/python -c 'from helpers.workspace.wheels import fix_wheels; fix_wheels()'
+.venv/bin/python -c 'from helpers.workspace import fix_wheels; fix_wheels()'
 .venv/bin/python -m compileall -q -j 0 -x '/tests?/' .venv/lib helpers > /dev/null || true

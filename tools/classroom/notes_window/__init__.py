@@ -15,7 +15,7 @@ from jupyter_server.utils import url_path_join
 from nbconvert.filters import markdown2html
 from tornado import web
 
-from helpers.notebook.look import LOOK_FILE
+from helpers.notebook import LOOK_FILE
 from tools.classroom.class_page import page_file
 from tools.classroom.notes import of_step
 from tools.classroom.present import FOLDER, Copies, deck, deck_file, shown_cell

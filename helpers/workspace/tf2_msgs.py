@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from helpers.ros.interfaces import share_folder
-from helpers.workspace import Workspace
+from importlib.util import find_spec
+
+from helpers.workspace.workspace import Workspace
 
 MESSAGE = 'geometry_msgs/TransformStamped[] transforms\n'
 CMAKE_LISTS = """\
@@ -38,7 +39,7 @@ def provide_tf2_msgs(workspace: Workspace) -> None:
 
     Raises RuntimeError, with what colcon says, if the build fails.
     """
-    if share_folder('tf2_msgs'):
+    if find_spec('tf2_msgs'):
         return
     workspace.write('src/tf2_msgs/msg/TFMessage.msg', MESSAGE)
     workspace.write('src/tf2_msgs/CMakeLists.txt', CMAKE_LISTS)
