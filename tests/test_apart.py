@@ -147,3 +147,14 @@ def test_each_hostile_answer_gets_a_sentence_and_leaves_nothing(function, capsys
     assert not [
         p for p in psutil.process_iter(['cmdline']) if p.info['cmdline'] == ['sleep', '1000']
     ]
+
+
+def test_a_thread_that_failed_gets_a_sentence_of_its_own(capsys):
+    def starts_a_thread():
+        thread = threading.Thread(target=lambda: 1 / 0)
+        thread.start()
+        thread.join()
+        return 'nothing came'
+
+    said = ' '.join(points_of(starts_a_thread, capsys).split())
+    assert 'nothing came. A thread of yours ended with ZeroDivisionError: division by zero' in said

@@ -14,7 +14,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
-from helpers.checks.bench import Bench
+from helpers.checks.bench import Bench, let, must_define, must_have
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks
 
@@ -118,6 +118,27 @@ def test_a_class_in_place_of_a_node_is_said():
         pytest.raises(Failed, match='^a node is wanted here.* the class Doubler'),
     ):
         bench.spin(Doubler)
+
+
+def test_what_is_not_written_yet_is_named():
+    with Bench(), pytest.raises(Failed, match=r'^there is no self\.timer yet$'):
+        must_have(Doubler(), 'publisher', 'timer')
+    must_define(Doubler, '__init__', 'number_callback')
+    with pytest.raises(Failed, match='^the class has no timer_callback yet$'):
+        must_define(Doubler, 'timer_callback')
+
+
+PERIOD_S = 0.5
+
+
+def period():
+    return PERIOD_S
+
+
+def test_a_constant_that_the_code_reads_gets_another_value(monkeypatch):
+    monkeypatch.setitem(globals(), 'PERIOD_S', PERIOD_S)
+    let(period, PERIOD_S=0.1)
+    assert period() == 0.1
 
 
 # --- What a verdict says of mistakes

@@ -219,6 +219,7 @@ def _worker(points: Callable[[], Sequence[Test]], send: Callable) -> None:
         except BaseException as error:  # whatever a student's code raises is an answer, not right
             ok, found = False, sentence(error)
         if failures and not ok:
+            found = found if found[-1:] in ('', '.', '!', '?') else f'{found}.'
             found = f'{found} {failures[0]}'.strip()
         if number == len(tests) - 1:
             left = [
