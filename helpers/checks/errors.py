@@ -23,6 +23,10 @@ class Failed(Exception):  # noqa: N818 - a verdict, and no error
     """What a check has found: raised by the bench, shown as it is."""
 
 
+class NeverEnds(Failed):
+    """What a check has found, if each later point of the task would wait as long for the same."""
+
+
 def is_students(filename: str) -> bool:
     """Return whether a file holds code of the student: a cell, or a file of the workspace."""
     if CELL.search(filename):
