@@ -139,7 +139,7 @@ def what_it_believed(at_bump):
 
 
 @tasks.add(5)
-def save_what_is_whole(salvage, half, whole_file):
+def save_what_is_whole(salvage, half):
     def saves_small(missing):
         rows = [(n, f'/{"ab"[n % 2]}', Bool(data=n > 3)) for n in range(6)]
         with bag_of(rows) as path:
@@ -149,15 +149,11 @@ def save_what_is_whole(salvage, half, whole_file):
             file.write_bytes(whole[: len(whole) - missing])
             return are_same(salvage(file), right)
 
-    def saves_half():
-        right = whole_messages(half)
-        result = are_same(salvage(half), right)
-        assert right == whole_messages(whole_file)[: len(right)]
-        return result
-
     def are_same(found, right):
         if not isinstance(found, list | tuple):
             return f'it returned {found!r}'
+        if not found:
+            return 'of the whole messages it returned none'
         for number, (saved, message) in enumerate(zip(found, right, strict=False)):
             if tuple(saved) != message:
                 parts = zip(('topic', 'log_time', 'data'), saved, message, strict=False)
@@ -173,7 +169,7 @@ def save_what_is_whole(salvage, half, whole_file):
     return [
         ('a file that is whole', lambda: saves_small(0), hint),
         ('a file without its last byte', lambda: saves_small(1), hint),
-        ('the half file', saves_half, hint),
+        ('the half file', lambda: are_same(salvage(half), whole_messages(half)), hint),
     ]
 
 

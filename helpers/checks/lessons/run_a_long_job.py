@@ -479,9 +479,9 @@ def keep_errors(node, go_on):
 
 
 def raise_first(errors):
-    """Raise the first error that is the student's."""
+    """Raise the first error that is the student's, and does not follow from a stuck wheel."""
     for error in errors:
-        if not isinstance(error, WheelStuckError):
+        if not any(isinstance(e, WheelStuckError) for e in (error, error.__context__)):
             raise error
 
 
