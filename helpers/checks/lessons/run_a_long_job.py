@@ -457,12 +457,16 @@ def operate(
     return server, operator
 
 
-def keep_errors(node, go_on):
+def keep_errors(node, drive):
     """Let a patroller drive in this way. Return a list of what its job raises, from now on.
 
     rclpy only logs what a job raises, and says that the goal was aborted.
     """
     errors = []
+
+    def go_on():
+        drive()
+
     node.go_on = go_on
     node.get_logger().set_level(40)  # rclpy warns of an aborted goal by its id, which changes
 
