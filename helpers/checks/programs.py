@@ -1,0 +1,168 @@
+"""What the checks of packages and programs share: build, run, and say exactly what went wrong.
+
+A program, a build or a launch says a lot when it fails. These functions find the first error in it:
+its file, its line, its text.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from catkin_pkg.package import InvalidPackage, Package, parse_package
+
+from helpers.checks.errors import Failed, is_students
+from helpers.workspace import Workspace
+from helpers.workspace.build_output import BuildResult
+from helpers.workspace.processes import Process
+
+POLL_S = 0.02
+TRACEBACK = 'Traceback (most recent call last)'
+FRAME = re.compile(r'\s*File "(.*?)", line (\d+)')
+CHAINED = re.compile(r'During handling of|The above exception')
+OF_A_PROGRAM = re.compile(r'\[[^\]\s]+-\d+\] ')  # what launch writes before a program's lines
+
+
+# --- Packages
+
+
+def manifest(workspace: Workspace, folder: str) -> Package:
+    """Return what the package.xml of a package in `src` says. Raises Failed if it is not valid."""
+    path = workspace.file(f'src/{folder}')
+    if not (path / 'package.xml').is_file():
+        raise Failed(f'there is no package src/{folder}')
+    try:
+        return parse_package(path)
+    except InvalidPackage as error:
+        reason = ' '.join(str(error).replace(f'{path}/', '').split())
+        raise Failed(f'package.xml cannot be read: {reason}') from None
+
+
+def needed(package: Package, moment: str) -> set[str]:
+    """Return the names that a package.xml gives for a moment: 'build' (with its tools) or 'run'."""
+    if moment == 'build':
+        depends = package.build_depends + package.buildtool_depends
+    else:
+        depends = package.exec_depends
+    return {depend.name for depend in depends}
+
+
+# --- Builds
+
+
+def builds(workspace: Workspace, *packages: str) -> bool | str:
+    """Build packages without what an earlier build has left. Return True, or the first error.
+
+    A warning of colcon counts as an error.
+    """
+    for package in packages:
+        for folder in 'build', 'install':
+            shutil.rmtree(workspace.file(f'{folder}/{package}'), ignore_errors=True)
+    result = workspace.build(*packages)
+    if result.ok and result.warnings:
+        return ' '.join(result.warnings[-1].split())
+    return result.ok or first_error(result)
+
+
+def first_error(result: BuildResult) -> str:
+    """Return the first error of a build that failed: where it is, and what it says."""
+    return error_of_build(result.errors or result.warnings)
+
+
+def error_of_build(lines: Sequence[str]) -> str:
+    """Return the first error of these lines, which `lines_that_matter` has found."""
+    place, said, margin = '', [], None  # the margin of the traceback that is being read
+    for number, line in enumerate(lines):
+        text, indent = line.strip(), len(line) - len(line.lstrip())
+        if number and re.match(r'CMake Error|\S+:\d+:(\d+:)? (fatal )?error: ', line):
+            break  # the next one
+        if TRACEBACK in line:
+            margin = indent
+        elif margin is not None and indent > margin:
+            if frame := FRAME.match(line):
+                place = f'{frame[1]}:{frame[2]}: '
+        elif cmake := re.match(r'CMake Error at (\S+:\d+)|called from (\S+:\d+)', text):
+            place = f'{cmake[1] or cmake[2]}: '
+        elif not re.match(r' *\d* \| ', line):  # below a compiler's error stands the code
+            margin = None
+            said.append(text)
+    return place + ' '.join(said)
+
+
+# --- Programs
+
+
+def sourced(workspace: Workspace, commands: str) -> str:
+    """Run commands in a new terminal that has sourced the workspace. Return what they print."""
+    return workspace.terminal(f'source install/setup.bash\n{commands}')
+
+
+def open_terminal(workspace: Workspace, name: str) -> Process:
+    """Return the terminal that a cell of the lesson has opened. Raises Failed if none has."""
+    if name not in workspace.terminals:
+        raise Failed(f'there is no terminal {name}: run the cell of the task first')
+    return workspace.terminals[name]
+
+
+def wait_until(condition: Callable[[], object], limit_s: float) -> bool:
+    """Wait until a condition holds, at most `limit_s` seconds. Return whether it holds."""
+    end = time.monotonic() + limit_s
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(POLL_S)
+    return True
+
+
+def line_of(process: Process, text: str, limit_s: float = 10.0) -> str:
+    """Wait for a line of a program with a text, and return it.
+
+    Raises Failed, with what the program says instead, if it ends before, or takes longer.
+    """
+    try:
+        return process.wait_for(text, limit_s)
+    except RuntimeError:
+        raise Failed(f'{process.name} has ended: {error_in(process.lines)}') from None
+    except TimeoutError as error:
+        raise Failed(str(error)) from None
+
+
+def error_in(lines: Sequence[str]) -> str:
+    """Return the first error of a program: exception, text, and the line of the workspace.
+
+    Of a program without a traceback it is the last line, or 'it printed nothing'. Lines of a launch
+    may have the name of their program in front.
+    """
+    start = next((number for number, line in enumerate(lines) if TRACEBACK in line), None)
+    if start is None:
+        said = [line.strip() for line in lines if line.strip()]
+        return said[-1] if said else 'it printed nothing'
+    program = OF_A_PROGRAM.match(lines[start])
+    prefix = program[0] if program else ''
+    own = [line.removeprefix(prefix) for line in lines[start:] if line.startswith(prefix)]
+    said, place, inside, chained = '', '', False, True
+    for number, line in enumerate(own):
+        if TRACEBACK in line:
+            if not chained:
+                break
+            inside, place = True, ''
+        elif CHAINED.match(line):
+            chained = True
+        elif inside and (frame := FRAME.match(line)):
+            if _is_own(frame[1]):
+                code = own[number + 1].strip() if number + 1 < len(own) else ''
+                place = f'Line {frame[2]} of {Path(frame[1]).name}: {code}'
+        elif inside and line and not line[0].isspace():
+            said, inside, chained = line, False, False
+    if not said:
+        return place or 'it ends with a traceback'
+    return f'{said}{"" if not place or said[-1] in ".!?" else "."} {place}'.strip()
+
+
+def _is_own(file: str) -> bool:
+    """Return whether a file is the learner's: no library, no script that colcon has made."""
+    script = re.search(r'/lib/\w+/\w+$', file)
+    return is_students(file) and not script and not Path(file).name.startswith('.')
