@@ -3,7 +3,14 @@
 import pytest
 
 from helpers.checks.errors import Failed
-from helpers.checks.programs import error_in, error_of_build, line_of, manifest, wait_until
+from helpers.checks.programs import (
+    error_in,
+    error_of_build,
+    error_of_launch,
+    line_of,
+    manifest,
+    wait_until,
+)
 from helpers.workspace import Workspace
 from helpers.workspace.build_output import lines_that_matter
 
@@ -29,6 +36,8 @@ def test_the_error_of_a_program_has_text_and_line():
     said = "AttributeError: 'Listener' object has no attribute 'create_subscriber'. "
     said += "Line 12 of listener.py: self.create_subscriber(String, 'topic', self.heard, 10)"
     assert error_in(TRACEBACK.splitlines()) == said
+    # In what a terminal of the workspace prints, its folder is left out.
+    assert error_in(TRACEBACK.replace('/home/you/ws/src', 'src').splitlines()) == said
     launched = [f'[listener-2] {line}' for line in TRACEBACK.splitlines()]
     mixed = [
         line for pair in zip(launched, ['[robot-1] I drive'] * 9, strict=False) for line in pair
@@ -105,12 +114,23 @@ def test_the_first_error_of_a_build_has_its_place(text, error):
     assert error_of_build(lines_that_matter(text)) == error
 
 
+def test_a_launch_names_its_own_error_or_that_of_the_first_program_that_died():
+    assert error_of_launch("a.xml:3: '2' is neither true nor false") == (
+        "a.xml:3: '2' is neither true nor false"
+    )
+    starts = '[INFO] [robot-1]: process started with pid [1]\n'
+    assert error_of_launch(starts) == ''
+    said = '[robot-1] error: no floor x\n'
+    died = '[ERROR] [robot-1]: process has died [pid 1, exit code 2]\n'
+    assert error_of_launch(starts + said + died) == 'robot-1 has died. [robot-1] error: no floor x'
+
+
 def test_a_package_that_cannot_be_read_says_why(workspace):
     with pytest.raises(Failed, match='there is no package src/x'):
-        manifest(workspace, 'x')
+        manifest(workspace, 'src/x')
     workspace.write('src/x/package.xml', '<package format="3"><depend>rclpy<depend></package>')
     with pytest.raises(Failed, match='package.xml cannot be read: .*mismatched tag: line 1'):
-        manifest(workspace, 'x')
+        manifest(workspace, 'src/x')
 
 
 def test_a_line_of_a_program_comes_or_its_error_does(workspace):

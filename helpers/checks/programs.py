@@ -16,10 +16,11 @@ from catkin_pkg.package import InvalidPackage, Package, parse_package
 
 from helpers.checks.errors import Failed, is_students
 from helpers.workspace import Workspace
-from helpers.workspace.build_output import BuildResult
+from helpers.workspace.build_output import BuildResult, without_folders
 from helpers.workspace.processes import Process
 
 POLL_S = 0.02
+DIED = 'process has died'
 TRACEBACK = 'Traceback (most recent call last)'
 FRAME = re.compile(r'\s*File "(.*?)", line (\d+)')
 CHAINED = re.compile(r'During handling of|The above exception')
@@ -30,10 +31,13 @@ OF_A_PROGRAM = re.compile(r'\[[^\]\s]+-\d+\] ')  # what launch writes before a p
 
 
 def manifest(workspace: Workspace, folder: str) -> Package:
-    """Return what the package.xml of a package in `src` says. Raises Failed if it is not valid."""
-    path = workspace.file(f'src/{folder}')
+    """Return what the package.xml in a folder, `src/my_package`, says.
+
+    Raises Failed if there is none, or if it is not valid.
+    """
+    path = workspace.file(folder)
     if not (path / 'package.xml').is_file():
-        raise Failed(f'there is no package src/{folder}')
+        raise Failed(f'there is no package {folder}')
     try:
         return parse_package(path)
     except InvalidPackage as error:
@@ -53,12 +57,12 @@ def needed(package: Package, moment: str) -> set[str]:
 # --- Builds
 
 
-def builds(workspace: Workspace, *packages: str) -> bool | str:
-    """Build packages without what an earlier build has left. Return True, or the first error.
+def builds(workspace: Workspace, *packages: str, anew: bool = True) -> bool | str:
+    """Build packages. Return True, or the first error. A warning of colcon counts as one.
 
-    A warning of colcon counts as an error.
+    With `anew`, what an earlier build has left is removed before.
     """
-    for package in packages:
+    for package in packages if anew else ():
         for folder in 'build', 'install':
             shutil.rmtree(workspace.file(f'{folder}/{package}'), ignore_errors=True)
     result = workspace.build(*packages)
@@ -162,7 +166,47 @@ def error_in(lines: Sequence[str]) -> str:
     return f'{said}{"" if not place or said[-1] in ".!?" else "."} {place}'.strip()
 
 
+def launch(
+    workspace: Workspace, words: str, is_done: Callable[[str], bool], limit_s: float = 20.0
+) -> str:
+    """Run `ros2 launch` until what it prints is enough, a program dies, or it ends. Press Ctrl+C.
+
+    Return what it has printed, without this machine's folders.
+    """
+    with workspace.start(
+        f'source install/setup.bash\nros2 launch {words}', 'the launch'
+    ) as process:
+
+        def is_over() -> bool:
+            text = '\n'.join(process.lines)
+            return not process.running or DIED in text or is_done(text)
+
+        wait_until(is_over, limit_s)
+    return without_folders('\n'.join(process.lines), workspace.path)
+
+
+def started(text: str) -> list[str]:
+    """Return the programs that a launch says it has started, sorted."""
+    return sorted(re.findall(r'\[(\S+)-\d+\]: process started', text))
+
+
+def error_of_launch(text: str) -> str:
+    """Return the first error of a launch or of one of its programs, or nothing if there is none."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    if any(TRACEBACK in line for line in lines):
+        return error_in(lines)
+    if lines and not started(text):
+        return lines[-1]
+    if dead := re.search(rf'\[(\S+-\d+)\]: {DIED}', text):
+        said = [line for line in lines if line.startswith(f'[{dead[1]}] ')]
+        return f'{dead[1]} has died. {said[-1] if said else "It printed nothing"}'
+    return ''
+
+
 def _is_own(file: str) -> bool:
     """Return whether a file is the learner's: no library, no script that colcon has made."""
-    script = re.search(r'/lib/\w+/\w+$', file)
-    return is_students(file) and not script and not Path(file).name.startswith('.')
+    if re.search(r'/lib/\w+/\w+$', file) or Path(file).name.startswith('.'):
+        return False
+    # What a terminal of the workspace prints has no folders of this machine.
+    in_workspace = re.match(r'(\w+/)?(src|install|build)/', file)
+    return bool(in_workspace) or is_students(file)

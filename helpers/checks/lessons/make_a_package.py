@@ -28,7 +28,7 @@ check = tasks.check
 @tasks.add(1)
 def create_a_package(workspace):
     def has_type():
-        kind = manifest(workspace, 'hello_pkg').get_build_type()
+        kind = manifest(workspace, 'src/hello_pkg').get_build_type()
         return kind == 'ament_python' or f'its type is {kind}'
 
     def has_license():
@@ -82,11 +82,11 @@ def a_slow_listener(workspace, file):
 @tasks.add(3)
 def what_it_needs(workspace):
     def type_is_right():
-        kind = manifest(workspace, 'hello_pkg').get_build_type()
+        kind = manifest(workspace, 'src/hello_pkg').get_build_type()
         return kind == 'ament_python' or f'its type is {kind}'
 
     def needs_both():
-        package = manifest(workspace, 'hello_pkg')
+        package = manifest(workspace, 'src/hello_pkg')
         names = sorted(needed(package, 'run'))
         others = sorted((needed(package, 'build') | {*names}) - {'rclpy', 'std_msgs'})
         if others:
