@@ -6,8 +6,11 @@ its file, its line, its text.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import re
 import shutil
+import signal
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +24,7 @@ from helpers.workspace.processes import Process
 
 POLL_S = 0.02
 DIED = 'process has died'
+LAUNCH_ENDS_S = 15.0  # it waits 5 s, and once more, for a program that does not end
 TRACEBACK = 'Traceback (most recent call last)'
 FRAME = re.compile(r'\s*File "(.*?)", line (\d+)')
 CHAINED = re.compile(r'During handling of|The above exception')
@@ -41,8 +45,8 @@ def manifest(workspace: Workspace, folder: str) -> Package:
     try:
         return parse_package(path)
     except InvalidPackage as error:
-        reason = ' '.join(str(error).replace(f'{path}/', '').split())
-        raise Failed(f'package.xml cannot be read: {reason}') from None
+        reason = re.sub(r"^Error\(s\) in package '.*?':", '', ' '.join(str(error).split()))
+        raise Failed(f'package.xml cannot be read: {reason.strip()}') from None
 
 
 def needed(package: Package, moment: str) -> set[str]:
@@ -121,7 +125,7 @@ def wait_until(condition: Callable[[], object], limit_s: float) -> bool:
     return True
 
 
-def line_of(process: Process, text: str, limit_s: float = 10.0) -> str:
+def line_of(process: Process, text: str, limit_s: float = 20.0) -> str:
     """Wait for a line of a program with a text, and return it.
 
     Raises Failed, with what the program says instead, if it ends before, or takes longer.
@@ -167,11 +171,12 @@ def error_in(lines: Sequence[str]) -> str:
 
 
 def launch(
-    workspace: Workspace, words: str, is_done: Callable[[str], bool], limit_s: float = 20.0
+    workspace: Workspace, words: str, is_done: Callable[[str], bool], limit_s: float = 40.0
 ) -> str:
-    """Run `ros2 launch` until what it prints is enough, a program dies, or it ends. Press Ctrl+C.
+    """Run `ros2 launch` until what it prints is enough, a program dies, or it ends.
 
-    Return what it has printed, without this machine's folders.
+    Return what it has printed until then, without this machine's folders. What its programs say
+    when they are ended is not a part of it.
     """
     with workspace.start(
         f'source install/setup.bash\nros2 launch {words}', 'the launch'
@@ -182,7 +187,21 @@ def launch(
             return not process.running or DIED in text or is_done(text)
 
         wait_until(is_over, limit_s)
-    return without_folders('\n'.join(process.lines), workspace.path)
+        text = '\n'.join(process.lines)
+        end_launch(process)
+    return without_folders(text, workspace.path)
+
+
+def end_launch(process: Process) -> None:
+    """Press Ctrl+C, and wait for all programs of a launch.
+
+    It gives each of them five seconds, then sends a second signal. Were it killed meanwhile, its
+    programs would go on.
+    """
+    if process.running:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGINT)
+    wait_until(lambda: not process.running, LAUNCH_ENDS_S)
 
 
 def started(text: str) -> list[str]:

@@ -147,14 +147,14 @@ def what_is_installed(workspace):
 def a_second_terminal(workspace):
     def talker_has_published():
         talking = open_terminal(workspace, 'talker')
-        return bool(line_of(talking, 'Publishing: "Hello World: 40"', 8))
+        return bool(line_of(talking, 'Publishing: "Hello World: 40"'))
 
     def listener_has_heard():
         if not open_terminal(workspace, 'talker').running:
             return 'the talker does not run'
         # No later message can push the last one out of the queue, so it always arrives.
         listening = open_terminal(workspace, 'listener')
-        return bool(line_of(listening, 'I heard: "Hello World: 40"', 8))
+        return bool(line_of(listening, 'I heard: "Hello World: 40"'))
 
     hint = 'Package not found: not sourced. No executable found: what is its name in setup.py?'
     return [
@@ -274,7 +274,7 @@ def fix_a_package(workspace):
             workspace.start(f'{run} forgetful_pkg counter', 'counter') as counter,
             workspace.start(f'{run} hello_pkg talker', 'the talker'),
         ):
-            return bool(line_of(counter, 'Counted: 5', 12))
+            return bool(line_of(counter, 'Counted: 5'))
 
     module = 'No module named: which file is in the folder, and which names are in setup.py?'
     return [
@@ -307,7 +307,15 @@ def run_main(workspace, file, texts, before='', last=None):
     with Bench() as bench:
         publisher = bench.publisher('topic', String)
         with workspace.start(command, 'the listener') as process:
-            bench.wait(lambda: publisher.get_subscription_count() or not process.running, 8)
+
+            def subscribed_or_ended():
+                return publisher.get_subscription_count() or not process.running
+
+            def is_there():
+                return subscribed_or_ended() or 'listener' in bench.tester.get_node_names()
+
+            bench.wait(is_there, 8)
+            bench.wait(subscribed_or_ended)
             if process.running and not publisher.get_subscription_count():
                 raise Failed('it runs, and does not subscribe to the topic "topic"')
             bench.say('topic', *(String(data=text) for text in texts), at_once=True)
