@@ -41,6 +41,8 @@ def build(workspace: Workspace, *packages: str, anew: bool = False) -> None:
 
 def why_it_failed(result: BuildResult) -> str:
     """Return the package of a build that failed, and its first error: what, file, line."""
+    if result.ok:
+        return 'nothing: the build has finished'
     error = first_error(result.errors)
     return f'{result.failed}: {error}' if result.failed else error
 
