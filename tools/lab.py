@@ -19,16 +19,17 @@ FIRST = 'lab/tree/notebooks/00_start_here.ipynb'
 
 
 def parser(description: str) -> argparse.ArgumentParser:
-    """Return a parser of the options that `open_lab` takes."""
-    made = argparse.ArgumentParser(description=description)
-    made.add_argument('--root', type=Path, default=ROOT, help='the folder that JupyterLab shows')
-    made.add_argument('--port', help='this port or none; otherwise the first free one from 8888 on')
-    made.add_argument('--no-browser', dest='browser', action='store_false')
-    made.add_argument(
+    options = argparse.ArgumentParser(description=description)
+    options.add_argument('--root', type=Path, default=ROOT, help='the folder that JupyterLab shows')
+    options.add_argument(
+        '--port', help='this port or none; otherwise the first free one from 8888 on'
+    )
+    options.add_argument('--no-browser', dest='browser', action='store_false')
+    options.add_argument(
         '--outputs', action='store_true', help='show lessons with the outputs of the repository'
     )
-    made.add_argument('more', nargs='*', help="JupyterLab's own options, after --")
-    return made
+    options.add_argument('more', nargs='*', help="JupyterLab's own options, after --")
+    return options
 
 
 def open_lab(
@@ -58,6 +59,8 @@ def open_lab(
     os.environ['PATH'] = f'{sys.prefix}/bin{os.pathsep}{os.environ["PATH"]}'
     command = [sys.executable, '-m', 'jupyterlab', f'--ServerApp.root_dir={options.root}']
     command += ['--LabApp.custom_css=True', f'--LabApp.default_url=/{address}', *more]
+    # The address is all that a student must see.
+    command += ['--ServerApp.log_level=WARN', '--LabApp.log_level=WARN']
     if options.port:
         command += [f'--port={options.port}', '--ServerApp.port_retries=0']
     if options.outputs:
@@ -66,6 +69,7 @@ def open_lab(
         command.append('--no-browser')
     if os.getuid() == 0:
         command.append('--allow-root')
+    print('Ctrl+C, twice, ends JupyterLab.', file=sys.stderr)
     os.execv(sys.executable, [*command, *options.more])
 
 

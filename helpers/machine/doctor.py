@@ -1,7 +1,7 @@
 """Is this machine ready for the notebooks, and if not, what to do.
 
-`python -m helpers.machine.doctor` prints a table, and exits with 1 if a required check fails.
-It runs on Python 3.10 and newer, and with any installation of ROS 2, also with none.
+`python -m helpers.machine.doctor` prints a table of checks, and exits with 1 if a required one
+fails. It runs on Python 3.10 and newer, and with any installation of ROS 2, also with none.
 """
 
 from __future__ import annotations

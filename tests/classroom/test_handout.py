@@ -85,14 +85,14 @@ def test_solutions_may_come_later(checkout, tmp_path):
 
 
 def test_packages_are_those_of_the_wanted_pythons(tmp_path):
-    head, *blocks = re.split(r'\n(?=[a-z])', (ROOT / 'requirements.lock').read_text())
+    head, *blocks = re.split(r'\n(?=[a-z])', (ROOT / 'tools/locks/requirements.lock').read_text())
     names = ('cycler', 'markupsafe', 'empy')
     # One that only some Pythons need, by their last number, too: 3.11.2 of Debian 12 is one.
     some = [block for block in blocks if "python_full_version < '3.11.5'" in block.splitlines()[0]]
     chosen = [block for block in blocks if block.startswith(names)] + some
     lock = tmp_path / 'requirements.lock'
     lock.write_text('\n'.join([head, *chosen]))
-    shutil.copy(ROOT / 'requirements-uv.lock', tmp_path)
+    shutil.copy(ROOT / 'tools/locks/requirements-uv.lock', tmp_path)
     handout.download(lock, tmp_path / 'wheels', ('3.11', '3.12'))
     found = sorted(path.name for path in (tmp_path / 'wheels').iterdir())
     assert [sum('cp311-' in n for n in found), sum('cp312-' in n for n in found)] == [1, 1]
@@ -105,8 +105,10 @@ def test_packages_are_those_of_the_wanted_pythons(tmp_path):
 def test_bad_input_gives_one_sentence(checkout, tmp_path, capsys):
     assert handout.main(['--root', str(tmp_path)]) == 1
     assert 'clone' in capsys.readouterr().err
-    (checkout / 'requirements.lock').write_text('# Every wheel exists for Python 3.12 3.11\na==1\n')
-    (checkout / 'requirements-uv.lock').write_text('\nuv==1\n')
+    locks = checkout / 'tools/locks'
+    locks.mkdir(parents=True, exist_ok=True)
+    (locks / 'requirements.lock').write_text('# Every wheel exists for Python 3.12 3.11\na==1\n')
+    (locks / 'requirements-uv.lock').write_text('\nuv==1\n')
     git(checkout, 'add', '.')
     git(checkout, 'commit', '-m', 'locks')
     assert handout.main(['--root', str(checkout), '--wheels', '3.9']) == 1

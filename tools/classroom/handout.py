@@ -26,8 +26,9 @@ from tools.lessons.clean import text_of
 from tools.lessons.lesson import ROOT, tags
 
 NAME = 'ros2_notebooks'
+LOCK = 'tools/locks/requirements.lock'
 WHEELS = 'wheels'
-LEFT_OUT = ('tests', 'benchmarks', '.ci', '.github', 'tools/classroom/hub', 'tools/soak')
+LEFT_OUT = ('tests', '.ci', '.github', 'tools/classroom/hub')
 NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', re.DOTALL)
 GLIBC = ('_2_28', '_2_27', '_2_26', '_2_24', '_2_17', '_2_12', '_2_5', '2014', '2010', '1')
 
@@ -52,7 +53,7 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
         shutil.copytree(course, Path(folder, BASE))
         Path(folder, BASE).rename(course / BASE)
         if pythons:
-            download(course / 'requirements.lock', course / WHEELS, pythons)
+            download(course / LOCK, course / WHEELS, pythons)
         output.parent.mkdir(parents=True, exist_ok=True)
         new = output.with_name(f'{output.name}.new')
         with tarfile.open(new, 'w:gz', compresslevel=6) as archive:

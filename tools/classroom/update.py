@@ -160,10 +160,10 @@ def update_from_archive(archive: Path, mine: Path) -> list[str]:
         newer = next((path.parent for path in Path(folder).glob(f'*/{BASE}')), None)
         if newer is None:
             raise ValueError(f'{archive} is no archive of `make handout`.')
-        lock = _bytes(mine / 'requirements.lock')
+        lock = _bytes(mine / 'tools/locks/requirements.lock')
         said = update_from_folder(newer, mine)
         brought = (newer / 'wheels').is_dir()
-        if brought or _bytes(mine / 'requirements.lock') != lock:
+        if brought or _bytes(mine / 'tools/locks/requirements.lock') != lock:
             shutil.rmtree(mine / 'wheels', ignore_errors=True)  # they are those of the old lock
         if brought:
             (newer / 'wheels').rename(mine / 'wheels')

@@ -69,7 +69,6 @@ def _clean_outputs(cell: NotebookNode) -> list[NotebookNode]:
 
 
 def text_of(notebook: NotebookNode) -> str:
-    """Return the text of a notebook's file, as Jupyter writes it."""
     return nbformat.writes(notebook) + '\n'
 
 

@@ -138,8 +138,8 @@ def _height_of_prose(block: str) -> float:
 
 def png_of(output: NotebookNode) -> bytes | None:
     """Return the PNG file of an output that is a figure of `helpers.plots.alt_text`."""
-    found = PICTURE.search(output.get('data', {}).get('text/html', ''))
-    return b64decode(found[1]) if found else None
+    picture = PICTURE.search(output.get('data', {}).get('text/html', ''))
+    return b64decode(picture[1]) if picture else None
 
 
 def _height_of_output(output: NotebookNode, figure: float) -> float:

@@ -18,7 +18,6 @@ def record() -> dict:
 
 
 def html() -> str:
-    """Return it as a part of a page."""
     svg = picture(ROOMS, [ROOMS.start[:2]], ROOMS.start)
     return (
         f'<div class="replay" data-drive={attribute(record())}>{style("drive.css")}'

@@ -13,7 +13,7 @@ fail() {
 }
 
 # Which lessons and packages an image holds: its label is the checksum of what went into it.
-inside=$(find LICENSE pyproject.toml requirements.lock requirements-hub.lock requirements-uv.lock Containerfile helpers notebooks tools -type f \
+inside=$(find LICENSE pyproject.toml requirements-hub.lock Containerfile helpers notebooks tools -type f \
     ! -path 'tools/classroom/hub/*' ! -path '*/__pycache__/*' ! -path '*/.ipynb_checkpoints/*' -exec cksum {} + | LC_ALL=C sort | cksum | tr ' ' -)
 [ "${1-}" != label ] || exec echo "$inside"
 

@@ -24,26 +24,26 @@ def measure(rate_hz: int, rounds: int = ROUNDS) -> dict[str, list[float]]:
 
     One run can be a fifth slower than the next, so the kinds take turns.
     """
-    found = {kind: [] for kind in KINDS}
+    latencies = {kind: [] for kind in KINDS}
     for turn in range(rounds):
         for kind in list(KINDS)[:: 1 if turn % 2 else -1]:
-            found[kind].append(latency_s(kind, rate_hz))
-    return found
+            latencies[kind].append(latency_s(kind, rate_hz))
+    return latencies
 
 
-def table(rate_hz: int, found: dict[str, Sequence[float]]) -> pd.DataFrame:
+def table(rate_hz: int, latencies: dict[str, Sequence[float]]) -> pd.DataFrame:
     """Return for each kind the median, the least and the most, and the ratio to the first kind."""
-    first = median(next(iter(found.values())))
+    first = median(next(iter(latencies.values())))
     return pd.DataFrame(
         {
             'rate': f'{rate_hz} Hz',
             'kind': kind,
             'median (least to most), us': '{:.0f} ({:.0f} to {:.0f})'.format(
-                *(1e6 * one for one in (median(runs), min(runs), max(runs)))
+                *(1e6 * value for value in (median(runs), min(runs), max(runs)))
             ),
             'ratio': f'{median(runs) / first:.2f}',
         }
-        for kind, runs in found.items()
+        for kind, runs in latencies.items()
     )
 
 

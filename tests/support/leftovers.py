@@ -1,10 +1,8 @@
-"""What a run of a notebook leaves behind: threads, processes, shared memory.
+"""What a notebook leaves behind: threads, processes, shared memory.
 
-`look` looks at a kernel from inside. When all kernels have ended, this module as a program looks at
-the run: it has a /dev/shm and a table of processes of its own, so that whatever is there was left.
+`look` looks at a kernel from inside, the functions below it at what is there after the kernel.
 """
 
-import os
 import re
 import sys
 import threading
@@ -48,10 +46,10 @@ def state_of_process() -> dict[str, str]:
         for child in psutil.Process().children(recursive=True)
         if not _of_pool(child) and not _of_terminal(child)
     ]
-    found = threads_of_process() | processes_that_stay(children, MOMENT_S)
+    sentences = threads_of_process() | processes_that_stay(children, MOMENT_S)
     for file in SHARED_MEMORY.findall(Path('/proc/self/maps').read_text()):
-        found[file] = f'The kernel still uses {file}.'
-    return found
+        sentences[file] = f'The kernel still uses {file}.'
+    return sentences
 
 
 def threads_of_process() -> dict[str, str]:
@@ -59,7 +57,7 @@ def threads_of_process() -> dict[str, str]:
 
     Of the threads that C++ started, those of Fast DDS's participants.
     """
-    found = {
+    sentences = {
         f'thread {thread.name} {thread.ident}': f'The thread {thread.name} still runs.'
         for thread in threading.enumerate()
         if type(thread).__name__ != OF_ZMQ
@@ -68,8 +66,8 @@ def threads_of_process() -> dict[str, str]:
         with suppress(OSError):  # it has ended
             name = (task / 'comm').read_text().strip()
             if name.startswith('dds.') and name not in OF_PROCESS:
-                found[f'native {name} {task.name}'] = f'The thread {name} still runs.'
-    return found
+                sentences[f'native {name} {task.name}'] = f'The thread {name} still runs.'
+    return sentences
 
 
 def _of_pool(process: psutil.Process) -> bool:
@@ -84,7 +82,7 @@ def _of_terminal(process: psutil.Process) -> bool:
     terminals = processes._started if processes else ()  # noqa: SLF001
     open_now = {terminal._process.pid for terminal in terminals}  # noqa: SLF001
     with suppress(psutil.NoSuchProcess):
-        return any(one.pid in open_now for one in (process, *process.parents()))
+        return any(ancestor.pid in open_now for ancestor in (process, *process.parents()))
     return False
 
 
@@ -95,22 +93,13 @@ def processes_that_stay(processes: list[psutil.Process], timeout_s: float) -> di
     while processes and time.monotonic() < deadline:
         time.sleep(0.01)
         processes = [process for process in processes if process.is_running()]
-    found = {}
+    sentences = {}
     for process in processes:
         with suppress(psutil.NoSuchProcess):
             kind = 'process'
             try:
-                what = ' '.join(process.cmdline())[:100] or process.name()
+                command = ' '.join(process.cmdline())[:100] or process.name()
             except psutil.ZombieProcess:
-                kind, what = 'zombie', f'{process.name()} (nobody has waited for its end)'
-            found[f'{kind} {process.pid}'] = f'The process {process.pid} still runs: {what}.'
-    return found
-
-
-if __name__ == '__main__':
-    # 1 is the shell that has started the run, and this program.
-    others = [process for process in psutil.process_iter() if process.pid not in (1, os.getpid())]
-    for sentence in processes_that_stay(others, END_TIMEOUT_S).values():
-        print(sentence)
-    for file in sorted(Path('/dev/shm').glob('fastrtps_*')):
-        print(f'Shared memory is left: {file}.')
+                kind, command = 'zombie', f'{process.name()} (nobody has waited for its end)'
+            sentences[f'{kind} {process.pid}'] = f'The process {process.pid} still runs: {command}.'
+    return sentences

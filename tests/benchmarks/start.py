@@ -1,6 +1,6 @@
 """From a fresh clone with empty caches to JupyterLab's answer, beside the packages asked for alone.
 
-    python -m benchmarks.start [ROUNDS]        on an idle machine, with a network
+    PYTHONPATH=tests python -m benchmarks.start [ROUNDS]        on an idle machine, with a network
 
 No number fails: a reader judges the ratios. Neither side has uv in a cache. The reference is given
 uv; a course that must fetch it pays for that.
@@ -20,7 +20,7 @@ from pathlib import Path
 
 import pandas as pd
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = "jupyterlab nbval 'ros-jazzy-rclpy[fastrtps]==7.1.6' ros-jazzy-common-interfaces==5.3.6"
 LAB = '--no-browser --ServerApp.port={port} --ServerApp.port_retries=0 --allow-root'
 COMMANDS = {
@@ -65,7 +65,9 @@ def start(command: str) -> dict[str, float]:
 
 if __name__ == '__main__':
     rounds = int(sys.argv[1]) if sys.argv[1:] else 3
-    found = [{'what': c} | start(w) for _ in range(rounds) for c, w in COMMANDS.items()]
-    medians = pd.DataFrame(found).groupby('what', sort=False).median()
+    starts = [
+        {'command': name} | start(words) for _ in range(rounds) for name, words in COMMANDS.items()
+    ]
+    medians = pd.DataFrame(starts).groupby('command', sort=False).median()
     medians.loc['ratio'] = medians.iloc[0] / medians.iloc[1]
-    print(pd.DataFrame(found).to_string(), medians.to_string(), sep='\n\n')
+    print(pd.DataFrame(starts).to_string(), medians.to_string(), sep='\n\n')

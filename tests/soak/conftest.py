@@ -1,20 +1,26 @@
-"""A plugin for pytest beside nbval: it runs the cells of a notebook in harder ways.
+"""A plugin for pytest beside nbval: it runs the cells of notebooks in harder ways, for `make soak`.
 
 The comparison stays nbval's own, with the settings of pyproject.toml. `--soak` says how:
 
-- `idle`, `busy`: as nbval does
+- `idle`: as nbval does
+- `busy`: beside busy loops
 - `twice`: each cell twice, then all cells again in the same kernel
 - `interrupt`: each cell is interrupted at a random time, then run again and compared
 - `kill`: the kernel is killed in the middle of a random cell, then all in a fresh one
 
 After the last cell, and after each interrupt, the kernel must have nothing that it had not at its
-start.
+start; and when it has ended, the machine must be as it was. run.sh gives a run a /dev/shm and a
+table of processes of its own, so that whatever is there was left.
 """
 
 from __future__ import annotations
 
+import os
 import random
 import re
+import subprocess
+import sys
+import tempfile
 import time
 from collections import defaultdict
 from contextlib import suppress
@@ -26,10 +32,23 @@ from queue import Empty
 import psutil
 import pytest
 from nbformat.v4 import new_code_cell
+from support.leftovers import processes_that_stay
 
-from tools.lessons.comparison import IPyNbCell, IPyNbFile, RunningKernel
+from tools.lessons.comparison import IPyNbFile, NamedCell, RunningKernel
+from tools.lessons.lesson import ROOT
 
-LOOK = '__import__("tools.soak.leftovers", fromlist=["look"]).look()'
+CONDITIONS = ('idle', 'busy', 'twice', 'interrupt', 'kill')
+BUSY_LOOPS = 4
+# What would be in the home otherwise.
+STATE = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR', 'IPYTHONDIR')
+STATE += ('ROS_LOG_DIR', 'MPLCONFIGDIR')
+OWN_FOLDER = pytest.StashKey[Path]()  # of this run: its home, its temporary files
+LOOPS = pytest.StashKey[list[subprocess.Popen]]()
+KNOWN = pytest.StashKey[set[str]]()  # what is there, and was looked at
+END_TIMEOUT_S = 10.0  # of processes, when their kernel has ended
+# Run in a kernel. Its first look makes tests/support known.
+LOOK = '__import__("support.leftovers", fromlist=["look"]).look()'
+FIRST_LOOK = f'__import__("sys").path.append({str(Path(__file__).parents[1])!r}); {LOOK}'
 SHORTEST_S, LONGEST_S = 0.001, 10.0
 ANSWER_TIMEOUT_S = 60.0  # of a kernel that is alive, on a busy machine
 REPLY_S = 0.2  # after its 'idle', a kernel's reply to the same message is there
@@ -46,16 +65,34 @@ COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option of this plugin."""
-    parser.addoption('--soak', default='idle')
+    parser.addoption('--soak', choices=CONDITIONS, default='idle')
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Give this run a home and a temporary folder of its own, and start what makes it busy."""
+    tempfile.gettempdir()  # pytest's own files stay where they are
+    folder = tempfile.TemporaryDirectory(prefix='soak-', ignore_cleanup_errors=True)
+    config.add_cleanup(folder.cleanup)
+    config.stash[OWN_FOLDER] = own = Path(folder.name)
+    for part in ('home', 'tmp', 'state'):
+        (own / part).mkdir()
+    os.environ.update({'HOME': f'{own}/home', 'TMPDIR': f'{own}/tmp'})
+    os.environ.update(dict.fromkeys(STATE, f'{own}/state'))
+    config.stash[LOOPS] = [
+        subprocess.Popen([sys.executable, '-ISc', 'while True: pass'])
+        for _ in range(BUSY_LOOPS if config.option.soak == 'busy' else 0)
+    ]
+    for loop in config.stash[LOOPS]:
+        config.add_cleanup(loop.kill)
+    config.stash[KNOWN] = {*_on_the_machine(config)}
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Give each notebook the cells that the condition asks for."""
     mode, plain, items[:] = config.option.soak, list(items), []
-    for _, group in groupby(plain, key=lambda item: item.parent):
+    for file, group in groupby(plain, key=lambda item: item.parent):
         cells = list(group)
-        items.append(_look_after(cells[0], 'the first look'))
+        items.append(_like(cells[0], NamedCell, 'the first look', FIRST_LOOK))
         if mode == 'kill':
             cell = random.choice(cells)
             items.append(_like(cell, Killed, f'{cell.name} killed'))
@@ -73,9 +110,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         else:
             items += cells
         items.append(_look_after(cells[-1], 'what is left in the kernel'))
+        items.append(Machine.from_parent(file.session, name=f'what {file.name} has left'))
 
 
-def _like(cell: IPyNbCell, kind: type[IPyNbCell], name: str, source: str = '') -> IPyNbCell:
+def _like(cell: NamedCell, kind: type[NamedCell], name: str, source: str = '') -> NamedCell:
     return kind.from_parent(
         cell.parent,
         name=name,
@@ -86,11 +124,45 @@ def _like(cell: IPyNbCell, kind: type[IPyNbCell], name: str, source: str = '') -
     )
 
 
-def _look_after(cell: IPyNbCell, name: str) -> IPyNbCell:
-    return _like(cell, IPyNbCell, name, LOOK)
+def _look_after(cell: NamedCell, name: str) -> NamedCell:
+    return _like(cell, NamedCell, name, LOOK)
 
 
-class Again(IPyNbCell):
+class Machine(pytest.Item):
+    """What is on the machine after a notebook. pytest has ended its kernel before."""
+
+    def runtest(self) -> None:
+        known = self.config.stash[KNOWN]
+        left = {
+            key: sentence
+            for key, sentence in _on_the_machine(self.config).items()
+            if key not in known
+        }
+        known |= left.keys()
+        if left:
+            pytest.fail('\n'.join(left.values()), pytrace=False)
+
+    def reportinfo(self) -> tuple:
+        return ROOT, 0, self.name
+
+
+def _on_the_machine(config: pytest.Config) -> dict[str, str]:
+    """Return a sentence for each process, each file and each piece of shared memory, by a key."""
+    mine = {1, os.getpid(), *(loop.pid for loop in config.stash[LOOPS])}
+    others = [process for process in psutil.process_iter() if process.pid not in mine]
+    sentences = processes_that_stay(others, END_TIMEOUT_S)
+    for file in Path('/dev/shm').glob('fastrtps_*'):
+        sentences[str(file)] = f'Shared memory is left: {file}.'
+    own = config.stash[OWN_FOLDER]
+    git = ['git', '-C', ROOT, 'status', '--porcelain', '--untracked-files=all']
+    changed = subprocess.run(git, stdout=subprocess.PIPE, text=True, check=True).stdout.splitlines()
+    files = [file for part in ('home', 'tmp') for file in (own / part).rglob('*')]
+    for file in [*changed, *(str(file) for file in files if not file.is_dir())]:
+        sentences[file] = f'{file} has changed.'
+    return sentences
+
+
+class Again(NamedCell):
     """A cell that has run before in this kernel."""
 
     def compare_outputs(self, test, ref, skip_compare=None) -> bool:
@@ -101,7 +173,7 @@ class Again(IPyNbCell):
         return super().compare_outputs(test, ref, skip_compare)
 
 
-class Interrupted(IPyNbCell):
+class Interrupted(NamedCell):
     """A cell that is interrupted."""
 
     def runtest(self) -> None:
@@ -140,7 +212,7 @@ class Interrupted(IPyNbCell):
             return True, error
 
 
-class Killed(IPyNbCell):
+class Killed(NamedCell):
     """A cell in whose middle the kernel is killed; a fresh one takes its place."""
 
     def runtest(self) -> None:
@@ -178,16 +250,16 @@ def listen(kernel: RunningKernel, message: str, until: str, timeout_s: float) ->
     raise RuntimeError('the kernel has ended')
 
 
-def fresh_kernel(item: IPyNbCell, cells_to_run: int) -> None:
+def fresh_kernel(item: NamedCell, cells_to_run: int) -> None:
     """Kill the kernel of a cell; start one that has run the first cells of its notebook."""
     file = item.parent
     with suppress(psutil.NoSuchProcess):
         psutil.Process(file.kernel.km.provisioner.pid).suspend()  # it holds what is noted
     for path in Path('/dev/shm').glob('fastrtps_*'):
-        item.user_properties.append(('held', path))  # nobody could remove it
+        item.config.stash[KNOWN].add(str(path))  # nobody could remove it
     file.kernel.stop()
     file.setup()
-    file.kernel.await_idle(file.kernel.execute_cell_input(LOOK), ANSWER_TIMEOUT_S)
+    file.kernel.await_idle(file.kernel.execute_cell_input(FIRST_LOOK), ANSWER_TIMEOUT_S)
     run_first(file, cells_to_run)
 
 
