@@ -13,7 +13,9 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
-from helpers.fusion import VARIANCES, odometry_message, seconds_of, simulate, stamp_of, yaw_of
+from helpers.fusion import VARIANCES, simulate
+from helpers.robot import odometry_message
+from helpers.ros import seconds_of, stamp_of, yaw_of
 
 tasks = Tasks()
 check = tasks.check
