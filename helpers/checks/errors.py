@@ -55,14 +55,19 @@ def places(frame: FrameType | None) -> Iterator[tuple[str, int]]:
         frame = frame.f_back
 
 
+def place_of(error: BaseException) -> str:
+    """Return the line of the student in which an error came up, or nothing."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return own_line((frame.filename, frame.lineno or 0) for frame in reversed(frames))
+
+
 def sentence(error: BaseException) -> str:
     """Say in one sentence or two what an error says, and in which line of the student."""
     if isinstance(error, Failed):
         return str(error)
     if isinstance(error, SystemError) and error.__cause__:  # pybind11 hides a wrong field in one
         error = error.__cause__
-    frames = traceback.extract_tb(error.__traceback__)
-    place = own_line((frame.filename, frame.lineno or 0) for frame in reversed(frames))
+    place = place_of(error)
     text = ' '.join(str(error).split('\n\n')[0].split())
     text = re.sub(r' at 0x[0-9a-fA-F]+', '', text)
     text = re.sub(r'(?:\w+\.<locals>\.)+', '', text)  # of a function in a function: its name only
