@@ -39,7 +39,7 @@ from typing import NoReturn
 
 import psutil
 
-from helpers.ros.domain import speak_udp_only
+from helpers.ros import speak_udp_only
 
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 POLL_S = 0.05

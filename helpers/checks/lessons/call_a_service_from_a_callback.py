@@ -16,10 +16,10 @@ from std_srvs.srv import Trigger
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
-from helpers.notebook.threads import frames
+from helpers.notebook import frames
 from helpers.recording import CallbackRecording
-from helpers.replay.calls import replay_calls
-from helpers.ros.session import ros_session
+from helpers.replay import replay_calls
+from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check

@@ -16,7 +16,7 @@ from test_msgs.action import Fibonacci as Patrol
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
-from helpers.replay.actions import ActionRecording, replay_action
+from helpers.replay import ActionRecording, replay_action
 from helpers.robot import Floor
 
 tasks = Tasks()
