@@ -247,6 +247,8 @@ def play(bench, workspace, command):
     with workspace.start(command) as player:
         if not bench.wait(lambda: not player.running, 40):
             raise Failed(f'the player does not end. It printed: {what_it_printed(player)}')
+        if player.wait() != 0:
+            raise Failed(f'the command failed. It printed: {what_it_printed(player)}')
     bench.quiet()
     return what_it_printed(player)
 
