@@ -7,56 +7,58 @@ lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, OUT
 	@exec $(PYTHON) -m tools.lab $(if $(filter yes,$(OUTPUTS)),--outputs) $(server) -- $(LAB_ARGS)
 
 present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02, or PLAN=90, a timetable; NEW=yes makes it anew
-	@exec $(PYTHON) -m tools.classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" $(if $(filter yes,$(NEW)),--new) \
-		$(if $(filter no,$(FRESH)),--saved-outputs) $(server) -- $(LAB_ARGS)
-
-card: set_up ## one page to print for a timetable of teaching.md: PLAN=90
-	@$(PYTHON) -m tools.classroom.card $(PLAN)
+	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" $(if $(filter yes,$(NEW)),--new) \
+		$(server) -- $(LAB_ARGS)
 
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join over the network; PORT=8765, BROWSER=no
-	@exec $(PYTHON) -m tools.classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
+	@exec $(PYTHON) -m classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
 
-test: set_up lint ## lint, tests of the helpers, every notebook compared with its saved outputs
-	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(PYTEST_ARGS)
+test: set_up ## the course: style, tests of the helpers, every notebook compared with its saved outputs; LESSON=02 for one
+	@answers="extend-exclude=[$$($(PYTHON) -m tools.lessons.answers)]" && \
+		.venv/bin/ruff check --config "$$answers" && .venv/bin/ruff format --check --config "$$answers"
+	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(lesson) $(PYTEST_ARGS)
 
-test-tools: set_up ## the tools: an installation from nothing, two machines, the licences
+test-ros2: set_up ## the `ros2` command, a package of its own in ros2/
+	@$(PYTHON) -m pytest -n 2 --dist loadscope --max-worker-restart 0 -o faulthandler_timeout=600 ros2 $(PYTEST_ARGS)
+
+test-tools: set_up ## the tools: an installation from nothing, a new lesson, two machines
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/tools $(PYTEST_ARGS)
 
-test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour: LESSON=lose_messages for one
-	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(if $(LESSON),-k "$(LESSON)") $(PYTEST_ARGS)
+test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour; LESSON=02 for one
+	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(PYTEST_ARGS)
 
 test-browser: ## the real JupyterLab and the site in Chromium, as students use them; it takes minutes
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/browser $(PYTEST_ARGS)
 
-test-classroom: ## deck, notes and class page; then a class of 12 on a JupyterHub, and the container; it takes minutes
-	@tools/set_up.sh browser && { tools/classroom/hub/set_up.sh || echo 'LEFT OUT: the hub.'; }
+test-classroom: ## slides, notes and class page; then a class of 12 on a JupyterHub, and the container; it takes minutes
+	@tools/set_up.sh browser && { classroom/hub/set_up.sh || echo 'LEFT OUT: the hub.'; }
 	@failed=0; \
-	$(PYTHON) -m pytest -n 2 $(slow) --ignore tests/classroom/hub tests/classroom $(PYTEST_ARGS) || failed=$$?; \
-	$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 tests/classroom/hub $(PYTEST_ARGS) || failed=$$?; \
+	$(PYTHON) -m pytest -n 2 $(slow) --ignore classroom/tests/hub classroom/tests $(PYTEST_ARGS) || failed=$$?; \
+	$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 classroom/tests/hub $(PYTEST_ARGS) || failed=$$?; \
 	exit $$failed
 
 image: ## a container image of the lessons, with podman or docker: BASE=, CONTAINER=, IMAGE_ARGS=... change how
-	@tools/classroom/container/run.sh image
+	@classroom/container/run.sh image
 
 lab-container: ## the lessons in a container of that image, your notebooks in my_lessons/: PORT=8890, LESSONS=FOLDER
-	@tools/classroom/container/run.sh lab
+	@classroom/container/run.sh lab
 
-hub: ## a JupyterHub for a class on this machine; CONTAINERS=yes, HUB_ARGS=... change how. See tools/classroom/HOSTING.md
-	@tools/classroom/hub/set_up.sh
-	@exec $(PYTHON) -m tools.classroom.hub $(if $(filter yes,$(CONTAINERS)),--containers) -- $(HUB_ARGS)
+hub: ## a JupyterHub for a class on this machine; CONTAINERS=yes, HUB_ARGS=... change how. See classroom/HOSTING.md
+	@classroom/hub/set_up.sh
+	@exec $(PYTHON) -m classroom.hub $(if $(filter yes,$(CONTAINERS)),--containers) -- $(HUB_ARGS)
 
 handout: set_up ## a student's edition as one archive: SOLUTIONS=no leaves the solutions out, OFFLINE=yes (PYTHONS="3.11 3.12") adds the packages
-	@$(PYTHON) -m tools.classroom.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
+	@$(PYTHON) -m classroom.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
 		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
 
 update: set_up ## get newer lessons, keep what you have written; FROM=ros2_notebooks.tar.gz names a newer archive
-	@$(PYTHON) -m tools.classroom.update $(if $(FROM),"$(FROM)")
+	@$(PYTHON) -m classroom.update $(if $(FROM),"$(FROM)")
 
 notebooks: set_up ## run all notebooks, save their outputs, and write what follows from them; LESSON=02 for one
 	@$(PYTHON) -m tools.lessons.run $(LESSON)
 
-lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04 puts it there; REMOVE=yes takes it out
+lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04 puts it behind that one; REMOVE=yes takes it out
 	@$(PYTHON) -m tools.lessons.new "$(NAME)" $(if $(AFTER),--after "$(AFTER)") $(if $(filter yes,$(REMOVE)),--remove)
 
 site: set_up ## write the lessons and documents as a web site into site/, which needs no network
@@ -64,27 +66,29 @@ site: set_up ## write the lessons and documents as a web site into site/, which 
 	@$(PYTHON) -m tools.site
 
 soak: set_up ## before a release, as root: run the notebooks in hard conditions; CONDITIONS="idle busy" LESSON=02
-	@$(PYTHON) -m tools.soak $(if $(CONDITIONS),--conditions $(CONDITIONS)) $(if $(LESSON),--lesson "$(LESSON)")
+	@tests/soak/run.sh "$(CONDITIONS)" "$(LESSON)"
 
 bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="20 200" for some rates
-	@$(PYTHON) -m benchmarks $(ONLY)
-	@$(PYTHON) -m benchmarks.start
+	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks $(ONLY)
+	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks.start
 
 release: set_up ## make handout, site and image of a tagged commit, and say what to publish where
 	@tools/release.sh
 
-lint: set_up ## ruff: style and format of modules and notebooks
+lint: set_up ## ruff: style and format of all modules and notebooks
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
 
-lock: ## write requirements.lock from pyproject.toml; UPGRADE=yes takes newer versions
+lock: ## write tools/locks from pyproject.toml; UPGRADE=yes takes newer versions
 	@tools/lock.sh $(if $(filter yes,$(UPGRADE)),--upgrade)
 
-licences: set_up ## write licences.md from the lock files and what the packages say
-	@$(PYTHON) -m tools.licences
+licences: set_up ## the licence that each installed package names
+	@.venv/bin/pip-licenses --from=mixed --with-system --order=license
+	@echo 'Unknown above, named in package.xml: the packages of ROS 2.'
+	@sed -n 's/.*<license[^>]*>\([^<]*\).*/\1/p' .venv/share/*/package.xml | sort | uniq -c
 
 clean: ## remove the environment, JupyterLab's state, caches and what lessons built; students' files stay
 	if [ -d .jupyter ]; then find .jupyter -mindepth 1 -maxdepth 1 ! -name hub -exec rm -rf {} +; fi
-	rm -rf .venv .uv .soak scratch handout site .site .hypothesis .pytest_cache .ruff_cache
+	rm -rf .venv .uv scratch handout site .site .hypothesis .pytest_cache .ruff_cache
 	find . \( -name .git -o -path ./my_lessons -o -path ./presentation -o -path ./.jupyter/hub \) -prune -o \
 		\( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
 
@@ -92,11 +96,11 @@ set_up:
 	@mkdir -p .jupyter && tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
-test test-tools test-answers test-browser test-classroom notebooks lesson soak bench lint: groups := test
+test test-ros2 test-tools test-answers test-browser test-classroom notebooks lesson soak bench lint: groups := test
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present card class test test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
+.PHONY: help lab present class test test-ros2 test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
 	lesson site soak bench release lint lock licences clean set_up
 
 PYTHON := .venv/bin/python
@@ -104,6 +108,9 @@ PYTHON := .venv/bin/python
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None
 # is replaced: where one has crashed, pytest-xdist may wait for its successor for ever.
 WORKERS := 4
+
+# A lesson is named by its number or its name, everywhere: LESSON=02, LESSON=lose_messages, LESSON="02 03".
+lesson = $(if $(LESSON),--lesson "$(LESSON)")
 
 # Tests that start servers, browsers and compilers.
 slow := --dist worksteal --max-worker-restart 0 -o faulthandler_timeout=600

@@ -1,12 +1,16 @@
 """Every lesson keeps the rules, and what is said of it elsewhere is right. nbval runs it."""
 
+from pathlib import Path
+
 import pytest
+import yaml
 
 from helpers.checks import progress
 from tools.lessons import rules, tables
 from tools.lessons.lesson import lessons
 
 LESSONS = lessons()
+ANSWERS = Path(__file__).parent / 'answers'
 
 
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
@@ -21,7 +25,7 @@ def test_lessons_together():
 
 
 def test_what_follows_from_the_notebooks():
-    differ = list(tables.made(tables.texts_of()))
+    differ = list(tables.updated(tables.texts_of()))
     assert not differ, f'They differ from what follows from the notebooks: run `{tables.COMMAND}`.'
 
 
@@ -29,7 +33,16 @@ def test_lesson_00_shows_the_tasks_that_there_are():
     assert not tables.needs_run(LESSONS), f'Run `{tables.COMMAND}`.'
 
 
+@pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
+def test_each_task_has_answers_that_try_its_check(lesson):
+    file = ANSWERS / f'{lesson.name}.yaml'
+    answers = yaml.load(file.read_text(), yaml.BaseLoader) if file.exists() else {}
+    numbers = range(1, len(lesson.tasks) + 1)
+    wanted = {f'{number} {kind}' for number in numbers for kind in ('wrong', 'right')}
+    assert answers.keys() == wanted, f'{file.name} beside tests/answers/test_answers.py says how.'
+
+
 def test_kernels_and_rules_read_the_same_tasks():
     assert progress.with_tasks() == tables.with_tasks(LESSONS)
-    for one in LESSONS:
-        assert one.tasks == list(rules.tasks(one))
+    for lesson in LESSONS:
+        assert lesson.tasks == list(rules.tasks(lesson))

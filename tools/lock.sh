@@ -1,14 +1,16 @@
 #!/bin/sh
-# Write requirements.lock: every dependency of pyproject.toml, pinned, with the hashes of its files.
-# And requirements-GROUP.lock for each of its groups: what that needs besides.
+# Write tools/locks/requirements.lock: every dependency of pyproject.toml, pinned, with the hashes of its
+# files. And for each of its groups a requirements-GROUP.lock: what that needs besides.
 # usage: tools/lock.sh [--upgrade]
 # Without --upgrade a version that still fits stays as it is.
 set -eu
 cd "$(dirname "$0")/.."
 . tools/uv.sh
+. tools/locks/files.sh
 
-new=.requirements.lock.new
-trap 'rm -f "$new" "$new.checked"' EXIT
+temporary=$(mktemp -d)
+trap 'rm -rf "$temporary"' EXIT
+new=$temporary/requirements.lock
 
 resolve() { # LOCK, and what uv resolves; uv keeps the versions that it finds in the file
     rm -f "$new"
@@ -20,7 +22,8 @@ resolve() { # LOCK, and what uv resolves; uv keeps the versions that it finds in
         --no-emit-index-url --no-emit-find-links --output-file "$new" "$@" > /dev/null
 }
 
-resolve requirements.lock pyproject.toml --extra ros "$@"
+lock=tools/locks/requirements.lock
+resolve "$lock" pyproject.toml --extra ros "$@"
 
 # The lock fits several Pythons, but a package may lack the wheel of one. tools/set_up.sh reads the
 # result in the second line, and need not ask the package index.
@@ -34,20 +37,21 @@ for python in 3.14 3.13 3.12 3.11; do
     fi
     rm -f "$new.checked"
 done
-[ -n "$pythons" ] || fail 'No Python has a wheel of every package: requirements.lock stays as it was.'
+[ -n "$pythons" ] || fail "No Python has a wheel of every package: $lock stays as it was."
 {
     echo '# Made by `make lock` from pyproject.toml. Do not edit.'
     echo "# Every wheel exists for Python$pythons"
     cat "$new"
-} > requirements.lock
-echo "requirements.lock: $(grep -c '^[a-z].*==' requirements.lock) pins, Python$pythons"
+} > "$lock"
+echo "$lock: $(grep -c '^[a-z].*==' "$lock") pins, Python$pythons"
 
-constraints='--constraint requirements.lock'
-for group in uv test browser site hub licences; do
-    resolve "requirements-$group.lock" --group "$group" $constraints "$@"
+constraints="--constraint $lock"
+for group in uv $groups; do
+    lock=$(lock_of "$group")
+    resolve "$lock" --group "$group" $constraints "$@"
     {
         echo "# Made by \`make lock\` from the group \`$group\` of pyproject.toml. Do not edit."
         cat "$new"
-    } > "requirements-$group.lock"
-    constraints="$constraints --constraint requirements-$group.lock" # .venv may hold all of them
+    } > "$lock"
+    constraints="$constraints --constraint $lock" # .venv may hold all of them
 done

@@ -1,8 +1,9 @@
 #!/bin/sh
-# Make .venv and install requirements.lock and this project into it. If .venv is up to date, this does
-# nothing. After an interruption the next call repairs what the last one left.
+# Make .venv and install tools/locks/requirements.lock into it, this project, and its `ros2` command. If
+# .venv is up to date, this does nothing. After an interruption the next call repairs what the last
+# one left.
 # usage: tools/set_up.sh [--python 3.12] [GROUP...]
-# A group of pyproject.toml adds its requirements-GROUP.lock. Later calls keep it up to date.
+# A group of pyproject.toml adds its lock. Later calls keep it up to date.
 set -eu
 cd "$(dirname "$0")/.."
 wanted_version=
@@ -16,13 +17,15 @@ fi
 if [ -w pyproject.toml ]; then exec 9<> pyproject.toml; else exec 9< pyproject.toml; fi
 ! command -v flock > /dev/null || flock 9 # two calls at once: the second waits
 
-locks=requirements.lock with=
-for group in test browser site hub licences; do
+. tools/locks/files.sh
+learners=tools/locks/requirements.lock
+locks=$learners with=
+for group in $groups; do
     case " $* " in
         *" $group "*) ;;
         *) [ -f ".venv/with_$group" ] || continue ;;
     esac
-    locks="$locks requirements-$group.lock" with="$with .venv/with_$group"
+    locks="$locks $(lock_of "$group")" with="$with .venv/with_$group"
 done
 
 # The stamp is written last. It holds all that .venv depends on, so that a changed lock, a moved
@@ -30,7 +33,7 @@ done
 wanted() {
     version=$(.venv/bin/python -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null) || return 0
     printf '%s\n' "Python $version" "$(pwd -P)" \
-        "$(cat $locks pyproject.toml tools/set_up.sh tools/jupyter/* | cksum)"
+        "$(cat $locks pyproject.toml ros2/pyproject.toml tools/set_up.sh tools/jupyter/* | cksum)"
 }
 stamp=.venv/set_up.stamp
 have=$(wanted)
@@ -46,8 +49,8 @@ esac
 . tools/uv.sh
 
 # The versions for which every pinned package has a wheel, newest first: tools/lock.sh found them.
-versions=$(sed -n 's/^# Every wheel exists for Python //p' requirements.lock)
-[ -n "$versions" ] || fail 'requirements.lock does not name its Python versions: get it again with `git checkout requirements.lock`.'
+versions=$(sed -n 's/^# Every wheel exists for Python //p' "$learners")
+[ -n "$versions" ] || fail "$learners does not name its Python versions: get it again with \`git checkout $learners\`."
 [ ! -f wheels/pythons ] || versions=$(cat wheels/pythons)
 case " $versions " in
     *" ${wanted_version:-${versions%% *}} "*) versions=${wanted_version:-$versions} ;;
@@ -80,10 +83,10 @@ quiet=
 [ -t 2 ] || quiet=--quiet
 echo "Installing $(sed -n 's/^\([a-z].*\)==.*/\1/p' $locks | sort -u | wc -l) packages, about 215 MB the first time" >&2
 # Wheels only, except empy, which has none: one module, from its pinned source, by the pinned setuptools.
-"$uv" pip sync $quiet $no_index --python .venv/bin/python --require-hashes --build-constraints requirements.lock \
+"$uv" pip sync $quiet $no_index --python .venv/bin/python --require-hashes --build-constraints "$learners" \
     --only-binary :all: --no-binary empy $locks ||
     fail 'uv could not install requirements.lock: check the network, or name your package index with UV_DEFAULT_INDEX, then try again.'
-"$uv" pip install --quiet --offline --python .venv/bin/python --no-deps --editable .
+"$uv" pip install --quiet --offline --python .venv/bin/python --no-deps --editable . --editable ros2
 
 mkdir -p .venv/share/jupyter/lab/settings
 mkdir -p .venv/etc/jupyter .venv/etc/ipython

@@ -37,7 +37,7 @@ done
 
 # --- uv ------------------------------------------------------------------------------------------
 
-uv_pin=$(sed -n 's/^uv==\([^ ]*\).*/\1/p' requirements-uv.lock)
+uv_pin=$(sed -n 's/^uv==\([^ ]*\).*/\1/p' tools/locks/requirements-uv.lock)
 if uv=$(command -v uv) && "$uv" python dir > /dev/null 2>&1; then # as [tool.uv] of pyproject.toml wants it
     :
 else
@@ -51,7 +51,7 @@ else
                 fail 'No Python is on the PATH: install one, for example with `sudo apt install python3 python3-venv`, then try again.'
             rm -rf .uv .uv.new
             PIP_ROOT_USER_ACTION=ignore "$any_python" -I tools/pip.py install --quiet --disable-pip-version-check --no-user --no-deps --no-compile --target .uv.new \
-                --only-binary :all: --require-hashes --requirement requirements-uv.lock ||
+                --only-binary :all: --require-hashes --requirement tools/locks/requirements-uv.lock ||
                 fail 'pip could not install uv: check the network, or name your package index with PIP_INDEX_URL, then try again.'
             mv .uv.new .uv
             ;;

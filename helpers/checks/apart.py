@@ -39,6 +39,8 @@ from typing import NoReturn
 
 import psutil
 
+from helpers.ros import speak_udp_only
+
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 POLL_S = 0.05
 DUMP_S = 0.5  # for the worker to write where its threads are
@@ -271,7 +273,7 @@ def _be_worker(
         faulthandler.register(signal.SIGUSR1, file=dump, all_threads=True)
         _limit_memory()
         gc.freeze()  # the objects of the kernel: a collection would only copy their pages
-        os.environ['FASTDDS_BUILTIN_TRANSPORTS'] = 'UDPv4'
+        speak_udp_only()
         _leave_kernel()
 
         def send(message: object, cpu_s: float = limits[0], limit_s: float = limits[1]) -> None:

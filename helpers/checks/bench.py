@@ -30,8 +30,8 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
 from helpers.checks.errors import Failed, own_line, places
-from helpers.notebook.threads import frames
-from helpers.ros.session import ros_session
+from helpers.notebook import frames
+from helpers.ros import ros_session
 
 WAIT_S = 2.0  # for what a right answer does at once
 QUIET_S = 10.0

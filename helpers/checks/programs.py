@@ -18,9 +18,7 @@ from pathlib import Path
 from catkin_pkg.package import InvalidPackage, Package, parse_package
 
 from helpers.checks.errors import Failed, is_students
-from helpers.workspace import Workspace
-from helpers.workspace.build_output import BuildResult, without_folders
-from helpers.workspace.processes import Process
+from helpers.workspace import BuildResult, Process, Workspace, without_folders
 
 POLL_S = 0.02
 DIED = 'process has died'

@@ -46,8 +46,7 @@ from helpers.checks import classroom, progress
 from helpers.checks.apart import Apart, Ending
 from helpers.checks.errors import own_line, places, sentence
 from helpers.checks.verdict import Point, Verdict, bundle
-from helpers.notebook.progress_bar import somebody_watches
-from helpers.notebook.threads import frames
+from helpers.notebook import frames, somebody_watches
 
 CPU_LIMIT_S = 5.0  # of one point: an endless loop uses it up
 LIMIT_S = 30.0  # of one point by the clock

@@ -15,7 +15,7 @@ from __future__ import annotations
 import html
 from dataclasses import asdict, dataclass, field
 
-from helpers.notebook.text import wrap
+from helpers.notebook import wrap
 
 KEY = 'ros2_notebooks'
 AGAIN = 'Try again, or go on with the solution below.'

@@ -29,10 +29,22 @@ import pytest
 import yaml
 from support.kernel import NOTEBOOKS, Kernel
 
+from helpers.checks.progress import with_tasks
+
 HERE = Path(__file__).parent
 LEAST = {'wrong': 5, 'right': 3}  # answers of a task
 
-LESSONS = sorted(path.stem for path in HERE.glob('*.yaml'))
+FILES = sorted(HERE.glob('*.yaml'))
+
+
+def answers_of(path: Path) -> dict[str, list]:
+    """Return the answers in a file, by their task and kind: '3 wrong'."""
+    return yaml.load(path.read_text(encoding='utf-8'), yaml.BaseLoader)
+
+
+def tasks_of(path: Path) -> set[int]:
+    """Return the numbers of the tasks that have answers."""
+    return {int(key.split()[0]) for key in answers_of(path)}
 
 
 def source_of(answer: str | dict[str, str], *sources: str) -> str:
@@ -65,20 +77,30 @@ def edited(source: str, edits: list[tuple[tuple[int, int], str]]) -> str:
     return result
 
 
-def judge(kernel: Kernel, answers: dict, key: str, cells: dict[str, list[str]]) -> None:
+def tag_of(cell: nbformat.NotebookNode) -> str:
+    """Return 'exercise', 'check' or 'solution', or nothing for another cell."""
+    tags = {'exercise', 'check', 'solution'}.intersection(cell.metadata.get('tags', []))
+    return tags.pop() if tags else ''
+
+
+def run_all(kernel: Kernel, *sources: list[str]) -> str:
+    """Run cells, and return what they print."""
+    return ''.join(kernel.run(source) for group in sources for source in group)
+
+
+def judge(kernel: Kernel, answers: list, key: str, cells: dict[str, list[str]]) -> None:
     """Run each answer, and its check twice: each time it must find of which kind the answer is."""
     kind = key.split()[1]
-    some = answers.pop(key, [])
-    assert len(some) >= LEAST[kind], (
-        f'{HERE.name} has {len(some)} answers under "{key}", and {LEAST[kind]} are wanted.'
+    assert len(answers) >= LEAST[kind], (
+        f'There are {len(answers)} answers "{key}", and at least {LEAST[kind]} are wanted.'
     )
     starters = cells['exercise']
     files = starters if len(starters) > 1 else []  # the answer changes what they have written
-    for answer in some:
+    for answer in answers:
         source = source_of(answer, *cells['solution'], *starters)
-        said = ''.join(map(kernel.run, [*files, source]))
+        said = run_all(kernel, files, [source])
         for _ in range(2):
-            said += kernel.run(cells['check'][0])
+            said += run_all(kernel, cells['check'])
             solved = [verdict['solved'] for verdict in kernel.verdicts]
             # A name that the answer does not define is an error of the cell, not a verdict.
             assert solved == [kind == 'right'] or (kind == 'wrong' and not solved), (
@@ -86,31 +108,54 @@ def judge(kernel: Kernel, answers: dict, key: str, cells: dict[str, list[str]]) 
             )
 
 
-@pytest.mark.parametrize('lesson', LESSONS)
-def test_checks_judge_right_and_wrong_answers(lesson):
+@pytest.mark.parametrize(
+    ('lesson', 'task'),
+    [(path.stem, task) for path in FILES for task in sorted(tasks_of(path))],
+    ids=lambda value: value if isinstance(value, str) else f'task {value}',
+)
+def test_check_judges_right_and_wrong_answers(lesson, task):
     [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{lesson}.ipynb')
-    answers = yaml.load((HERE / f'{lesson}.yaml').read_text(), yaml.BaseLoader)
-    task, cells = 1, defaultdict(list)  # the cells of this task, by their tag
+    answers = answers_of(HERE / f'{lesson}.yaml')
+    cells = defaultdict(list)  # the cells of this task, by their tag
+    number = 1  # of the task that comes next
     with Kernel() as kernel:
         for cell in nbformat.read(path, 4).cells:
-            tags = cell.metadata.get('tags', [])
-            if 'solution' in tags:
-                cells['solution'] = [cell.source.split('\n', 1)[1]]
-                judge(kernel, answers, f'{task} wrong', cells)
-                # What a right answer builds stays, so the solution is tried before.
-                said = ''.join(map(kernel.run, [*cells['exercise'], cell.source]))
-                assert [(verdict['of'], verdict['solved']) for verdict in kernel.verdicts] == [
-                    ('solution', True)
-                ], said
-                judge(kernel, answers, f'{task} right', cells)
-                for source in [*cells['exercise'], *cells['check'], cell.source]:
-                    kernel.run(source)
-                task, cells = task + 1, defaultdict(list)
-            elif cell.cell_type == 'code':
-                kernel.run(cell.source)
-                assert not any(verdict['solved'] for verdict in kernel.verdicts), (
-                    f'The starter of task {task} is right.'
+            [tag] = {'exercise', 'check', 'solution'}.intersection(
+                cell.metadata.get('tags', [])
+            ) or {''}
+            if cell.cell_type != 'code':
+                continue
+            if number == task and tag:
+                cells[tag].append(
+                    cell.source.split('\n', 1)[1] if tag == 'solution' else cell.source
                 )
-                for tag in {'exercise', 'check'}.intersection(tags):
-                    cells[tag].append(cell.source)
-    assert not answers, f'There are no such tasks: {", ".join(answers)}.'
+            elif tag == 'solution':
+                kernel.run(cell.source.split('\n', 1)[1])
+            elif not tag:
+                kernel.run(cell.source)
+            if tag == 'solution':
+                if number == task:
+                    break
+                number += 1
+        assert cells['solution'], f'The lesson {lesson} has no task {task}.'
+        run_all(kernel, cells['exercise'], cells['check'])
+        assert [verdict['solved'] for verdict in kernel.verdicts] == [False], (
+            'The starter is right.'
+        )
+        judge(kernel, answers.get(f'{task} wrong', []), f'{task} wrong', cells)
+        # What a right answer builds stays, so the solution comes after the wrong ones.
+        said = run_all(kernel, cells['exercise'], [f'%%solution {task}\n{cells["solution"][0]}'])
+        assert [(verdict['of'], verdict['solved']) for verdict in kernel.verdicts] == [
+            ('solution', True)
+        ], said
+        judge(kernel, answers.get(f'{task} right', []), f'{task} right', cells)
+
+
+def test_each_task_of_a_lesson_has_answers():
+    for tasks in with_tasks():
+        path = HERE / f'{tasks.name}.yaml'
+        known = tasks_of(path) if path.exists() else set()
+        missing = sorted(set(range(1, tasks.tasks + 1)) ^ known)
+        assert not missing, (
+            f'tests/answers/{tasks.name}.yaml lacks tasks, or has others: {missing}.'
+        )

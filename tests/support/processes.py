@@ -11,8 +11,8 @@ from pathlib import Path
 
 import psutil
 
+from support.leftovers import threads_of_process
 from support.waits import START_LIMIT_S
-from tools.soak.leftovers import threads_of_process
 
 HERE = Path(__file__).parents[1]  # for `import support` in a process
 SEGMENT = re.compile(r'/dev/shm/fastrtps_[0-9a-f]{16}')

@@ -1,6 +1,5 @@
 """The set-up, on a lock of two packages that lie in a folder, and what the real locks must hold."""
 
-import json
 import os
 import re
 import shutil
@@ -13,6 +12,7 @@ from support.processes import put
 
 from tools.lessons.lesson import ROOT
 
+LOCKS = Path('tools/locks')
 BASE_PYTHON = Path(sys._base_executable)
 HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
 COMMANDS = (
@@ -21,12 +21,10 @@ COMMANDS = (
 
 
 def test_the_locks_name_no_package_index():
-    for lock in ROOT.glob('requirements*.lock'):
+    locks = [*ROOT.glob('*.lock'), *(ROOT / LOCKS).glob('*.lock')]
+    assert ROOT / LOCKS / 'requirements.lock' in locks
+    for lock in locks:
         assert not re.search(r'://|--(extra-)?index|--find-links|file:|@', lock.read_text())
-    for lock in (ROOT / 'tools').glob('**/package-lock.json'):
-        packages = json.loads(lock.read_text())['packages']
-        assert not any('resolved' in package for package in packages.values())
-        assert all(package['integrity'] for name, package in packages.items() if name)
 
 
 def last_line(answer: subprocess.CompletedProcess) -> str:
@@ -46,11 +44,11 @@ class Checkout:
         put(self.bin, 'python3.14', 'echo "pyenv: python3.14: command not found" >&2; exit 127')
         self.root = folder / 'élève one'
         self.root.mkdir()
-        for name in ('tools', 'helpers'):
+        for name in ('tools', 'helpers', 'ros2'):
             shutil.copytree(ROOT / name, self.root / name)
-        for name in ('pyproject.toml', 'LICENSE', 'requirements-uv.lock'):
+        for name in ('pyproject.toml', 'LICENSE'):
             shutil.copy(ROOT / name, self.root)
-        blocks = re.split(r'\n(?=[a-z])', (ROOT / 'requirements.lock').read_text())
+        blocks = re.split(r'\n(?=[a-z])', (ROOT / LOCKS / 'requirements.lock').read_text())
         self.pins = {
             name: next(f'{block}\n' for block in blocks if block.startswith(f'{name}=='))
             for name in ('iniconfig', 'pluggy')
@@ -60,15 +58,13 @@ class Checkout:
     def fetch(self) -> None:
         """Fetch the packages of the locks, as `make handout OFFLINE=yes` does."""
         for lock in ('requirements.lock', 'requirements-uv.lock'):
-            subprocess.run(
-                [BASE_PYTHON, '-I', ROOT / 'tools/pip.py', 'download', '--quiet', '--no-deps']
-                + ['--require-hashes', '--requirement', self.root / lock, '--dest', self.wheels],
-                check=True,
-            )
+            command = [BASE_PYTHON, '-I', ROOT / 'tools/pip.py', 'download', '--quiet', '--no-deps']
+            command += ['--require-hashes', '--requirement', self.root / LOCKS / lock]
+            subprocess.run([*command, '--dest', self.wheels], check=True)
 
     def lock(self, *names: str, group: str = '') -> None:
         """Write a lock of these packages, or of all."""
-        file = self.root / f'requirements{group and f"-{group}"}.lock'
+        file = self.root / LOCKS / f'requirements{group and f"-{group}"}.lock'
         header = f'# Every wheel exists for Python 3.14 {HERE}\n'
         file.write_text(header + ''.join(self.pins[name] for name in names or self.pins))
 
@@ -106,12 +102,12 @@ class Checkout:
 
 @pytest.fixture(scope='module')
 def checkout(tmp_path_factory):
-    found = Checkout(tmp_path_factory.mktemp('set_up'))
-    found.fetch()
-    return found
+    checkout = Checkout(tmp_path_factory.mktemp('set_up'))
+    checkout.fetch()
+    return checkout
 
 
-ALL = ['iniconfig', 'pluggy', 'ros2-notebooks']
+ALL = ['iniconfig', 'pluggy', 'ros2-command', 'ros2-notebooks']
 
 
 def test_set_up_from_nothing_then_only_what_changed(checkout):
@@ -143,7 +139,7 @@ def test_set_up_from_nothing_then_only_what_changed(checkout):
     third = checkout.set_up()
     assert third.returncode == 0, third.stderr
     assert 'Making' not in third.stderr
-    assert checkout.installed() == ['iniconfig', 'ros2-notebooks']
+    assert checkout.installed() == ['iniconfig', 'ros2-command', 'ros2-notebooks']
     assert (folder / 'iniconfig/__init__.py').exists()
 
 
@@ -151,7 +147,7 @@ def test_a_group_is_kept_once_it_was_asked_for(checkout):
     checkout.lock('iniconfig')
     checkout.lock('pluggy', group='test')
     assert checkout.set_up().returncode == 0
-    assert checkout.installed() == ['iniconfig', 'ros2-notebooks']
+    assert checkout.installed() == ['iniconfig', 'ros2-command', 'ros2-notebooks']
     for arguments in (['test'], []):
         answer = checkout.set_up(*arguments)
         assert answer.returncode == 0, answer.stderr
@@ -161,7 +157,7 @@ def test_a_group_is_kept_once_it_was_asked_for(checkout):
 
 def test_a_wrong_hash_installs_nothing_and_the_next_call_repairs(checkout):
     checkout.lock()
-    lock = checkout.root / 'requirements.lock'
+    lock = checkout.root / LOCKS / 'requirements.lock'
     lock.write_text(re.sub(r'sha256:\w+', f'sha256:{"0" * 64}', lock.read_text()))
     (checkout.root / '.venv/set_up.stamp').unlink(missing_ok=True)
     answer = checkout.set_up()
@@ -187,42 +183,43 @@ def test_a_moved_checkout_is_made_anew(checkout):
 
 
 def test_packages_that_came_along_are_enough(tmp_path, checkout):
-    one = Checkout(tmp_path)
-    shutil.copytree(checkout.wheels, one.root / 'wheels', ignore=lambda *_: ['cache'])
-    (one.root / 'wheels/pythons').write_text(HERE)
+    offline = Checkout(tmp_path)
+    shutil.copytree(checkout.wheels, offline.root / 'wheels', ignore=lambda *_: ['cache'])
+    (offline.root / 'wheels/pythons').write_text(HERE)
     nowhere = {'UV_DEFAULT_INDEX': 'http://127.0.0.1:9/', 'PIP_FIND_LINKS': '/nowhere'}
-    answer = one.set_up(**nowhere, PIP_NO_INDEX='0')
+    answer = offline.set_up(**nowhere, PIP_NO_INDEX='0')
     assert answer.returncode == 0, answer.stderr
-    assert one.installed() == ALL
+    assert offline.installed() == ALL
 
 
 # --- One sentence says what to do ----------------------------------------------------------------
 
 
 def test_without_a_python_it_says_what_to_install(tmp_path):
-    one = Checkout(tmp_path)
+    checkout = Checkout(tmp_path)
     for name in ('python3', 'python3.14'):
-        (one.bin / name).unlink()
-    assert last_line(one.set_up()).startswith('No Python is on the PATH: install one')
+        (checkout.bin / name).unlink()
+    assert last_line(checkout.set_up()).startswith('No Python is on the PATH: install one')
 
 
 def test_without_venv_it_says_what_to_install(tmp_path):
-    one = Checkout(tmp_path)
+    checkout = Checkout(tmp_path)
     # What Debian's python3 is without the package python3-venv, and without pip.
-    put(one.bin, 'python3', f'case $* in *pip*) exit 1 ;; esac; exec "{BASE_PYTHON}" "$@"')
-    assert last_line(one.set_up()) == (
+    put(checkout.bin, 'python3', f'case $* in *pip*) exit 1 ;; esac; exec "{BASE_PYTHON}" "$@"')
+    assert last_line(checkout.set_up()) == (
         'python3 has no pip and no venv: run `sudo apt install python3-venv`, then try again.'
     )
 
 
 def test_without_a_usable_python_it_says_which(tmp_path, checkout):
-    one = Checkout(tmp_path)
-    one.wheels = checkout.wheels
-    (one.root / 'requirements.lock').write_text('# Every wheel exists for Python 3.14\n')
-    answer = one.set_up(UV_OFFLINE='1')
+    unlucky = Checkout(tmp_path)
+    unlucky.wheels = checkout.wheels
+    lock = unlucky.root / LOCKS / 'requirements.lock'
+    lock.write_text('# Every wheel exists for Python 3.14\n')
+    answer = unlucky.set_up(UV_OFFLINE='1')
     assert answer.returncode == 1
     assert last_line(answer).startswith('No usable Python 3.14 to 3.14 is on the PATH')
-    answer = one.set_up('--python', '3.9')
+    answer = unlucky.set_up('--python', '3.9')
     assert last_line(answer) == 'Not every pinned package has a wheel for Python 3.9.'
 
 
@@ -234,9 +231,9 @@ def test_without_a_network_it_says_what_to_check(tmp_path):
 
 
 def test_another_machine_is_sent_to_environment_md(tmp_path):
-    one = Checkout(tmp_path)
-    put(one.bin, 'uname', 'echo Linux aarch64')
-    assert 'environment.md says what to do on other machines' in last_line(one.set_up())
+    checkout = Checkout(tmp_path)
+    put(checkout.bin, 'uname', 'echo Linux aarch64')
+    assert 'environment.md says what to do on other machines' in last_line(checkout.set_up())
 
 
 # --- make ----------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
-from helpers.notebook.fresh import AS_SAVED, MARK
+from helpers.notebook import AS_SAVED, MARK
 
 NOTEBOOK_METADATA = {
     'kernelspec': {
@@ -69,7 +69,6 @@ def _clean_outputs(cell: NotebookNode) -> list[NotebookNode]:
 
 
 def text_of(notebook: NotebookNode) -> str:
-    """Return the text of a notebook's file, as Jupyter writes it."""
     return nbformat.writes(notebook) + '\n'
 
 

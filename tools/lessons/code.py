@@ -2,6 +2,7 @@
 
 import ast
 import symtable
+from typing import NamedTuple
 
 from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
@@ -32,16 +33,25 @@ def guess_of(cell: NotebookNode) -> tuple[str, str, object] | None:
     return None
 
 
-def names_of(cell: NotebookNode) -> tuple[set[str], set[str]]:
-    """Return the names that a cell gives, and those that it takes from other cells."""
+class Names(NamedTuple):
+    """The names in a cell: those it assigns, those it imports, and those of other cells it uses."""
+
+    given: set[str] = set()
+    imported: set[str] = set()
+    taken: set[str] = set()
+
+
+def names_of(source: str) -> Names:
+    """Return the names in the source of a cell; none of a lesson that is being written."""
     try:
-        plain = TransformerManager().transform_cell(cell.source)
+        plain = TransformerManager().transform_cell(source)
         top = symtable.symtable(plain, 'cell', 'exec')
-    except SyntaxError:  # of a lesson that is being written
-        return set(), set()
+    except SyntaxError:
+        return Names()
     given = {symbol.get_name() for symbol in top.get_symbols() if symbol.is_assigned()}
-    taken, inside = set(), [top]
-    for table in inside:
-        taken |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
-        inside += table.get_children()
-    return given, taken - given
+    imported, used, tables = set(), set(), [top]
+    for table in tables:
+        imported |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_imported()}
+        used |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
+        tables += table.get_children()
+    return Names(given, imported, used - given - imported)

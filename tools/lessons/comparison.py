@@ -4,8 +4,7 @@ pyproject.toml has its options, tests/nbval_sanitize.cfg what is masked before i
 """
 
 import re
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Callable, Iterator
 
 from jupyter_client.manager import KernelManager
 from nbval import kernel
@@ -18,11 +17,21 @@ from nbval.plugin import (
     metadata_tags,
 )
 
-from tools.lessons.lesson import ROOT
+from tools.lessons.lesson import ROOT, called
 
-__all__ = ['IPyNbCell', 'IPyNbFile', 'RunningKernel', 'comment_markers', 'metadata_tags']
+__all__ = ['IPyNbFile', 'NamedCell', 'RunningKernel', 'comment_markers', 'metadata_tags']
 
 MASKS = ROOT / 'tests' / 'nbval_sanitize.cfg'
+
+
+class NamedCell(IPyNbCell):
+    """A cell that a report calls as the rules do, and not by its number."""
+
+    def reportinfo(self) -> tuple:
+        return self.path, 0, f'{self.path.name}::{self.name}'
+
+    def repr_failure(self, excinfo: object) -> str:
+        return super().repr_failure(excinfo).replace(f'Cell {self.cell_num}: ', f'{self.name}: ', 1)
 
 
 def masked(text: str) -> str:
@@ -32,8 +41,25 @@ def masked(text: str) -> str:
     return text
 
 
-def start_kernels_by(manager: Callable[..., KernelManager]) -> Callable[[], None]:
-    """Let nbval start its kernels by this manager. The function that it returns undoes that."""
-    undo = partial(setattr, kernel, 'KernelManager', kernel.KernelManager)
-    kernel.KernelManager = manager
+def change_nbval(start_kernel: Callable[..., KernelManager]) -> Callable[[], None]:
+    """Let nbval start its kernels by this function, and name cells as the rules do.
+
+    The function that it returns undoes that.
+    """
+    plain_manager, plain_collect = kernel.KernelManager, IPyNbFile.collect
+
+    def collect(file: IPyNbFile) -> Iterator[NamedCell]:
+        for cell in plain_collect(file):
+            yield NamedCell.from_parent(
+                file,
+                name=called(cell.cell).replace('::', ':'),  # pytest splits its names there
+                cell_num=cell.cell_num,
+                cell=cell.cell,
+                options=cell.options,
+            )
+
+    def undo() -> None:
+        kernel.KernelManager, IPyNbFile.collect = plain_manager, plain_collect
+
+    kernel.KernelManager, IPyNbFile.collect = start_kernel, collect
     return undo

@@ -24,6 +24,7 @@ FOLDER = ROOT / 'notebooks'
 START, GLOSSARY = '00', '99'  # the notebooks that are no lessons
 PARTS = ('nodes', 'packages', 'robot')
 NOTE = 'For the instructor'
+LONGEST_NAME = 40  # letters of a cell's first line that are enough to find it
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,8 @@ class Lesson:
     @property
     def leave_out(self) -> str:
         """What a class leaves out first when time runs out; empty where nothing is named."""
-        found = re.search(r'^When time runs out, leave out: (.+)$', self._class_note, re.MULTILINE)
-        return found[1] if found else ''
+        line = re.search(r'^When time runs out, leave out: (.+)$', self._class_note, re.MULTILINE)
+        return line[1] if line else ''
 
     @property
     def next_link(self) -> str:
@@ -91,21 +92,21 @@ class Lesson:
     @cached_property
     def steps(self) -> list[str]:
         """The step of each cell, such as `1`; empty before the first one."""
-        found, step = [], ''
+        steps, step = [], ''
         for cell in self.notebook.cells:
             if heading := re.match(r'## (\w+)', cell.source):
                 step = heading[1]
-            found.append(step)
-        return found
+            steps.append(step)
+        return steps
 
     @cached_property
     def minutes_by_step(self) -> dict[str, int]:
         """The minutes of the instructor's notes: `1`, `2`, ... to their sum."""
-        found: dict[str, int] = {}
+        minutes_by_step: dict[str, int] = {}
         for cell, step in zip(self.notebook.cells, self.steps, strict=True):
             if minutes := minutes_of_note(cell.source):
-                found[step] = found.get(step, 0) + minutes
-        return found
+                minutes_by_step[step] = minutes_by_step.get(step, 0) + minutes
+        return minutes_by_step
 
     def minutes_of(self, steps: tuple[int, int] | None) -> int:
         """Return the minutes of some steps, the first and the last one, or of the whole lesson."""
@@ -124,25 +125,33 @@ class Lesson:
     def _class_note(self) -> str:
         return '\n'.join(cell.source for cell in self.notebook.cells if cell.cell_type == 'raw')
 
-    def _find(self, pattern: str, text: str, what: str) -> re.Match:
-        if found := re.search(pattern, text, re.MULTILINE):
-            return found
-        raise ValueError(f'{self.file} needs a {what}.')
+    def _find(self, pattern: str, text: str, missing: str) -> re.Match:
+        if match := re.search(pattern, text, re.MULTILINE):
+            return match
+        raise ValueError(f'{self.file} needs a {missing}.')
 
 
 def tags(cell: NotebookNode) -> set[str]:
-    """Return the tags of a cell."""
     return set(cell.metadata.get('tags', []))
+
+
+def called(cell: NotebookNode) -> str:
+    """Return how a cell is called: by its first words, and by its id.
+
+    JupyterLab finds the words with Ctrl+F, and the id at the end of its address, such as
+    02_lose_messages.ipynb#cell-id=check-02-1.
+    """
+    words = next((line.strip() for line in cell.source.splitlines() if line.strip()), '')
+    return f'"{words[:LONGEST_NAME]}" ({cell.id})'
 
 
 def minutes_of_note(source: str) -> int:
     """Return the minutes that a note for the instructor names; 0 for what is none."""
-    found = re.match(rf'{NOTE}: (\d+) minutes', source)
-    return int(found[1]) if found else 0
+    minutes = re.match(rf'{NOTE}: (\d+) minutes', source)
+    return int(minutes[1]) if minutes else 0
 
 
 def first_heading(text: str) -> str:
-    """Return the words of the heading with which a text begins."""
     return text.splitlines()[0].lstrip('# ')
 
 
@@ -155,28 +164,31 @@ def read(text: str, file: str) -> Lesson:
 
 
 def paths(folder: Path = FOLDER) -> list[Path]:
-    """Return the notebooks of a folder, in teaching order."""
     return sorted(folder.glob('*.ipynb'))
 
 
 def lessons(folder: Path = FOLDER) -> list[Lesson]:
-    """Return what the notebooks of a folder hold, in teaching order."""
     return [read(path.read_text(encoding='utf-8'), path.name) for path in paths(folder)]
 
 
-def chosen(numbers: str, folder: Path = FOLDER) -> list[Path]:
-    """Return the notebooks with these numbers, such as '02 03'; all of them for an empty text.
+def chosen(words: str, folder: Path = FOLDER) -> list[Path]:
+    """Return the notebooks with these numbers or names, such as '02 set_parameters'.
 
-    Raises ValueError if a number is not that of exactly one notebook.
+    An empty text chooses all. Raises ValueError if a word is not that of exactly one notebook.
     """
     known = paths(folder)
     if not known:
         raise ValueError(f'There is no notebook in {folder}.')
-    found = []
-    for number in numbers.split():
-        match = [path for path in known if path.name.startswith(f'{number:0>2}_')]
+    notebooks = set()
+    for word in words.split():
+        number = f'{word:0>2}'
+        match = [
+            path for path in known if word in (path.stem, path.stem[3:]) or number == path.stem[:2]
+        ]
         if len(match) != 1:
-            names = ', '.join(path.name[:2] for path in known)
-            raise ValueError(f'There is no single lesson {number!r}. Give one of {names}.')
-        found += match
-    return sorted(set(found)) or known
+            names = ', '.join(path.stem for path in known)
+            raise ValueError(
+                f'There is no single lesson {word!r}. Give a number or a name: {names}.'
+            )
+        notebooks |= {*match}
+    return sorted(notebooks) or known

@@ -4,16 +4,18 @@
     python -m tools.lessons.new count_the_losses --after 04      as lesson 05
     python -m tools.lessons.new count_the_losses --remove        out again
 
-The new lesson is a copy of template.txt, a complete small lesson that keeps all rules. A notebook
-that gets another number is renamed; its title, its workspace and the links to it follow. What is
-said of it in words is printed: a person must look at these lines. All texts are computed before the
-first file is touched.
+The new lesson is a copy of a complete small lesson that keeps all rules: template.txt is its
+notebook, template.yaml the answers with which its checks are tested. A notebook that gets another
+number is renamed; its title, its workspace and the links to it follow. Its other files have no
+number, and stay. Where a text calls a lesson by its number, that is printed: a person must look at
+these lines. All texts are computed before the first file is touched.
 """
 
 import argparse
 import re
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import nbformat
@@ -21,10 +23,15 @@ from nbformat import NotebookNode
 
 from tools.lessons import tables
 from tools.lessons.clean import clean, text_of, write
-from tools.lessons.lesson import GLOSSARY, ROOT, START
+from tools.lessons.lesson import GLOSSARY, ROOT, START, chosen, paths
 from tools.lessons.rules import FOLDED
 
 TEMPLATE = Path(__file__).with_name('template.txt')
+# What a lesson has besides its notebook, and the template of it, if there is one.
+BESIDE = {
+    'tests/answers/{name}.yaml': TEMPLATE.with_suffix('.yaml'),
+    'helpers/checks/lessons/{name}.py': TEMPLATE.with_suffix('.py'),
+}
 EXAMPLE = 'make lesson NAME=count_the_losses'
 
 
@@ -33,7 +40,9 @@ def template(stem: str = '90_write_a_lesson', part: str = 'nodes') -> NotebookNo
     text = TEMPLATE.read_text(encoding='utf-8').replace('Part: nodes', f'Part: {part}')
     title = f'# {stem[:2]} {stem[3:].replace("_", " ").capitalize()}'
     cells = []
-    for cell in re.split('^%% ', text.replace('# 90 Write a lesson', title), flags=re.M)[1:]:
+    text = text.replace('# 90 Write a lesson', title)
+    text = text.replace('lessons.write_a_lesson import', f'lessons.{stem[3:]} import')
+    for cell in re.split('^%% ', text, flags=re.M)[1:]:
         head, _, source = cell.partition('\n')
         kind, *tags = head.split()
         metadata = {'tags': tags}
@@ -55,99 +64,141 @@ def renumbered(texts: tables.Texts, old: str, new: str) -> tables.Texts:
     return {path: link.sub(f'[{new[:2]}', text).replace(old, new) for path, text in texts.items()}
 
 
-def plan(name: str, after: str, remove: bool, root: Path) -> tuple[dict[str, str], tables.Texts]:
-    """Return the renames of notebooks, and the texts of all files, by their new paths.
+@dataclass
+class Plan:
+    """What becomes of a checkout when a lesson is added or removed."""
 
-    A removed notebook is renamed to ''. Raises ValueError with one sentence if the wish cannot be
-    met.
-    """
-    stems = [path.stem for path in sorted((root / 'notebooks').glob('*.ipynb'))]
-    texts = _tracked(root) | tables.texts_of(root)
-    inner = [stem for stem in stems if stem[:2] not in (START, GLOSSARY)]
-    found = next((stem for stem in stems if stem[3:] == name), None)
-    if remove:
-        if found not in inner:
-            known = ', '.join(stem[3:] for stem in inner)
-            raise ValueError(f'There is no lesson {name!r} to remove. Give one of {known}.')
-        del texts[_path(found)]
-        texts |= tables.made(texts)
-        if named := sorted(path for path, text in texts.items() if found in text):
-            raise ValueError(
-                f'{", ".join(named)}: these files name {found}. Take it out there, then try again.'
-            )
-        inner.remove(found)
-    else:
-        if not re.fullmatch(r'[a-z]+(_[a-z0-9]+)+', name):
-            raise ValueError(
-                'Name the lesson in small letters, a verb and what it is about, with _ between '
-                f'the words: {EXAMPLE}'
-            )
-        if found:
-            raise ValueError(f'There is {found}.ipynb already: choose another name.')
-        places = [stem[:2] for stem in [stems[0], *inner]]
-        if after and after not in places:
-            raise ValueError(
-                f'There is no lesson {after!r}. Give AFTER one of {", ".join(places)}.'
-            )
-        place = places.index(after) if after else len(inner)
-        inner.insert(place, '')
+    texts: tables.Texts  # of all files, by their new paths
+    moved: dict[str, str]  # the notebooks that get another number, by their stems
+    removed: list[str]  # paths
+    run: str = START  # the number of the notebook to run next
+
+
+def plan_to_add(name: str, after: str, root: Path) -> Plan:
+    """Plan a new lesson. Raises ValueError with one sentence if it cannot be added."""
+    if not re.fullmatch(r'[a-z]+(_[a-z0-9]+)+', name):
+        raise ValueError(
+            'Name the lesson in small letters, a verb and what it is about, with _ between '
+            f'the words: {EXAMPLE}'
+        )
+    files = [*paths(root / 'notebooks'), *(root / path for path in _beside(name))]
+    for file in files:
+        if name in (file.stem, file.stem[3:]) and file.exists():
+            raise ValueError(f'There is {file.relative_to(root)} already: choose another name.')
+    numbered = _numbered(root)
+    place = len(numbered)
+    if after:
+        before = chosen(after, root / 'notebooks')[0]
+        if before.name[:2] == GLOSSARY:
+            raise ValueError('The glossary stays at the end: name another lesson with AFTER.')
+        place = numbered.index(before.stem) + 1 if before.stem in numbered else 0
+    numbered.insert(place, '')
+    texts, moved = _move(_texts_of(root), numbered)
+    new = f'{place + 1:02d}_{name}'
+    before = tables.lessons_of(texts)[place]
+    part = before.part if before.is_lesson else 'nodes'
+    texts[_path(new)] = text_of(template(new, part))
+    for path, of_template in _beside(name).items():
+        if of_template.exists():
+            texts[path] = of_template.read_text(encoding='utf-8')
+    return Plan(texts | tables.updated(texts), moved, removed=[], run=new[:2])
+
+
+def plan_to_remove(lesson: str, root: Path) -> Plan:
+    """Plan a removal. Raises ValueError with one sentence if the lesson must stay."""
+    old = chosen(lesson, root / 'notebooks')[0].stem
+    numbered = _numbered(root)
+    if old not in numbered:
+        raise ValueError(f'{old} is no lesson: it stays.')
+    numbered.remove(old)
+    removed = [path for path in [_path(old), *_beside(old[3:])] if (root / path).exists()]
+    texts = {path: text for path, text in _texts_of(root).items() if path not in removed}
+    texts |= tables.updated(texts)
+    if named := sorted(path for path, text in texts.items() if old in text):
+        raise ValueError(
+            f'{", ".join(named)}: these files name {old}. Take it out there, then try again.'
+        )
+    texts, moved = _move(texts, numbered)
+    return Plan(texts | tables.updated(texts), moved, removed)
+
+
+def _numbered(root: Path) -> list[str]:
+    """Return the stems of the notebooks whose number is their place."""
+    stems = [path.stem for path in paths(root / 'notebooks')]
+    return [stem for stem in stems if stem[:2] not in (START, GLOSSARY)]
+
+
+def _move(texts: tables.Texts, stems: list[str]) -> tuple[tables.Texts, dict[str, str]]:
+    """Give each notebook the number of its place; return the texts, and the stems that change."""
     moved = {
         stem: f'{number:02d}{stem[2:]}'
-        for number, stem in enumerate(inner, 1)
+        for number, stem in enumerate(stems, 1)
         if stem and stem[:2] != f'{number:02d}'
     }
-    # If numbers grow the last notebook moves first, if they shrink the first one.
-    for old in sorted(moved, reverse=not remove):
+    for old in _free_first(moved):
         texts = renumbered(texts, old, moved[old])
-    if remove:
-        moved[found] = ''
-    else:
-        new = f'{place + 1:02d}_{name}'
-        before = tables.lessons_of(texts)[place]
-        part = before.part if before.is_lesson else 'nodes'
-        texts[_path(new)] = text_of(template(new, part))
-    return moved, texts | tables.made(texts)
+    return texts, moved
 
 
-def to_look_at(texts: tables.Texts, moved: dict[str, str]) -> list[str]:
-    """Return the lines that call a lesson by a number that it had: `path:line: text`."""
-    old = '|'.join(stem[:2] for stem in moved)
-    says = re.compile(rf'(?:[Ll]essons? |LESSON=)(?:\d\d(?:,| and| or| to)* )*(?:{old})\b')
+def _free_first(moved: dict[str, str]) -> list[str]:
+    """Return the stems in an order in which each new name is free: the last one first to grow."""
+    return sorted(moved, reverse=any(new > old for old, new in moved.items()))
+
+
+def _beside(name: str) -> dict[str, Path]:
+    """Return the paths of what a lesson has besides its notebook, and their templates."""
+    return {path.format(name=name): of_template for path, of_template in BESIDE.items()}
+
+
+def to_look_at(texts: tables.Texts, numbers: set[str]) -> list[str]:
+    """Return the lines that call a lesson by one of these numbers: `path:line: text`."""
+    if not numbers:
+        return []
+    named = re.compile(
+        rf'(?:[Ll]essons? |LESSON=)(?:\d\d(?:,| and| or| to)* )*(?:{"|".join(sorted(numbers))})\b'
+    )
     return [
         f'{path}:{number}: {line.strip()[:100]}'
         for path, text in sorted(texts.items())
         for number, line in enumerate(text.splitlines(), 1)
-        if says.search(line)
+        if named.search(line)
     ]
 
 
 def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
-    """Run the tool; return its exit status."""
     parser = argparse.ArgumentParser(description='Add a lesson, or take one out.')
-    parser.add_argument('name', help='for example count_the_losses')
-    parser.add_argument('--after', default='', metavar='NN', help='the lesson before it')
+    parser.add_argument('name', help='for example count_the_losses; to remove, also a number')
+    parser.add_argument('--after', default='', metavar='LESSON', help='the lesson before it')
     parser.add_argument('--remove', action='store_true', help='take the lesson out')
     options = parser.parse_args(arguments)
     try:
-        before = _tracked(root) | tables.texts_of(root)
-        moved, texts = plan(options.name, options.after, options.remove, root)
-        if moved and _git(root, 'status', '--porcelain', '-uno'):
+        before = _texts_of(root)
+        if options.remove:
+            plan = plan_to_remove(options.name, root)
+        else:
+            plan = plan_to_add(options.name, options.after, root)
+        if (plan.moved or plan.removed) and _git(root, 'status', '--porcelain', '-uno'):
             raise ValueError('Commit your changes first: the new numbers would mix with them.')
-        for old in sorted(moved, reverse=not options.remove):  # as above
-            new = moved[old]
-            _git(root, *(['mv', _path(old), _path(new)] if new else ['rm', '-q', _path(old)]))
+        if plan.removed:
+            _git(root, 'rm', '-q', *plan.removed)
+        for old in _free_first(plan.moved):
+            _git(root, 'mv', _path(old), _path(plan.moved[old]))
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1
-    back = {_path(new): _path(old) for old, new in moved.items() if new}
-    for path, text in texts.items():
+    for path in plan.removed:
+        print(f'{path}: removed')
+    back = {_path(new): _path(old) for old, new in plan.moved.items()}
+    for path, text in plan.texts.items():
         if text != before.get(back.get(path, path)):
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
             write(root / path, text)
             print(f'{path}: written')
-    if moved and (lines := to_look_at(texts, moved)):
+    old_numbers = {stem[:2] for stem in plan.moved}
+    old_numbers |= {Path(path).name[:2] for path in plan.removed if path.endswith('.ipynb')}
+    if lines := to_look_at(plan.texts, old_numbers):
         print('Look at these lines, which name a lesson by its old number:', *lines, sep='\n')
-    new = next((path for path in texts if back.get(path, path) not in before), _path(START))
-    print(f'Now run `make notebooks LESSON={Path(new).name[:2]}`.')
+    print(f'Now run `make notebooks LESSON={plan.run}`.')
     return 0
 
 
@@ -155,8 +206,8 @@ def _path(stem: str) -> str:
     return f'notebooks/{stem}.ipynb'
 
 
-def _tracked(root: Path) -> tables.Texts:
-    """Return all texts that git knows, but those of this tool."""
+def _texts_of(root: Path) -> tables.Texts:
+    """Return all texts that git knows, but those of this tool, and all notebooks."""
     texts = {}
     for path in _git(root, 'ls-files', '-z').split('\0'):
         if path and not path.startswith('tools/lessons/') and (root / path).is_file():
@@ -164,7 +215,7 @@ def _tracked(root: Path) -> tables.Texts:
                 texts[path] = (root / path).read_text(encoding='utf-8')
             except UnicodeDecodeError:
                 continue
-    return texts
+    return texts | tables.texts_of(root)
 
 
 def _git(root: Path, *arguments: str) -> str:

@@ -4,6 +4,7 @@ A rule looks at a notebook and yields a sentence for each thing that is wrong. t
 `make notebooks` writes.
 """
 
+import builtins
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -11,15 +12,16 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
+from helpers.checks.verdict import KEY
 from tools.lessons.code import guess_of, names_of
 from tools.lessons.comparison import comment_markers, metadata_tags
-from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, tags
-from tools.lessons.slides import LARGEST, PICTURE, height
+from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, called, tags
 
-MAX_CODE_LINES = 24  # what a slide has room for
+MAX_CODE_LINES = 24  # what a screen has room for
+PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 MIN_WORDS = 6  # of an alternative text
 TASK = ('exercise', 'check', 'solution')
-FOLDED = {'solution': '%%solution ', 'check': '# ✔ Check of task ', 'harness': '# ', 'notes': NOTE}
+FOLDED = {'solution': '%%solution ', 'harness': '# ', 'notes': NOTE}
 TAGS = {'predict', 'nbval-ignore-output', 'deck-break', *TASK, *FOLDED}
 REASON = '# Not compared: '
 THIS_MACHINE = {str(Path(__file__).resolve().parents[2]), str(Path.home()), sys.prefix} - {'/'}
@@ -29,17 +31,15 @@ PATH = re.compile(
     r'|\b[A-Z]:\\\S+|(?<!\S)(?!python3/)\S*(?:site|dist)-packages\S*|'
     + '|'.join(rf'{re.escape(folder)}\b' for folder in sorted(THIS_MACHINE))
 )
-PRIVATE = re.compile(r'^\s*(?:from|import) (helpers\._\w+)', re.MULTILINE)
+BEHIND_A_DOOR = re.compile(r'^\s*(?:from|import) (helpers\.(\w+)\.(?!lessons\.)\w+)', re.MULTILINE)
 Rule = Callable[[Lesson], Iterator[str]]
 
 
 # What the rules look at
 
 
-def code_cells(lesson: Lesson) -> list[tuple[str, NotebookNode]]:
-    """Return every code cell with its name for a reader: `code cell 1` and so on."""
-    cells = [cell for cell in lesson.notebook.cells if cell.cell_type == 'code']
-    return [(f'code cell {count}', cell) for count, cell in enumerate(cells, 1)]
+def code_cells(lesson: Lesson) -> list[NotebookNode]:
+    return [cell for cell in lesson.notebook.cells if cell.cell_type == 'code']
 
 
 def prose(lesson: Lesson) -> str:
@@ -59,10 +59,10 @@ def texts(cell: NotebookNode) -> Iterator[str]:
                 yield PICTURE.sub('', str(data))
 
 
-def printed(cells: list[NotebookNode], start: str) -> int:
-    """Return how many lines of the cells' text outputs start with `start`."""
-    lines = [line for cell in cells for text in texts(cell) for line in text.splitlines()]
-    return sum(line.startswith(start) for line in lines)
+def verdicts(cell: NotebookNode) -> list[dict]:
+    """Return what the checks of a cell found, as data."""
+    data = [output.get('metadata', {}).get(KEY) for output in cell.outputs]
+    return [verdict for verdict in data if verdict]
 
 
 def alternative_texts(cell: NotebookNode) -> Iterator[str]:
@@ -80,98 +80,124 @@ def alternative_texts(cell: NotebookNode) -> Iterator[str]:
 
 def tasks(lesson: Lesson) -> dict[str, list[NotebookNode]]:
     """Return the code cells of each task, up to its solution, by its heading."""
-    found: dict[str, list[NotebookNode]] = {}
+    cells: dict[str, list[NotebookNode]] = {}
     name, inside = '', False
     for cell in lesson.notebook.cells:
         heading = re.search(r'^### ✎ (Task \d.*)', cell.source, re.MULTILINE)
         if heading and cell.cell_type == 'markdown':
             name, inside = heading[1], True
-            found[name] = []
+            cells[name] = []
         if inside and cell.cell_type == 'code':
-            if 'solution' not in tags(cell) and any('solution' in tags(c) for c in found[name]):
+            if 'solution' not in tags(cell) and any('solution' in tags(c) for c in cells[name]):
                 inside = False
             else:
-                found[name].append(cell)
-    return found
+                cells[name].append(cell)
+    return cells
 
 
 # Outputs
 
 
 def executed_in_order(lesson: Lesson) -> Iterator[str]:
-    for count, (name, cell) in enumerate(code_cells(lesson), 1):
+    for count, cell in enumerate(code_cells(lesson), 1):
         if cell.execution_count != count:
-            yield f'{name} has execution count {cell.execution_count}: run the whole notebook.'
+            yield (
+                f'The cell {called(cell)} was run as number {cell.execution_count}, not {count}: '
+                'run the whole notebook.'
+            )
 
 
 def prints_what_stays(lesson: Lesson) -> Iterator[str]:
-    for name, cell in code_cells(lesson):
+    for cell in code_cells(lesson):
         for output in cell.outputs:
             plain = output.get('data', {}).get('text/plain', '')
             if output.get('name') == 'stderr':
-                yield f'{name} writes to stderr: {output.text.strip()!r}.'
+                yield f'The cell {called(cell)} writes to stderr: {output.text.strip()!r}.'
             elif set(output.get('data', {})) == {'text/plain'} and re.match(
                 r'[\[(]?(<|Text\(|array\(\[<)', plain
             ):
-                yield f'{name} leaves {plain!r}: assign the value to a name.'
-        if found := next(filter(None, map(PATH.search, texts(cell))), None):
-            yield f'{name} shows {found[0]}, a path of one machine.'
+                yield f'The cell {called(cell)} leaves {plain!r}: assign the value to a name.'
+        if path := next(filter(None, map(PATH.search, texts(cell))), None):
+            yield f'The cell {called(cell)} shows {path[0]}, a path of this machine.'
 
 
 def compared(lesson: Lesson) -> Iterator[str]:
     """All outputs are compared, but for the tag nbval-ignore-output with its reason."""
-    for name, cell in code_cells(lesson):
+    for cell in code_cells(lesson):
         lines = [line.strip() for line in cell.source.splitlines()]
         comments = {line.lstrip('#').strip() for line in lines if line.startswith('#')}
         for marker in sorted(comments & set(comment_markers) | tags(cell) & set(metadata_tags)):
             if marker != 'nbval-ignore-output':
-                yield f'{name} has the marker {marker}: only the tag nbval-ignore-output is used.'
+                yield (
+                    f'The cell {called(cell)} has the marker {marker}: only the tag '
+                    'nbval-ignore-output is used.'
+                )
             elif not any(line.startswith(REASON) and line != REASON.strip() for line in lines):
-                yield f'{name} has the marker {marker} without "{REASON}...".'
+                yield f'The cell {called(cell)} has the marker {marker} without "{REASON}...".'
 
 
 def pictures_described(lesson: Lesson) -> Iterator[str]:
     """Every picture has a text of its own, for those who do not see it."""
     known: set[str] = set()
-    for index, cell in enumerate(lesson.notebook.cells, 1):
+    for cell in lesson.notebook.cells:
         for alt in alternative_texts(cell):
             if len(alt.split()) < MIN_WORDS:
                 yield (
-                    f'Cell {index} has a picture without an alternative text of {MIN_WORDS} '
-                    f'words or more: {alt!r}. helpers.plots.alt_text gives one to a figure.'
+                    f'The cell {called(cell)} has a picture without an alternative text of '
+                    f'{MIN_WORDS} words or more: {alt!r}. helpers.plots.alt_text gives one to a '
+                    'figure.'
                 )
             elif alt in known:
-                yield f'Cell {index}: another picture has the alternative text {alt!r}.'
+                yield f'The cell {called(cell)}: another picture has the alternative text {alt!r}.'
             known.add(alt)
 
 
 # Cells
 
 
-def imports_what_is_public(lesson: Lesson) -> Iterator[str]:
-    for name, cell in code_cells(lesson):
-        if found := PRIVATE.search(cell.source):
-            yield f'{name} imports {found[1]}: a lesson imports what helpers offer.'
+def imports_from_doors(lesson: Lesson) -> Iterator[str]:
+    for cell in code_cells(lesson):
+        if found := BEHIND_A_DOOR.search(cell.source):
+            yield (
+                f'The cell {called(cell)} imports {found[1]}: a lesson imports from the door, '
+                f'helpers.{found[2]}.'
+            )
 
 
 def names_stay(lesson: Lesson) -> Iterator[str]:
     """A cell that is run again, after the last one, takes from others what it took before."""
     cells = [
-        (name, *names_of(cell)) for name, cell in code_cells(lesson) if 'solution' not in tags(cell)
+        (called(cell), names_of(cell.source))
+        for cell in code_cells(lesson)
+        if 'solution' not in tags(cell)
     ]
-    for place, (name, _, taken) in enumerate(cells):
-        for word in sorted(taken):
-            before = [one for one, given, _ in cells[:place] if word in given]
-            after = [one for one, given, _ in cells[place:] if word in given]
+    for place, (reader, names) in enumerate(cells):
+        for name in sorted(names.taken):
+            before = [giver for giver, own in cells[:place] if name in own.given]
+            after = [giver for giver, own in cells[place:] if name in own.given]
             if before and after:
                 yield (
-                    f'{name} takes {word!r} from {before[-1]}, and {after[0]} gives the name to '
-                    f'something else: run again, {name} takes that. Choose another name.'
+                    f'The cell {reader} takes {name!r} from {before[-1]}, and {after[0]} gives '
+                    'the name to something else: run again, it takes that. Choose another name.'
                 )
 
 
+def solutions_import_what_they_use(lesson: Lesson) -> Iterator[str]:
+    """A cell that begins with a magic is one that ruff does not read."""
+    known = {*dir(builtins), '__name__', 'get_ipython', 'display'}
+    for cell in code_cells(lesson):
+        names = names_of(cell.source)
+        known |= names.given | names.imported
+    for cell in code_cells(lesson):
+        _, _, source = cell.source.partition('\n')
+        if 'solution' in tags(cell) and not source.startswith('%%'):
+            names = names_of(source)
+            for name in sorted(names.taken - known):
+                yield f'The cell {called(cell)} uses {name!r}, which no cell defines or imports.'
+
+
 def steps_begin_cells(lesson: Lesson) -> Iterator[str]:
-    """The title of a step is the first line of its cell: there its slide begins."""
+    """The title of a step is the first line of its cell: there a slide begins."""
     for cell in lesson.notebook.cells:
         if cell.cell_type == 'markdown' and (title := re.search(r'\n## (.*)', cell.source)):
             yield f'The step "{title[1]}" is inside a cell: let a cell of its own begin with it.'
@@ -179,34 +205,34 @@ def steps_begin_cells(lesson: Lesson) -> Iterator[str]:
 
 def tagged(lesson: Lesson) -> Iterator[str]:
     """JupyterLab shows the first line of a folded cell, and unfolds Markdown when it runs it."""
-    for index, cell in enumerate(lesson.notebook.cells, 1):
+    for cell in lesson.notebook.cells:
+        name = f'The cell {called(cell)}'
         for tag in sorted(tags(cell) - TAGS):
-            yield f'Cell {index} has the unknown tag {tag!r}.'
+            yield f'{name} has the unknown tag {tag!r}.'
         folded = tags(cell) & FOLDED.keys()
         if ('jupyter' in cell.metadata) != bool(folded):
-            yield f'Cell {index}: hide the source of a {", a ".join(FOLDED)}, and of nothing else.'
+            yield f'{name}: hide the source of a {", a ".join(FOLDED)}, and of nothing else.'
         for tag in folded - {'notes'}:
             if not cell.source.startswith(FOLDED[tag]):
-                yield f'Cell {index} has the tag {tag}: begin it with `{FOLDED[tag].strip()}`.'
+                yield f'{name} has the tag {tag}: begin it with `{FOLDED[tag].strip()}`.'
         raw, noted = cell.cell_type == 'raw', 'notes' in tags(cell)
         if (raw or noted) and not (raw and noted and cell.source.startswith(f'{NOTE}: ')):
             yield (
-                f'Cell {index} is a note: make it a raw cell with the tag notes that begins with '
+                f'{name} is a note: make it a raw cell with the tag notes that begins with '
                 f'`{NOTE}: `.'
             )
 
 
-def fits_a_slide(lesson: Lesson) -> Iterator[str]:
-    for index, cell in enumerate(lesson.notebook.cells, 1):
+def fits_a_screen(lesson: Lesson) -> Iterator[str]:
+    for cell in lesson.notebook.cells:
         lines = len(cell.source.splitlines())
         hidden = tags(cell) & FOLDED.keys()
         if cell.cell_type == 'code' and lines > MAX_CODE_LINES and not hidden:
             yield (
-                f'Cell {index} has {lines} lines of code, more than {MAX_CODE_LINES}: make two '
-                'cells of it. A file can stand in two: `%%write PATH part 1`, then `part 2`.'
+                f'The cell {called(cell)} has {lines} lines of code, more than {MAX_CODE_LINES}: '
+                'make two cells of it. A file can stand in two: `%%write PATH part 1`, then '
+                '`part 2`.'
             )
-        if (percent := height(cell)) > LARGEST:
-            yield f'Cell {index} with its outputs takes {percent:.0f} % of the height.'
 
 
 # The lesson
@@ -239,20 +265,23 @@ def links_lead_somewhere(lesson: Lesson) -> Iterator[str]:
 def guesses_are_compared(lesson: Lesson) -> Iterator[str]:
     """The class is asked the question with which the guess is compared: no two are the same."""
     cells, asked = code_cells(lesson), set()
-    for count, (name, cell) in enumerate(cells, 1):
+    for count, cell in enumerate(cells, 1):
         if 'predict' not in tags(cell):
             continue
-        if (found := guess_of(cell)) is None:
-            yield f"{name} must end like this: `my_guess = guess('How many are heard?', ...)`."
+        if (parts := guess_of(cell)) is None:
+            yield (
+                f'The cell {called(cell)} must end like this: '
+                "`my_guess = guess('How many are heard?', ...)`."
+            )
             continue
-        guess, question, answer = found
+        guess, question, answer = parts
         if answer is not ...:
-            yield f'{name} answers its question: write `...` for the student to fill in.'
+            yield f'The cell {called(cell)} answers its question: write `...` for the student.'
         if question in asked:
-            yield f'{name} asks what another guess asks: {question!r}.'
+            yield f'The cell {called(cell)} asks what another guess asks: {question!r}.'
         asked.add(question)
         compared = rf'compare_prediction\(\s*{re.escape(repr(question))},\s*{guess}\b'
-        if not any(re.search(compared, later.source) for _, later in cells[count:]):
+        if not any(re.search(compared, later.source) for later in cells[count:]):
             yield f'No later cell has compare_prediction({question!r}, {guess}, ...).'
 
 
@@ -265,28 +294,27 @@ def tasks_are_checked(lesson: Lesson) -> Iterator[str]:
         own = [cell for cell in cells if tags(cell) & set(TASK)]
         inside += len(own)
         kinds = ''.join(tag[0] for cell in own for tag in TASK if tag in tags(cell))
-        if not re.fullmatch('e+c+s', kinds):
+        if not re.fullmatch('e+cs', kinds):
             yield f'{name!r} needs cells with the tags {", ".join(TASK)}, in this order.'
             continue
         *_, check, solution = own
-        if not re.search(rf'^check\(\s*{count},', check.source, re.MULTILINE):
-            yield f'{name!r}: its check must call `check({count}, ...)`.'
+        if not re.fullmatch(rf'check\({count}(, [^\n]+)?\)', check.source):
+            yield f'{name!r}: its check must be one line, `check({count}, ...)`.'
         if not solution.source.startswith(f'%%solution {count}\n'):
             yield f'{name!r}: its solution must begin with `%%solution {count}`.'
-        missing = printed([check], '[not yet]')
-        points = missing + printed([check], '[ok]')
-        if not missing:
+        starters, solutions = verdicts(check), verdicts(solution)
+        if [verdict['solved'] for verdict in starters] != [False]:
             yield f'{name!r}: its check finds nothing missing in the starter.'
-        if printed([solution], '[ok]') != points or printed([solution], '[not yet]'):
-            yield f'{name!r}: its solution does not pass all {points} points of the check.'
+        if [verdict['solved'] for verdict in solutions] != [True]:
+            yield f'{name!r}: its solution does not pass its check.'
     if sum(bool(tags(cell) & set(TASK)) for cell in lesson.notebook.cells) != inside:
         yield 'A cell has the tag of a task, but is under no "### ✎ Task".'
 
 
 def questions_have_one_right_answer(lesson: Lesson) -> Iterator[str]:
-    for index, cell in enumerate(lesson.notebook.cells, 1):
+    for cell in lesson.notebook.cells:
         if cell.source.startswith('### Question ') and cell.source.count('**Right.**') != 1:
-            yield f'Cell {index}: a question needs exactly one right answer.'
+            yield f'The cell {called(cell)}: a question needs exactly one right answer.'
 
 
 RULES: list[Rule] = [
@@ -294,11 +322,12 @@ RULES: list[Rule] = [
     prints_what_stays,
     compared,
     pictures_described,
-    imports_what_is_public,
+    imports_from_doors,
     names_stay,
+    solutions_import_what_they_use,
     steps_begin_cells,
     tagged,
-    fits_a_slide,
+    fits_a_screen,
     named,
     links_lead_somewhere,
     guesses_are_compared,
@@ -314,7 +343,7 @@ def problems(lesson: Lesson) -> list[str]:
 
 def problems_of_all(lessons: list[Lesson]) -> list[str]:
     """Return what is wrong with the numbers and names of all notebooks, a sentence each."""
-    found = [
+    sentences = [
         f'{lesson.file} is not of the form NN_verb_phrase.ipynb.'
         for lesson in lessons
         if not re.fullmatch(r'\d\d(_[a-z0-9]+)+\.ipynb', lesson.file)
@@ -322,5 +351,5 @@ def problems_of_all(lessons: list[Lesson]) -> list[str]:
     numbers = [lesson.number for lesson in lessons]
     wanted = [f'{count:02d}' for count in range(len(lessons) - 1)] + [GLOSSARY]
     if numbers != wanted:
-        found.append(f'The numbers of the notebooks are {numbers}, and should be {wanted}.')
-    return found
+        sentences.append(f'The numbers of the notebooks are {numbers}, and should be {wanted}.')
+    return sentences

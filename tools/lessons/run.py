@@ -1,7 +1,7 @@
 """Run lessons and save their outputs, and write what follows from the notebooks.
 
-    python -m tools.lessons.run             all lessons
-    python -m tools.lessons.run 02 03       some of them
+    python -m tools.lessons.run                         all lessons
+    python -m tools.lessons.run 02 set_parameters       some of them
 
 Each notebook gets a fresh kernel of the interpreter that runs this tool, started as nbval starts
 it. What is saved is what this one run gave, pictures included. A picture kept from an earlier run
@@ -33,9 +33,12 @@ from nbformat import NotebookNode
 from helpers.checks.progress import FILE_VARIABLE
 from tools.lessons import tables
 from tools.lessons.clean import clean, text_of, write
-from tools.lessons.lesson import ROOT, START, chosen
+from tools.lessons.lesson import ROOT, START, Lesson, called, chosen
+from tools.lessons.rules import tasks_are_checked
 
 CELL_TIMEOUT_S = 100
+# JupyterLab would ask which of the two files to keep, and either choice loses something.
+CHANGED = 'changed. Open in JupyterLab? File > Reload Notebook from Disk'
 
 
 class _ThisInterpreter(KernelSpecManager):
@@ -55,43 +58,43 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
     for cell in notebook.cells:
         if cell.cell_type == 'code':
             cell.outputs, cell.execution_count = [], None
-    running = said = 0
+    running, size = '', 0
 
-    def count(**_: object) -> None:
+    def begin(cell: NotebookNode, **_: object) -> None:
         nonlocal running
-        running += 1
+        running = called(cell)
 
-    def note(**_: object) -> None:
-        nonlocal said
-        said = os.fstat(written.fileno()).st_size
+    def end(**_: object) -> None:
+        nonlocal size
+        size = os.fstat(from_c.fileno()).st_size
 
-    client = _client(notebook, folder, on_cell_execute=count, on_cell_executed=note)
+    client = _client(notebook, folder, on_cell_execute=begin, on_cell_executed=end)
     environment = os.environ | {
         # Under nbval ipykernel sees this variable, and leaves output written at C level alone.
         'PYTEST_CURRENT_TEST': 'tools/lessons/run.py',
         FILE_VARIABLE: '',  # what is saved is the table of a reader who has solved nothing
     }
     try:
-        with tempfile.TemporaryFile() as written:
+        with tempfile.TemporaryFile() as from_c:
             client.execute(
-                cleanup_kc=True, env=environment, stdout=subprocess.DEVNULL, stderr=written
+                cleanup_kc=True, env=environment, stdout=subprocess.DEVNULL, stderr=from_c
             )
             # Not what ZeroMQ may say when the kernel ends: nobody sees that.
-            lines = os.pread(written.fileno(), said, 0).decode(errors='replace').splitlines(True)
-            from_c = ''.join(line for line in lines if not line.startswith('[IPKernelApp]'))
+            lines = os.pread(from_c.fileno(), size, 0).decode(errors='replace').splitlines(True)
+            shown = ''.join(line for line in lines if not line.startswith('[IPKernelApp]'))
     except CellExecutionError as error:
         lines = f'{error.ename}: {error.evalue}'.splitlines()
         # The second line of a time-out says what was waited for.
-        what = ' '.join(lines[: 2 if error.ename == 'TimeoutError' else 1])
+        reason = ' '.join(lines[: 2 if error.ename == 'TimeoutError' else 1])
     except CellTimeoutError:
-        what = f'it took longer than {CELL_TIMEOUT_S} s'
+        reason = f'it took longer than {CELL_TIMEOUT_S} s'
     except (DeadKernelError, AssertionError):  # after Ctrl+C nbclient fails its own assertion
-        what = 'the kernel ended'
+        reason = 'the kernel ended'
     else:
-        if from_c:
-            raise RuntimeError(f'JupyterLab would show on red what C wrote: {from_c[:200]!r}')
+        if shown:
+            raise RuntimeError(f'JupyterLab would show on red what C wrote: {shown[:200]!r}')
         return clean(notebook)
-    raise RuntimeError(f'code cell {running} failed: {what}')
+    raise RuntimeError(f'the cell {running} failed: {reason}')
 
 
 def _client(notebook: NotebookNode, folder: Path, **hooks: Callable) -> NotebookClient:
@@ -116,22 +119,24 @@ def _client(notebook: NotebookNode, folder: Path, **hooks: Callable) -> Notebook
 def update(path: Path) -> bool:
     """Execute and clean a notebook's file in place; return whether that changed it.
 
-    Raises RuntimeError as `execute` does, and the file is as it was before; ValueError if it was
-    saved meanwhile, and the file is as it was saved.
+    Raises RuntimeError as `execute` does, and if a check does not judge its starter and its
+    solution as it should: the file is as it was before. Raises ValueError if it was saved
+    meanwhile, and the file is as it was saved.
     """
     before = path.read_text(encoding='utf-8')
     notebook = execute(nbformat.reads(before, as_version=4), path.parent)
+    if problems := [*tasks_are_checked(Lesson(path.name, notebook))]:
+        raise RuntimeError(' '.join(problems))
     if path.read_text(encoding='utf-8') != before:
         raise ValueError(f'{path.name} was changed while it ran: save it, then run it again.')
     return write(path, text_of(notebook), before)
 
 
 def main(arguments: list[str], root: Path = ROOT) -> int:
-    """Run the tool with the numbers of lessons; return its exit status."""
     try:
         paths = chosen(' '.join(arguments), root / 'notebooks')
         texts = tables.texts_of(root)
-        changed = tables.made(texts)
+        changed = tables.updated(texts)
         for name, text in changed.items():
             write(root / name, text)
             print(f'{name}: written from the notebooks')
@@ -145,7 +150,7 @@ def main(arguments: list[str], root: Path = ROOT) -> int:
             except RuntimeError as error:
                 raise ValueError(f'{path.name}: {error} (the file is as it was)') from None
             seconds = time.monotonic() - start
-            print(f'{path.name}: {seconds:.0f} s, {"changed" if changed else "unchanged"}')
+            print(f'{path.name}: {seconds:.0f} s, {CHANGED if changed else "unchanged"}')
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1

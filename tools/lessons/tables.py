@@ -5,7 +5,7 @@ README.md and teaching.md and the notebook 00 hold tables between two marks:
     <!-- made by `make notebooks`: map of nodes -->
     <!-- end -->
 
-Each lesson ends with a link to the next one. The rows of a timetable are written by hand: what
+Each lesson ends with a link to the next lesson. The rows of a timetable are written by hand: what
 happens, and the minutes if it is no lesson. The times, and the minutes and titles of lessons, are
 made. The functions take and return texts by their path in the checkout, so that nothing is written
 before all of it is right.
@@ -40,11 +40,10 @@ def texts_of(root: Path = ROOT) -> Texts:
 
 
 def lessons_of(texts: Texts) -> list[Lesson]:
-    """Return the notebooks among some texts, in teaching order."""
     return [read(texts[path], Path(path).name) for path in sorted(texts) if path.endswith('.ipynb')]
 
 
-def made(texts: Texts) -> Texts:
+def updated(texts: Texts) -> Texts:
     """Return the texts that differ from what the notebooks say, as they should be.
 
     Raises ValueError with one sentence if a notebook does not say what a table needs.
@@ -77,9 +76,9 @@ def needs_run(lessons: list[Lesson]) -> bool:
 def with_tasks(lessons: list[Lesson]) -> list[progress.Tasks]:
     """Return the notebooks that have tasks, as `helpers.checks.progress` knows them."""
     return [
-        progress.Tasks(one.number, one.name, one.title, len(one.tasks))
-        for one in lessons
-        if one.tasks
+        progress.Tasks(lesson.number, lesson.name, lesson.title, len(lesson.tasks))
+        for lesson in lessons
+        if lesson.tasks
     ]
 
 
@@ -99,11 +98,11 @@ def _with_tables(text: str, lessons: list[Lesson]) -> str:
     return BLOCK.sub(new, text)
 
 
-def _table(what: str, old: str, lessons: list[Lesson]) -> str:
-    """Return the lines of the table `what`, which was `old`."""
-    kind, _, name = what.partition(' of ')
+def _table(title: str, old: str, lessons: list[Lesson]) -> str:
+    """Return the lines of the table with a title such as `map of nodes`, which was `old`."""
+    kind, _, name = title.partition(' of ')
     if kind not in TABLES:
-        raise ValueError(f'No table is called {what!r}. Name one of {", ".join(TABLES)}.')
+        raise ValueError(f'No table is called {title!r}. Name one of {", ".join(TABLES)}.')
     head, *rows = TABLES[kind](name, old, lessons)
     lines = [
         f'|{"|".join(f" {cell} " if cell else " " for cell in row)}|\n' for row in [head, *rows]
@@ -114,9 +113,9 @@ def _table(what: str, old: str, lessons: list[Lesson]) -> str:
 def _readme(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
     columns = [
         [
-            f'[{one.number} {one.title}](notebooks/{one.file})'
-            for one in lessons
-            if _is_in(one, part)
+            f'[{lesson.number} {lesson.title}](notebooks/{lesson.file})'
+            for lesson in lessons
+            if _is_in(lesson, part)
         ]
         for part in PARTS
     ]
@@ -132,27 +131,32 @@ def _map(part: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
         raise ValueError(f'The map has no part {part!r}. Name one of {", ".join(PARTS)}.')
     return [
         ['lesson', 'you can then', 'minutes'],
-        *([one.next_link, one.can, str(one.minutes)] for one in lessons if _is_in(one, part)),
+        *(
+            [lesson.next_link, lesson.can, str(lesson.minutes)]
+            for lesson in lessons
+            if _is_in(lesson, part)
+        ),
     ]
 
 
 def _leave_out(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
-    rows = [[one.number, one.leave_out] for one in lessons if one.leave_out]
+    rows = [[lesson.number, lesson.leave_out] for lesson in lessons if lesson.leave_out]
     return [['lesson', ''], *rows]
 
 
 def _timetable(_name: str, old: str, lessons: list[Lesson]) -> list[list[str]]:
-    by_path = {f'notebooks/{one.file}': one for one in lessons}
+    by_path = {f'notebooks/{lesson.file}': lesson for lesson in lessons}
     at, table = 0, [['from', 'minutes', '']]
-    for minutes, what in ROW.findall(old):
-        if link := LINK.match(what):
+    for minutes, event in ROW.findall(old):
+        if link := LINK.match(event):
             _, path, first, last = link.groups()
             if path not in by_path:
                 raise ValueError(f'A timetable names {path}, which is not there.')
             steps = (int(first), int(last or first)) if first else None
             minutes = by_path[path].minutes_of(steps)
-            what = f'[{by_path[path].number} {by_path[path].title}]{what[what.index("](") + 1 :]}'
-        table.append([_time(at), str(minutes), what])
+            title = f'{by_path[path].number} {by_path[path].title}'
+            event = f'[{title}]{event[event.index("](") + 1 :]}'
+        table.append([_time(at), str(minutes), event])
         at += int(minutes or 0)
     return [*table, [_time(at), '', 'End']]
 

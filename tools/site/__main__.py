@@ -21,8 +21,8 @@ from nbformat import NotebookNode
 from PIL import Image
 from sphinx.cmd.build import build_main
 
-from helpers.notebook.look import LOOK_CSS
-from helpers.replay.levels import level
+from helpers.notebook import LOOK_CSS
+from helpers.replay import level
 from tools.lessons.lesson import (
     FOLDER,
     GLOSSARY,
@@ -37,7 +37,7 @@ from tools.site import free_drive
 
 HERE = Path(__file__).parent
 WORK = ROOT / '.site'
-CLASSROOM = ('tools/classroom/README', 'tools/classroom/HOSTING')
+CLASSROOM = ('classroom/README', 'classroom/HOSTING')
 DOCUMENTS = (
     'README',
     'environment',
@@ -45,7 +45,6 @@ DOCUMENTS = (
     *CLASSROOM,
     'CONTRIBUTING',
     'tools/UPGRADING',
-    'licences',
 )
 FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
@@ -90,9 +89,9 @@ def is_widget(output: NotebookNode) -> bool:
 def _fold(cell: NotebookNode) -> None:
     """Fold the source of a solution, of a check, and of what is folded in JupyterLab."""
     if 'check' in tags(cell) or cell.metadata.get('jupyter', {}).get('source_hidden'):
-        what = next(iter(tags(cell) & {'solution', 'check'}), 'code')
+        kind = next(iter(tags(cell) & {'solution', 'check'}), 'code')
         cell.metadata['mystnb'] = {
-            f'code_prompt_{verb}': f'{verb.capitalize()} the {what}' for verb in ('show', 'hide')
+            f'code_prompt_{verb}': f'{verb.capitalize()} the {kind}' for verb in ('show', 'hide')
         }
         cell.metadata['tags'] = ['hide-input']
 
@@ -100,13 +99,13 @@ def _fold(cell: NotebookNode) -> None:
 def _with_files(text: str, figures: Path) -> str:
     """Write the figures of an output into a folder, and return its HTML with links to them."""
 
-    def write(found: re.Match) -> str:
-        png = b64decode(found['png'])
+    def write(figure: re.Match) -> str:
+        png = b64decode(figure['png'])
         image = Image.open(io.BytesIO(png))
         name = f'{hashlib.sha256(png).hexdigest()[:16]}.webp'
         image.save(figures / name, lossless=True)
         size = f'width="{image.width}" height="{image.height}" loading="lazy"'
-        return f'<img {found["alt"]}{size} src="../_static/figures/{name}"'
+        return f'<img {figure["alt"]}{size} src="../_static/figures/{name}"'
 
     return FIGURE.sub(write, text)
 
@@ -151,36 +150,34 @@ def _linked(pages: Path) -> set[str]:
 
 
 def _parts(known: list[Lesson]) -> dict[str, list[str]]:
-    """Return the pages by the parts of the table of contents."""
     parts: dict[str, list[str]] = {'Start': []} | {part.capitalize(): [] for part in PARTS}
     names = {START: 'Start', GLOSSARY: 'Terms'}
-    for one in known:
-        part = names.get(one.number) or one.part.capitalize()
-        parts.setdefault(part, []).append(f'notebooks/{Path(one.file).stem}')
+    for lesson in known:
+        part = names.get(lesson.number) or lesson.part.capitalize()
+        parts.setdefault(part, []).append(f'notebooks/{Path(lesson.file).stem}')
     return parts | {'Documents': list(DOCUMENTS)}
 
 
 def _first_page() -> str:
     text = (HERE / 'index.md').read_text('utf-8')
-    for name, part in (('{level}', level('save').html()), ('{drive}', free_drive.html())):
-        text = text.replace(name, f'```{{raw}} html\n{part}\n```')
+    for place, html in (('{level}', level('save').html()), ('{drive}', free_drive.html())):
+        text = text.replace(place, f'```{{raw}} html\n{html}\n```')
     return text
 
 
 def main() -> int:
-    """Write the site; return the exit status."""
-    pages, made, site = WORK / 'pages', WORK / 'made', ROOT / 'site'
+    pages, built, site = WORK / 'pages', WORK / 'built', ROOT / 'site'
     try:
         prepare(pages)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1
-    shutil.rmtree(made, ignore_errors=True)
+    shutil.rmtree(built, ignore_errors=True)
     options = ['-q', '-W', '--keep-going', '-E', '-d', f'{WORK}/trees', '-b', 'html']
-    if status := build_main([*options, str(pages), str(made)]):
+    if status := build_main([*options, str(pages), str(built)]):
         return status
     shutil.rmtree(site, ignore_errors=True)
-    made.rename(site)
+    built.rename(site)
     print('site/index.html is written. It needs no network.')
     return 0
 

@@ -36,9 +36,9 @@ REPAIRS = [
 
 def repair(app, pagename, templatename, context, doctree):
     """Let assistive technology read a page; Sphinx calls this for each one."""
-    for part, found, better in REPAIRS:
+    for part, text, better in REPAIRS:
         if part in context:
-            context[part] = context[part].replace(found, better)
+            context[part] = context[part].replace(text, better)
 
 
 def setup(app):

@@ -7,8 +7,6 @@ from pygments.util import ClassNotFound
 
 
 class CellLexer(IPython3Lexer):
-    """A lexer for Pygments."""
-
     def get_tokens_unprocessed(self, text):
         """Yield (index, token, value) of a cell's source."""
         first, newline, rest = text.partition('\n')

@@ -1,0 +1,654 @@
+"""What the tasks of the lesson "Test a node" are judged by: the student's tests test the tests.
+
+The sources below are versions of what the student tests, right ones and wrong ones.
+"""
+
+import re
+from functools import partial
+
+from lifecycle_msgs.srv import GetState
+from rclpy.lifecycle import TransitionCallbackReturn
+
+from helpers.checks.bench import Bench
+from helpers.checks.planted import run_tests
+from helpers.checks.tasks import Tasks, once
+
+tasks = Tasks()
+check = tasks.check
+
+PACKAGE = 'src/brake_pkg'
+
+
+def planted(source, old, new):
+    """Return the source with a bug in it."""
+    assert source.count(old) == 1, old
+    return source.replace(old, new)
+
+
+def is_caught(runs, name):
+    """Return the test of a point: the student's tests must fail for this version."""
+
+    def test():
+        run = runs()[name]
+        return run.fails or f'pytest: {run.says}'
+
+    return test
+
+
+def all_pass(runs, names):
+    """Return the test of a point: the student's tests must pass for these versions."""
+
+    def test():
+        wrong = [name for name in names if not runs()[name].passes]
+        return not wrong or f'with {names[wrong[0]]} pytest: {runs()[wrong[0]].says}'
+
+    return test
+
+
+# --- Task 1: a function
+
+SPEED = """import math
+def safe_speed(distance_m, full_mps=0.25):
+    if math.isnan(distance_m):
+        return 0.0
+    return full_mps * min(1.0, max(0.0, 2 * (distance_m - 0.5)))
+"""
+WRONG_SPEEDS = {
+    'drives on near a wall': planted(
+        SPEED, 'max(0.0, 2 * (distance_m - 0.5))', 'abs(2 * distance_m - 1)'
+    ),
+    'has no slow zone': planted(SPEED, '2 * (distance_m - 0.5)', 'distance_m > 0.5'),
+    'treats nan as free': planted(SPEED, 'return 0.0', 'return full_mps'),
+    'stops if nothing is in sight': planted(SPEED, 'isnan(distance_m)', 'isfinite(distance_m) - 1'),
+    'still moves at 0.5 m': planted(SPEED, 'max(0.0', '(distance_m >= 0.5) * max(0.1'),
+}
+
+
+@tasks.add(1, limit_s=60)
+def test_the_function(workspace, tests):
+    versions = {'our': '', 'another': SPEED, **WRONG_SPEEDS}
+    runs = once(lambda: run_tests(workspace, PACKAGE, tests, 'brake_pkg.speed', versions))
+    right = {'our': 'our function', 'another': 'another function'}
+    return [
+        ('it passes for two right functions', all_pass(runs, right), 'Is each row what it says?'),
+        *(
+            (f'it fails for one that {name}', is_caught(runs, name), 'A row for this case.')
+            for name in WRONG_SPEEDS
+        ),
+    ]
+
+
+# --- Task 2: a fixture
+
+BRAKE = """from geometry_msgs.msg import Twist
+from rclpy.node import Node
+from sensor_msgs.msg import Range
+
+from brake_pkg.speed import safe_speed
+
+
+class Brake(Node):
+    def __init__(self):
+        super().__init__('brake')
+        self.publisher = self.create_publisher(Twist, 'cmd_vel', 10)
+        self.subscription = self.create_subscription(Range, 'range', self.range_callback, 10)
+
+    def range_callback(self, message):
+        twist = Twist()
+        twist.linear.x = safe_speed(message.range)
+        self.publisher.publish(twist)
+"""
+ALONE = """import os, pytest, rclpy
+from domain_coordinator import domain_id
+
+before = []
+
+def test_alone(bench):
+    number = bench.node.context.get_domain_id()
+    assert number != int(os.environ['ROS_DOMAIN_ID']), 'it is in the domain of this notebook'
+    with pytest.raises(RuntimeError), domain_id(selector=lambda: number):
+        assert not number, 'another test can take its domain'
+
+@pytest.mark.parametrize('one', [1, 2])
+def test_again(bench, one):
+    before.append(bench)
+
+def test_again_ends():
+    assert not rclpy.ok(), 'rclpy is not shut down after a test'
+    for node in before[0].brake, before[0].node:
+        assert not list(node.publishers), f'the node {node.get_name()} is still there after a test'
+"""
+
+
+@tasks.add(2, limit_s=60)
+def a_domain_of_its_own(workspace):
+    @once
+    def runs():
+        workspace.write(f'{PACKAGE}/test/alone.py', ALONE)
+        versions = {'alone': BRAKE, 'again': BRAKE}
+        try:
+            return run_tests(
+                workspace, PACKAGE, 'test/alone.py', 'brake_pkg.brake', versions, only=True
+            )
+        finally:
+            workspace.file(f'{PACKAGE}/test/alone.py').unlink()
+
+    def passes(name):
+        return lambda: runs()[name].passes or f'with our test, {runs()[name].says}'
+
+    inside = 'with domain_id() as number: all other lines are in it.'
+    after = 'After yield: destroy_node(), twice, and shutdown().'
+    return [
+        ('its domain is its own', passes('alone'), inside),
+        ('it clears up after each test', passes('again'), after),
+    ]
+
+
+# --- Tasks 3 and 5: a flaky test
+
+BUSY = (
+    BRAKE
+    + """
+import itertools, time
+Quick, tests = Brake, itertools.count(1)
+
+class Brake(Quick):
+    def __init__(self):
+        super().__init__()
+        self.other_work_s = 0 if next(tests) % 3 else 0.4
+
+    def range_callback(self, message):
+        time.sleep(self.other_work_s)
+        super().range_callback(message)
+"""
+)
+LATE = (
+    BRAKE
+    + """
+Quick = Brake
+
+class Brake(Quick):
+    def create_subscription(self, *arguments):
+        def connect():
+            late.cancel()
+            Quick.create_subscription(self, *arguments)
+
+        late = self.create_timer(0.4, connect)
+"""
+)
+
+
+def run_busy(workspace, tests='test/test_brake.py'):
+    """Run the tests of a brake on a busy computer: in every third test it gets less CPU time."""
+    versions = {'busy': BUSY}
+    runs = run_tests(workspace, PACKAGE, tests, 'brake_pkg.brake', versions, most_failures=9)
+    return runs['busy']
+
+
+@tasks.add(3, limit_s=60)
+def catch_it(workspace, tests):
+    busy = once(lambda: run_busy(workspace, tests))
+
+    def runs_nine_times():
+        run = busy()
+        count = run.passed + len(run.failed)
+        return count == 9 or f'number of runs: {count}; pytest: {run.says}'
+
+    def is_flaky():
+        run = busy()
+        return (run.passed > 0 and run.fails) or f'all runs are alike: {run.says}'
+
+    parametrize = "@pytest.mark.parametrize('again', range(9)), and (bench, again)"
+    return [
+        ('pytest runs it nine times', runs_nine_times, parametrize),
+        ('some runs pass, and some fail', is_flaky, 'Leave the rest of the test as it is.'),
+    ]
+
+
+# --- Task 4: a wait
+
+WAITS = """import pytest
+from rclpy.executors import SingleThreadedExecutor
+from waiting import wait_until
+import rclpy
+
+CASES = {'events_1': (9, 1, 5), 'events_7': (9, 7, 5), 'at_once': (9, 0, 5), 'in_vain': (3, 4, 1)}
+
+@pytest.mark.parametrize('ticks, wanted, limit_s', CASES.values(), ids=CASES)
+def test_waits(ticks, wanted, limit_s):
+    seen, said = [], 'it returned'
+    rclpy.init()
+    node, executor = rclpy.create_node('ticking'), SingleThreadedExecutor()
+    executor.add_node(node)
+    node.create_timer(0.05, lambda: len(seen) < ticks and seen.append(1))
+    try:
+        wait_until(executor, lambda: len(seen) >= wanted, limit_s)
+    except AssertionError:
+        said = 'it raised AssertionError'
+    node.destroy_node()
+    rclpy.shutdown()
+    right = 'it returned' if wanted <= ticks else 'it raised AssertionError'
+    assert said == right and len(seen) == min(ticks, wanted), f'{said} after {len(seen)} events'
+"""
+
+
+@tasks.add(4, limit_s=60)
+def wait_for_an_event(workspace):
+    @once
+    def runs():
+        workspace.write(f'{PACKAGE}/test/our_waits.py', WAITS)
+        versions = dict.fromkeys(('events', 'at_once', 'in_vain'), '')
+        try:
+            return run_tests(workspace, PACKAGE, 'test/our_waits.py', 'none', versions, only=True)
+        finally:
+            workspace.file(f'{PACKAGE}/test/our_waits.py').unlink()
+
+    def passes(name):
+        return lambda: runs()[name].passes or f'with our test, {runs()[name].says}'
+
+    at_once = 'Ask holds() before you spin.'
+    end = 'time.monotonic() < end, and assert holds().'
+    return [
+        ('it waits for 1 and for 7 events', passes('events'), 'while'),
+        ('it does not wait for what is true already', passes('at_once'), at_once),
+        ('after 1 s without it, it raises AssertionError', passes('in_vain'), end),
+    ]
+
+
+@tasks.add(5, limit_s=60)
+def fix_the_flaky_test(workspace, tests):
+    @once
+    def runs():
+        versions = {
+            'busy': BUSY.replace('0.4', '2'),
+            'late': LATE,
+            'wrong': planted(BRAKE, 'message.range', '9.0'),
+        }
+        return run_tests(workspace, PACKAGE, tests, 'brake_pkg.brake', versions, most_failures=9)
+
+    def passes_nine_times():
+        run = runs()['busy']
+        count = run.passed + len(run.failed)
+        return (run.passed == 9 and run.passes) or f'of {count} runs: {without_run(run.says)}'
+
+    def passes_late():
+        return runs()['late'].passes or without_run(runs()['late'].says)
+
+    return [
+        ('on the busy computer all nine runs pass', passes_nine_times, 'Wait for bench.speeds.'),
+        ('it passes if the brake connects late', passes_late, 'Wait for a subscriber, then send.'),
+        ('it fails for a node that drives on', is_caught(runs, 'wrong'), 'Keep the assert.'),
+    ]
+
+
+def without_run(text):
+    """Leave out which of the nine runs it was: on a busy computer it is another one."""
+    return re.sub(r'(test_\w+)\[.*?\]', r'\1', text)
+
+
+# --- Task 6: colcon
+
+
+@tasks.add(6, limit_s=90)
+def run_them(workspace):
+    def is_run():
+        workspace.terminal('rm -rf build install')
+        result = workspace.build()
+        if not result.ok:
+            return str(result.errors[-1])
+        file = f'{PACKAGE}/test/test_planted.py'
+        workspace.write(file, 'def test_planted():\n    assert 1 == 2\n')
+        summary = workspace.terminal(
+            'colcon test --packages-select brake_pkg > test.txt 2>&1; colcon test-result | tail -1'
+        )
+        workspace.file(file).unlink()
+        counts = {word: int(n) for n, word in re.findall(r'(\d+) (\w+?)s?\b', summary)}
+        right = counts['test'] > 2 and counts['failure'] == 1 and not counts['error']
+        return right or f'it ran {counts["test"]} tests, of which {counts["failure"]} failed'
+
+    def has_executable():
+        printed = workspace.terminal("""source install/setup.bash
+            python -c 'from importlib.metadata import distribution
+for entry in distribution("brake_pkg").entry_points: print(entry.name, entry.value)' 2>&1 | tail -1
+        """)
+        return printed == 'brake brake_pkg.brake:main' or f'it has {printed or "no executable"}'
+
+    return [
+        ('colcon runs pytest', is_run, "extras_require={'test': [...]}"),
+        ('it has the executable brake', has_executable, "'brake = brake_pkg.brake:main'"),
+    ]
+
+
+# --- Task 7: a lifecycle
+
+OURS = """import pytest
+from rcl_interfaces.msg import Log
+from rclpy.lifecycle import TransitionCallbackReturn as Return
+from rclpy.parameter import Parameter
+from waiting import wait_until
+
+def say(bench, *distances):
+    wait_until(bench.executor, bench.sensor.get_subscription_count)
+    wait_until(bench.executor, lambda: bench.node.count_publishers('cmd_vel'))
+    for distance in distances:
+        bench.send(distance)
+
+def up(bench):
+    assert bench.brake.trigger_configure() == Return.SUCCESS
+    assert bench.brake.trigger_activate() == Return.SUCCESS
+    wait_until(bench.executor, bench.sensor.get_subscription_count)
+
+def test_parameter(bench):
+    errors = []
+    bench.node.create_subscription(
+        Log, '/rosout', lambda log: log.level >= 40 and errors.append(log.msg), 100
+    )
+    for wrong in (-1.0, 0.0):
+        bench.brake.set_parameters([Parameter('full_mps', value=wrong)])
+        assert bench.brake.trigger_configure() == Return.FAILURE, f'full_mps {wrong} is accepted'
+    for _ in range(20):
+        if not errors:
+            bench.executor.spin_once(timeout_sec=0.1)
+    assert errors, 'a wrong full_mps is refused, and no error is logged'
+    bench.brake.set_parameters([Parameter('full_mps', value=1.0)])
+    up(bench)
+    say(bench, 9.0)
+    wait_until(bench.executor, lambda: bench.speeds)
+    assert bench.speeds == [1.0]
+
+def test_active(bench):
+    assert bench.brake.trigger_configure() == Return.SUCCESS
+    say(bench, 9.0, 9.0)
+    for _ in range(6):
+        bench.executor.spin_once(timeout_sec=0.1)
+    assert bench.speeds == [], 'it publishes while it is inactive'
+    bench.brake.trigger_activate()
+    say(bench, 0.75, 0.25)
+    wait_until(bench.executor, lambda: len(bench.speeds) >= 2)
+    assert bench.speeds == [0.125, 0.0]
+
+def test_stop(bench):
+    up(bench)
+    say(bench, 9.0)
+    wait_until(bench.executor, lambda: bench.speeds)
+    assert bench.brake.trigger_deactivate() == Return.SUCCESS
+    wait_until(bench.executor, lambda: len(bench.speeds) == 2, 3)
+    assert bench.speeds == [0.25, 0.0]
+
+def test_again(bench):
+    up(bench)
+    assert bench.brake.trigger_deactivate() == Return.SUCCESS
+    assert bench.brake.trigger_cleanup() == Return.SUCCESS
+    assert not bench.brake.count_publishers('cmd_vel'), 'cleanup leaves the publisher'
+    assert not bench.brake.count_subscribers('range'), 'cleanup leaves the subscription'
+    up(bench)
+"""
+OUR_TESTS = {
+    'a wrong full_mps is refused, a right one used': (
+        'parameter',
+        "full_mps = self.get_parameter('full_mps').value. If it is not above 0: log an error, "
+        'and return FAILURE.',
+    ),
+    'it publishes in the state active only': (
+        'active',
+        'self.create_lifecycle_publisher(...), and publish safe_speed(...) in range_callback.',
+    ),
+    'deactivate stops the robot': ('stop', 'Publish Twist() before super().on_deactivate(state).'),
+    'after cleanup it can begin again': ('again', 'Destroy both, and return SUCCESS.'),
+}
+
+
+@tasks.add(7, limit_s=60)
+def a_brake_with_a_lifecycle(workspace):
+    @once
+    def runs():
+        workspace.write(f'{PACKAGE}/test/ours.py', OURS)
+        versions = {name: '' for name, _ in OUR_TESTS.values()}
+        try:
+            return run_tests(
+                workspace, PACKAGE, 'test/ours.py', 'brake_pkg.brake', versions, only=True
+            )
+        finally:
+            workspace.file(f'{PACKAGE}/test/ours.py').unlink()
+
+    def passes(name):
+        def test():
+            run = runs()[name]
+            if "no attribute 'to_label'" in run.says:
+                return 'a method on_... returned None. Is there a return?'
+            return run.passes or f'with our test, {run.says}'
+
+        return test
+
+    return [(what, passes(name), hint) for what, (name, hint) in OUR_TESTS.items()]
+
+
+# --- Task 8: a step that fails
+
+
+class Device:
+    """A camera without hardware. The calls in `broken` raise an OSError."""
+
+    def __init__(self, *broken):
+        self.broken, self.calls = broken, []
+
+    def _call(self, name):
+        self.calls.append(name)
+        if name in self.broken:
+            raise OSError(f'{name}: no camera')
+
+    def __getattr__(self, name):
+        if name in ('open', 'start', 'close'):
+            return partial(self._call, name)
+        raise AttributeError(name)
+
+
+def state_after(make_camera, device, *steps):
+    """Trigger steps of a new camera, as long as they succeed.
+
+    Return its state, the result of the last step, and what it has logged as an error. What a step
+    raises, and is no OSError of the device, is raised here: rclpy tells nobody.
+    """
+    raised = []
+    with Bench() as bench:
+        camera = _watched(make_camera, raised)(device)
+        results = []
+        for step in steps:
+            if not results or results[-1] == TransitionCallbackReturn.SUCCESS:
+                results.append(getattr(camera, f'trigger_{step}')())
+        bench.spin(camera)
+        answer = bench.call('/camera/get_state', GetState, limit_s=10)
+        errors = [line for line in bench.log('camera') if line.startswith('[ERROR]')]
+    if raised:
+        raise raised[0]
+    return answer.current_state.label, results[-1].name, errors
+
+
+def _watched(Camera, raised):
+    def watched(name):
+        method = getattr(Camera, name)
+
+        def step(self, state):
+            try:
+                return method(self, state)
+            except OSError:
+                raise
+            except Exception as error:
+                raised.append(error)
+                raise
+
+        return step
+
+    names = 'on_configure', 'on_activate', 'on_error'
+    return type('Camera', (Camera,), {name: watched(name) for name in names})
+
+
+@tasks.add(8)
+def a_camera_that_fails(Camera):
+    def ends(broken, steps, wanted_state, *calls):
+        device = Device(*broken)
+        state, result, _ = state_after(Camera, device, *steps)
+        if device.calls != list(calls):
+            return f'it called {", ".join(device.calls) or "nothing"}'
+        return state == wanted_state or f'it is {state}, and the step returned {result}'
+
+    def is_failure():
+        state, result, errors = state_after(Camera, Device('open'), 'configure')
+        if result != 'FAILURE':
+            return f'on_configure returned {result}'
+        if not errors:
+            return 'it logs no error'
+        return ends(['open'], ['configure'], 'unconfigured', 'open')
+
+    up = 'configure', 'activate'
+    opens = ('open', 'start')
+    return [
+        (
+            'it opens and starts the device',
+            lambda: ends([], up, 'active', *opens),
+            'self.device.start(), and return super().on_activate(state)',
+        ),
+        (
+            'without a camera, configure is a FAILURE, with an error in the log',
+            is_failure,
+            'try, and except OSError as error: self.get_logger().error(str(error))',
+        ),
+        (
+            'a start that fails closes it',
+            lambda: ends(['start'], up, 'unconfigured', *opens, 'close'),
+            'self.device.close() in on_error, and return SUCCESS',
+        ),
+    ]
+
+
+# --- Task 9: the running node
+
+
+@tasks.add(9)
+def make_it_active(workspace):
+    def is_active():
+        state = workspace.terminal('ros2 lifecycle get /brake')
+        return state == 'active [3]' or f'its state is {state}'
+
+    return [('the node is active', is_active, 'configure, then activate.')]
+
+
+# --- Task 10: six bugs
+
+RIGHT_NODE = """from geometry_msgs.msg import Twist
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from sensor_msgs.msg import Range
+
+from brake_pkg.speed import safe_speed
+
+
+class Brake(LifecycleNode):
+    def __init__(self):
+        super().__init__('brake')
+        self.declare_parameter('full_mps', 0.25)
+
+    def on_configure(self, state):
+        self.full_mps = self.get_parameter('full_mps').value
+        if self.full_mps <= 0:
+            self.get_logger().error('full_mps must be above 0')
+            return TransitionCallbackReturn.FAILURE
+        self.publisher = self.create_lifecycle_publisher(Twist, 'cmd_vel', 10)
+        self.subscription = self.create_subscription(Range, 'range', self.range_callback, 10)
+        return TransitionCallbackReturn.SUCCESS
+
+    def range_callback(self, message):
+        twist = Twist()
+        twist.linear.x = safe_speed(message.range, self.full_mps)
+        self.publisher.publish(twist)
+
+    def on_deactivate(self, state):
+        self.publisher.publish(Twist())
+        return super().on_deactivate(state)
+
+    def on_cleanup(self, state):
+        self.destroy_lifecycle_publisher(self.publisher)
+        self.destroy_subscription(self.subscription)
+        return TransitionCallbackReturn.SUCCESS
+"""
+OTHER_NODE = """from geometry_msgs.msg import Twist, Vector3
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn as Return
+from sensor_msgs.msg import Range
+from brake_pkg import speed
+
+
+class Brake(LifecycleNode):
+    def __init__(self):
+        super().__init__('brake')
+        self.full = self.declare_parameter('full_mps', 0.25)
+        self.active, self.parts = False, []
+
+    def on_configure(self, state):
+        self.full = self.get_parameter('full_mps').value
+        if not self.full > 0:
+            return Return.FAILURE
+        out = self.create_publisher(Twist, 'cmd_vel', 10)
+        self.say = lambda x: out.publish(Twist(linear=Vector3(x=x)))
+        self.parts = [out, self.create_subscription(Range, 'range', self.hear, 10)]
+        return Return.SUCCESS
+
+    def hear(self, message):
+        if self.active:
+            self.say(float(speed.safe_speed(message.range, self.full)))
+
+    def on_activate(self, state):
+        self.active = True
+        return Return.SUCCESS
+
+    def on_deactivate(self, state):
+        self.active = False
+        self.say(0.0)
+        return Return.SUCCESS
+
+    def on_cleanup(self, state):
+        self.destroy_publisher(self.parts[0])
+        self.destroy_subscription(self.parts[1])
+        return Return.SUCCESS
+"""
+BUGS = {
+    'drives on before a wall': ('safe_speed(message.range, self.full_mps)', 'self.full_mps'),
+    'ignores full_mps': ('message.range, self.full_mps', 'message.range'),
+    'publishes while it is inactive': ('create_lifecycle_publisher', 'create_publisher'),
+    'does not stop at deactivate': ('        self.publisher.publish(Twist())\n', ''),
+    'takes a negative full_mps': ('self.full_mps <= 0', 'self.full_mps == 0'),
+    'answers twice after cleanup': ('        self.destroy_subscription(self.subscription)\n', ''),
+}
+HINTS = {
+    'drives on before a wall': 'Send a distance below 0.5 m: the speed must be 0.0.',
+    'ignores full_mps': 'start(bench, full_mps=0.5): then 9.0 m is answered by 0.5.',
+    'publishes while it is inactive': 'Configure it, send 9.0, spin; activate it, send 0.75: the '
+    'first command must be 0.125.',
+    'does not stop at deactivate': 'After trigger_deactivate(), wait for one more speed: 0.0.',
+    'takes a negative full_mps': 'Set full_mps to -1.0: trigger_configure() must return FAILURE.',
+    'answers twice after cleanup': 'Start it, clean it up, start it again, and send two '
+    'distances: two answers, in their order.',
+}
+
+
+@tasks.add(10, limit_s=90)
+def find_six_bugs(workspace, tests):
+    @once
+    def runs():
+        versions = {'right': RIGHT_NODE, 'other': OTHER_NODE}
+        versions |= {bug: planted(RIGHT_NODE, old, new) for bug, (old, new) in BUGS.items()}
+        return run_tests(workspace, PACKAGE, tests, 'brake_pkg.brake', versions)
+
+    right = {'right': 'the right node', 'other': 'another right node'}
+
+    def finds(bug):
+        def test():
+            if not all(runs()[name].passes for name in right):
+                return 'not judged: your tests must first pass for the right nodes'
+            return is_caught(runs, bug)()
+
+        return test
+
+    own = 'Use no name of your own node. Hear the 0.0 of deactivate first.'
+    return [
+        ('they pass for two right nodes', all_pass(runs, right), own),
+        *((f'they fail for one that {bug}', finds(bug), HINTS[bug]) for bug in BUGS),
+    ]

@@ -1,0 +1,126 @@
+"""Runs the student's tests with right and with wrong versions of what they test.
+
+A good test passes for each right version, and fails for each in which a bug was planted.
+
+    runs = run_tests(workspace, 'src/brake_pkg', 'test/test_speed.py', 'brake_pkg.speed',
+                     {'right': RIGHT, 'wrong': RIGHT.replace('<=', '<')})
+    runs['right'].passes, runs['wrong'].says
+"""
+
+from __future__ import annotations
+
+import json
+import linecache
+import os
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+RUNNER = Path(__file__).with_name('planted_runner.py')
+LONGEST = 160  # characters of a message
+
+
+@dataclass
+class Failure:
+    """A test that failed: its name, the line of the student, and what pytest says."""
+
+    test: str
+    file: str
+    line: int
+    message: str
+
+    def __str__(self) -> str:
+        source = linecache.getline(self.file, self.line).strip()
+        name = os.path.basename(self.file)
+        place = f', line {self.line} of {name}: {source}' if source else ''
+        message = ' '.join(self.message.splitlines()[0].split()) if self.message else ''
+        # pytest repeats the line of an assert, with its values.
+        return f'{self.test} fails{place}. {message[:LONGEST]}'.rstrip('. ')
+
+
+@dataclass
+class TestRun:
+    """What pytest says of one version: how many tests passed, which failed, or what is wrong."""
+
+    passed: int = 0
+    failed: list[Failure] = field(default_factory=list)
+    problem: str = ''
+
+    @property
+    def passes(self) -> bool:
+        """Whether there were tests, and all have passed."""
+        return self.passed > 0 and not self.failed and not self.problem
+
+    @property
+    def fails(self) -> bool:
+        """Whether a test ran and failed. Tests that cannot run do not find a bug."""
+        return bool(self.failed)
+
+    @property
+    def says(self) -> str:
+        """The result in words."""
+        if self.problem:
+            return self.problem
+        return str(self.failed[0]) if self.failed else 'all tests pass'
+
+
+def run_tests(
+    workspace,
+    package: str,
+    tests: str,
+    module: str,
+    versions: dict[str, str],
+    only: bool = False,
+    most_failures: int = 1,
+) -> dict[str, TestRun]:
+    """Run a file of tests with each version of a module: its source, '' for the student's own.
+
+    `package` is the folder of the package in the workspace, `tests` a file in it. With `only`, the
+    name of each version chooses the tests that it is for. A run ends after `most_failures`.
+    """
+    arguments = [f'--maxfail={most_failures}', f'{package}/{tests}']
+    task = {
+        'path': package,
+        'module': module,
+        'arguments': arguments,
+        'versions': {
+            name: {'source': source, 'keyword': name if only else ''}
+            for name, source in versions.items()
+        },
+    }
+    workspace.write('.versions.json', json.dumps(task))
+    for file in (workspace.path / package).rglob('*.py'):
+        linecache.checkcache(str(file))
+    command = f'PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 python -B {RUNNER} .versions.json'
+    printed = workspace.terminal(command)
+    try:
+        results = json.loads(printed.splitlines()[-1])
+    except (IndexError, ValueError):
+        return dict.fromkeys(versions, TestRun(problem=f'pytest does not run: {printed[-200:]}'))
+    return {name: _test_run(result, workspace.path) for name, result in results.items()}
+
+
+def _test_run(result: dict, folder: Path) -> TestRun:
+    if result['code'] == -1:
+        return TestRun(problem='a test does not end')
+    if result['code'] == -2:
+        return TestRun(problem='a test ends Python itself')
+    failed = [
+        Failure(entry['test'], str(folder / entry['file']), entry['line'], entry['message'])
+        for entry in result['failed']
+    ]
+    run = TestRun(result['passed'], failed)
+    if result['problems']:
+        run.problem = f'a file cannot be read: {_reason(result["problems"][0])}'
+    elif result['code'] == 5:
+        run.problem = 'there are no tests'
+    return run
+
+
+def _reason(problem: str) -> str:
+    """Return the error in what pytest prints of a file that it cannot import."""
+    errors = re.findall(r'^(?:E +)?([A-Z]\w*(?:Error|Exception).*|E +.*)$', problem, re.MULTILINE)
+    place = re.search(r'^(\S+\.py):(\d+): in <module>', problem, re.MULTILINE)
+    where = f' (line {place[2]} of {os.path.basename(place[1])})' if place else ''
+    lines = errors[-1:] or problem.strip().splitlines()[-1:]
+    return lines[-1].removeprefix('E').strip()[:LONGEST] + where

@@ -1,0 +1,120 @@
+"""Runs tests with several versions of a module, each in a process of its own, all at once.
+
+A script for `planted.py`, which starts it in the workspace. It imports nothing of helpers, since
+the tests must run as they would on a robot. Its one argument names a JSON file:
+
+    {"path": "src/brake_pkg", "module": "brake_pkg.brake", "arguments": ["-x", "test_brake.py"],
+     "versions": {"right": {"source": "class Brake...", "keyword": ""}, ...}}
+
+A version with a source replaces the module; a keyword chooses tests, as pytest's -k. The last line
+that it prints is the result of each version, as JSON: how many tests passed, and which failed.
+"""
+
+import time
+
+START = time.monotonic()
+
+import io  # noqa: E402
+import json  # noqa: E402
+import multiprocessing  # noqa: E402
+import sys  # noqa: E402
+import types  # noqa: E402
+from contextlib import redirect_stdout  # noqa: E402
+
+# Slow imports, before the processes fork. numpy and rclpy are here for the tests.
+import numpy  # noqa: E402, F401
+import pytest  # noqa: E402
+import rclpy  # noqa: E402, F401
+
+
+class Reports:
+    """A plugin of pytest that keeps what passed and what failed."""
+
+    def __init__(self):
+        self.passed, self.failed, self.problems = 0, [], []
+
+    def pytest_runtest_logreport(self, report):
+        """Count a test that passed, and keep where one failed: in itself or in a fixture."""
+        if report.when == 'call' and report.passed:
+            self.passed += 1
+        if report.failed:
+            crash = getattr(report.longrepr, 'reprcrash', None)
+            entry = _entry_of_the_test(report) or crash
+            self.failed.append(
+                {
+                    'test': report.nodeid.partition('::')[2] or report.nodeid,
+                    'file': str(getattr(entry, 'path', '')),
+                    'line': getattr(entry, 'lineno', 0),
+                    'message': crash.message if crash else str(report.longrepr),
+                }
+            )
+
+    def pytest_collectreport(self, report):
+        """Keep why a file cannot be read."""
+        if report.failed:
+            self.problems.append(str(report.longrepr))
+
+
+def _entry_of_the_test(report):
+    """Return the place in the test file at which the test failed, and not in what it called."""
+    traceback = getattr(report.longrepr, 'reprtraceback', None)
+    file = report.nodeid.partition('::')[0].rpartition('/')[2]
+    for entry in reversed(getattr(traceback, 'reprentries', [])):
+        place = getattr(entry, 'reprfileloc', None)
+        if place and place.path.endswith(file):
+            return place
+    return None
+
+
+def run(version, module, arguments, path, answer):
+    """Run the tests with one version, and send what came out."""
+    sys.path.insert(0, path)
+    if version['source']:
+        sys.modules[module] = types.ModuleType(module)
+        exec(version['source'], sys.modules[module].__dict__)
+    keyword = ['-k', version['keyword']] if version['keyword'] else []
+    reports = Reports()
+    with redirect_stdout(io.StringIO()):
+        code = pytest.main(
+            ['-q', '-p', 'no:cacheprovider', *keyword, *arguments], plugins=[reports]
+        )
+    answer.send(
+        {
+            'code': int(code),
+            'passed': reports.passed,
+            'failed': reports.failed,
+            'problems': reports.problems,
+        }
+    )
+
+
+def main():
+    """Run all versions, and print the results."""
+    del sys.path[0]  # the folder of this script
+    with open(sys.argv[1]) as file:
+        task = json.load(file)
+    # Longer on a busy computer.
+    end = time.monotonic() + min(45, 12 + 15 * (time.monotonic() - START))
+    fork = multiprocessing.get_context('fork')
+    running = []
+    for name, version in task['versions'].items():
+        here, there = fork.Pipe(duplex=False)
+        arguments = version, task['module'], task['arguments'], task['path'], there
+        process = fork.Process(target=run, args=arguments)
+        process.start()
+        there.close()
+        running.append((name, process, here))
+    results = {}
+    for name, process, answer in running:
+        try:
+            in_time = answer.poll(max(0, end - time.monotonic()))
+            results[name] = answer.recv() if in_time else {'code': -1}
+        except EOFError:  # the test has ended the whole process
+            results[name] = {'code': -2}
+        process.kill()
+        process.join()
+    print(json.dumps(results))
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,252 @@
+"""The verdict on a task: its text, its data, its card, and what becomes of the student's code."""
+
+import threading
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from support.kernel import Kernel
+
+from helpers.checks import tasks as module
+from helpers.checks.tasks import NOT_TRIED, Tasks, once
+from helpers.checks.verdict import AGAIN, Point, Verdict, bundle
+
+
+@pytest.fixture
+def number(request):
+    """A number of its own for each test: the tries at a task are counted by its number."""
+    return hash(request.node.name)
+
+
+def judged(capsys, number, *points, answer=None, **limits):
+    """Return the lines that a check of these points prints."""
+    tasks = Tasks()
+    tasks.add(number, **limits)(lambda answer: list(points))
+    tasks.check(number, answer)
+    return capsys.readouterr().out.splitlines()
+
+
+def tried(capsys, number, second=True):
+    return judged(
+        capsys,
+        number,
+        ('the group is Reentrant', lambda: True, 'Look at the second argument.'),
+        ('no message is lost', lambda: second, 'Count the threads.'),
+    )
+
+
+def test_hints_appear_at_the_second_wrong_try(capsys, number):
+    first = ['[ok] the group is Reentrant', '[not yet] no message is lost']
+    assert tried(capsys, number, second=False) == [*first, f'Task {number}: 1 of 2. {AGAIN}']
+    assert 'Hint' not in str(tried(capsys, number + 1, second=False))
+    hint = '    Hint: Count the threads.'
+    assert tried(capsys, number, second=False) == [*first, hint, f'Task {number}: 1 of 2. {AGAIN}']
+
+
+def test_a_second_run_prints_the_same(capsys, number):
+    # Starter, then solution, as in a notebook that is run from top to bottom.
+    runs = [(tried(capsys, number, second=False), tried(capsys, number)) for _ in range(3)]
+    assert runs[0] == runs[1] == runs[2]
+    assert runs[0][1][-1] == f'Task {number}: 2 of 2. All done.'
+
+
+class Group:
+    def add(self, timer): ...
+
+
+def test_what_the_code_did_is_said_with_its_line(capsys, number):
+    def broken():
+        raise RuntimeError(f'no {object()!r}\nmore')
+
+    def hidden():  # as publish() does for a float in an Int32
+        raise SystemError('returned a result with an exception set') from TypeError('a float')
+
+    def in_a_thread():
+        thread = threading.Thread(target=broken)
+        thread.start()
+        thread.join()
+        return 'nothing came'
+
+    lines = judged(
+        capsys,
+        number,
+        ('2, 4', lambda: 'your node published [1, 2]', ''),
+        ('the node exists', broken, ''),
+        ('it is in a group', lambda: Group.add('a timer'), ''),
+        ('it publishes', hidden, ''),
+        ('it is heard', in_a_thread, ''),
+        ('some', list, ''),
+        ('equal', lambda: np.bool_(True), ''),
+    )
+    text = ' '.join(' '.join(lines).split())
+    assert 'Found: your node published [1, 2] [not yet] the node exists' in text
+    line = "of test_tasks.py: raise RuntimeError(f'no {object()!r}\\nmore')"
+    number_of_line = broken.__code__.co_firstlineno + 1
+    assert f'RuntimeError: no <object object> more. Line {number_of_line} {line}' in text
+    assert "Group.add() missing 1 required positional argument: 'timer'. Did you forget ()" in text
+    assert 'Found: TypeError: a float [not yet] it is heard' in text
+    assert 'Found: nothing came A thread of yours ended with RuntimeError: no' in text
+    assert '[not yet] some [ok] equal' in text
+    assert lines[-1] == f'Task {number}: 1 of 7. {AGAIN}'
+
+
+def test_after_an_endless_point_the_others_wait(capsys, number):
+    waits = ('it waits', threading.Event().wait, '')
+    lines = judged(capsys, number, waits, ('and again', lambda: True, ''), limit_s=0.3)
+    text = ' '.join(' '.join(lines).split())
+    assert 'TimeoutError: it did not end. Is there an endless loop' in text
+    assert f'[not yet] and again Found: {NOT_TRIED}' in text
+
+
+def test_what_it_prints_is_shown_and_bounded(capsys, number):
+    def talk():
+        print('my own line')
+        print('x' * 100_000)
+        return True
+
+    lines = judged(capsys, number, ('it talks', talk, ''))
+    assert lines[0] == 'my own line'
+    assert lines[-1].endswith('All done.')
+    assert sum(map(len, lines)) < 25_000
+
+
+def test_interrupt_is_no_try(capsys, number, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(module.Apart, '__iter__', interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            tried(capsys, number)
+    assert 'Hint' not in str(tried(capsys, number, second=False))
+
+
+def test_long_lines_are_broken_at_blanks(capsys, number):
+    words = ' '.join(f'word{count}' for count in range(40))
+    for _ in range(2):
+        lines = judged(capsys, number, (words, lambda: words, words))
+        assert max(map(len, lines)) <= 94
+    assert ' '.join(' '.join(lines).split()).count(words) == 3
+
+
+def test_what_several_points_look_at_is_made_once():
+    made = []
+    build = once(lambda: made.append(1) or 'built')
+    assert (build(), build(), made) == ('built', 'built', [1])
+
+    @once
+    def broken():
+        made.append(2)
+        raise ValueError('no')
+
+    for _ in range(2):
+        with pytest.raises(ValueError, match='no'):
+            broken()
+    assert made == [1, 2]
+
+
+def test_an_unknown_task_is_a_sentence():
+    tasks = Tasks()
+    tasks.add(1)(list)
+    with pytest.raises(ValueError, match=r'^This lesson has no task 7: the tasks are \[1\][.]$'):
+        tasks.check(7)
+
+
+# --- Data and card
+
+
+class Tags(HTMLParser):
+    """Keeps the tags that are open, and the text."""
+
+    def __init__(self, source):
+        super().__init__()
+        self.open, self.text = [], ''
+        self.feed(source)
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += f' {data}'
+
+
+def test_data_text_and_card_say_the_same():
+    points = [Point('x < 3', True), Point('it turns', False, 'nothing & more', 'Look.')]
+    data, metadata = bundle(Verdict(3, points))
+    card = Tags(data['text/html'])
+    assert card.open == []
+    for part in ('x < 3', 'it turns', 'Found  nothing & more', 'Hint  Look.', 'Task 3: 1 of 2.'):
+        assert part in card.text
+    assert metadata['ros2_notebooks'] == {
+        'task': 3,
+        'of': 'answer',
+        'solved': False,
+        'points': [
+            {'what': 'x < 3', 'ok': True},
+            {'what': 'it turns', 'ok': False, 'found': 'nothing & more', 'hint': 'Look.'},
+        ],
+    }
+    assert bundle(Verdict(3, points[:1]))[1]['ros2_notebooks']['solved']
+
+
+# --- In a notebook
+
+LESSON = """
+from helpers.checks.tasks import Tasks
+tasks = Tasks()
+check = tasks.check
+
+@tasks.add(1)
+def two_is_two(two):
+    return [('it is 2', lambda: two == 2 or f'it is {two}', 'One and one.')]
+"""
+
+
+def test_a_lesson_goes_on_with_the_code_that_passes():
+    solution = '%%solution 1\ntwo = 1 + 1'
+    with Kernel() as kernel:
+        kernel.run(LESSON)
+        assert 'its check has not' in kernel.run('%%solution 1\nthree = 3')
+        assert '[not yet]' in kernel.run('two = 3\ncheck(1, two)')
+        assert kernel.run(solution) == '[ok] it is 2\nSolution of task 1: 1 of 1.\n'
+        assert [verdict['of'] for verdict in kernel.verdicts] == ['solution']
+        # What the solution gave is not the student's, and stays for the later cells.
+        assert 'This is the code of the solution.' in kernel.run('check(1, two)')
+        assert kernel.run('print(two)') == '2\n'
+        assert 'All done.' in kernel.run('two = 2.0\ncheck(1, two)')
+        assert 'goes on with your code' in kernel.run(solution)
+        assert kernel.run('print(two)') == '2.0\n'
+
+
+def test_a_cell_that_failed_is_not_judged_by_what_it_was_before():
+    with Kernel() as kernel:
+        kernel.run(LESSON)
+        assert 'All done.' in kernel.run('two = 2\ncheck(1, two)')
+        kernel.run('two = 1 + three')
+        said = kernel.run('check(1, two)')
+        assert 'The last cell that defines two ended with an error.' in said
+        assert said.endswith('Task 1: not judged.\n')
+        kernel.run('two = 3')
+        assert 'Found: it is 3' in kernel.run('check(1, two)')
+
+
+def test_a_check_leaves_the_kernel_as_it_was():
+    with Kernel() as kernel:
+        kernel.run(LESSON.replace('two == 2', 'two.append(4)'))
+        assert 'it is [3, 4]' in kernel.run('two = [3]\ncheck(1, two)')
+        assert kernel.run('print(two)') == '[3]\n'
+        assert 'Line 2: return 1 / 0' in kernel.run(
+            'def two():\n    return 1 / 0\ntasks.add(2)(lambda two: [("a", two, "")]); '
+            'check(2, two)'
+        )
+
+
+def test_an_int_in_a_float_field_is_an_error():
+    with Kernel() as kernel:
+        early = 'from geometry_msgs.msg import Vector3\nimport helpers.ros.session\n'
+        assert "The 'x' field must be of type 'float'" in kernel.run(f'{early}Vector3(x=1)')
+        late = 'from sensor_msgs.msg import Range'
+        assert "The 'range' field must" in kernel.run(f'{late}\nRange(range=1)')

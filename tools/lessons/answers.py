@@ -1,0 +1,45 @@
+"""In which notebooks somebody has solved tasks, since the last commit.
+
+python -m tools.lessons.answers          their paths as ruff's settings want them, for `make test`
+"""
+
+import subprocess
+import sys
+
+import nbformat
+
+from tools.lessons.lesson import FOLDER, tags
+
+WRITTEN = {'exercise', 'predict'}  # the tags of the cells in which a student writes
+
+
+def answered() -> list[str]:
+    """Return the file names of the notebooks whose answers differ from those of the last commit.
+
+    Without git, as in a handout, there is nothing to compare with.
+    """
+    changed = _git('diff', '--name-only', '--relative', '--diff-filter=M', 'HEAD').splitlines()
+    return [
+        file
+        for file in changed
+        if file.endswith('.ipynb')
+        and _answers((FOLDER / file).read_text(encoding='utf-8'))
+        != _answers(_git('show', f'HEAD:./{file}'))
+    ]
+
+
+def _answers(text: str) -> dict[str, str]:
+    """Return the sources of the cells in which a student writes, by their id."""
+    cells = nbformat.reads(text, as_version=4).cells
+    return {cell.id: cell.source for cell in cells if WRITTEN & tags(cell)}
+
+
+def _git(*arguments: str) -> str:
+    return subprocess.run(['git', *arguments], cwd=FOLDER, capture_output=True, text=True).stdout
+
+
+if __name__ == '__main__':
+    files = answered()
+    if files:
+        print(f'Answers of yours are in {", ".join(files)}: not read by ruff.', file=sys.stderr)
+    print(', '.join(f"'notebooks/{file}'" for file in files))
