@@ -1,11 +1,10 @@
-"""The checks of programs and builds name the first error: its file, its line, its text."""
+"""The checks of programs name the first error: its file, its line, its text."""
 
 import pytest
 
 from helpers.checks.errors import Failed
 from helpers.checks.programs import (
     error_in,
-    error_of_build,
     error_of_launch,
     launch,
     line_of,
@@ -14,7 +13,6 @@ from helpers.checks.programs import (
     wait_until,
 )
 from helpers.workspace import Workspace
-from helpers.workspace.build_output import lines_that_matter
 
 TRACEBACK = """[INFO] [listener]: I begin
 Traceback (most recent call last):
@@ -57,63 +55,6 @@ def test_of_several_errors_the_first_one_counts_and_of_a_chain_the_last():
 def test_a_program_without_a_traceback_has_said_its_last_line():
     assert error_in(["Package 'x' not found", '']) == "Package 'x' not found"
     assert error_in([]) == 'it printed nothing'
-
-
-CMAKE = """CMake Error at CMakeLists.txt:6 (rosidl_generate_interfaces):
-  Unknown CMake command "rosidl_generate_interfaces".
-
-
-"""
-CMAKE_RUNS_PYTHON = """CMake Error at /opt/ros/rosidl_adapt_interfaces.cmake:57 (message):
-  execute_process(/usr/bin/python -m rosidl_adapter)
-  returned error code 1:
-
-  Traceback (most recent call last):
-
-    File "rosidl_adapter/parser.py", line 851, in parse_service_string
-      raise InvalidServiceSpecification(
-
-  rosidl_adapter.parser.InvalidServiceSpecification: Could not find separator
-  '---' between request and response
-
-Call Stack (most recent call first):
-  CMakeLists.txt:8 (rosidl_generate_interfaces)
-
-
-"""
-GENERATOR = """Traceback (most recent call last):
-  File "/opt/generate.py", line 3, in <module>
-  File "rosidl_generator/__init__.py", line 160, in generate_type_hash
-    pkg_dir = include_map[pkg]
-KeyError: 'sensor_msgs'
-gmake[2]: *** [build.make:76: rosidl_generator] Error 1
-"""
-COMPILER = """src/node.cpp: In function 'int main()':
-src/node.cpp:12:5: error: 'spin' was not declared in this scope
-   12 |     spin(node);
-      |     ^~~~
-src/node.cpp:14:1: error: expected ';'
-make[2]: *** [CMakeFiles/node.dir/build.make:76: node.o] Error 1
-"""
-
-
-@pytest.mark.parametrize(
-    ('text', 'error'),
-    [
-        (CMAKE, 'CMakeLists.txt:6: Unknown CMake command "rosidl_generate_interfaces".'),
-        (
-            CMAKE_RUNS_PYTHON,
-            'CMakeLists.txt:8: rosidl_adapter.parser.InvalidServiceSpecification: Could not find '
-            "separator '---' between request and response",
-        ),
-        (GENERATOR, "rosidl_generator/__init__.py:160: KeyError: 'sensor_msgs'"),
-        (COMPILER, "src/node.cpp:12:5: error: 'spin' was not declared in this scope"),
-        ("error: can't copy 'x': no such file", "error: can't copy 'x': no such file"),
-    ],
-    ids=['cmake', 'python of cmake', 'generator', 'compiler', 'setup.py'],
-)
-def test_the_first_error_of_a_build_has_its_place(text, error):
-    assert error_of_build(lines_that_matter(text)) == error
 
 
 def test_a_launch_names_its_own_error_or_that_of_the_first_program_that_died():

@@ -74,6 +74,7 @@ def test_what_the_code_did_is_said_with_its_line(capsys, number):
         ('the node exists', broken, ''),
         ('it is in a group', lambda: Group.add('a timer'), ''),
         ('it publishes', hidden, ''),
+        ('it is called', lambda: broken('an argument'), ''),
         ('it is heard', in_a_thread, ''),
         ('some', list, ''),
         ('equal', lambda: np.bool_(True), ''),
@@ -84,10 +85,11 @@ def test_what_the_code_did_is_said_with_its_line(capsys, number):
     number_of_line = broken.__code__.co_firstlineno + 1
     assert f'RuntimeError: no <object object> more. Line {number_of_line} {line}' in text
     assert "Group.add() missing 1 required positional argument: 'timer'. Did you forget ()" in text
-    assert 'Found: TypeError: a float [not yet] it is heard' in text
+    assert 'Found: TypeError: a float [not yet] it is called' in text
+    assert 'TypeError: broken() takes 0 positional arguments but 1 was given' in text
     assert 'Found: nothing came A thread of yours ended with RuntimeError: no' in text
     assert '[not yet] some [ok] equal' in text
-    assert lines[-1] == f'Task {number}: 1 of 7. {AGAIN}'
+    assert lines[-1] == f'Task {number}: 1 of 8. {AGAIN}'
 
 
 def test_after_an_endless_point_the_others_wait(capsys, number):

@@ -23,6 +23,10 @@ class Failed(Exception):  # noqa: N818 - a verdict, and no error
     """What a check has found: raised by the bench, shown as it is."""
 
 
+class NeverEnds(Failed):
+    """What a check has found, if each later point of the task would wait as long for the same."""
+
+
 def is_students(filename: str) -> bool:
     """Return whether a file holds code of the student: a cell, or a file of the workspace."""
     if CELL.search(filename):
@@ -61,6 +65,7 @@ def sentence(error: BaseException) -> str:
     place = own_line((frame.filename, frame.lineno or 0) for frame in reversed(frames))
     text = ' '.join(str(error).split('\n\n')[0].split())
     text = re.sub(r' at 0x[0-9a-fA-F]+', '', text)
+    text = re.sub(r'(?:\w+\.<locals>\.)+', '', text)  # of a function in a function: its name only
     name = type(error).__name__
     if isinstance(error, SyntaxError):
         place = f'Line {error.lineno}: {(error.text or "").strip()}' if error.lineno else place

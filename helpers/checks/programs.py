@@ -1,7 +1,7 @@
-"""What the checks of packages and programs share: build, run, and say exactly what went wrong.
+"""What the checks of programs share: run them, and say exactly what went wrong.
 
-A program, a build or a launch says a lot when it fails. These functions find the first error in it:
-its file, its line, its text.
+A program or a launch says a lot when it fails. These functions find the first error in it: its
+file, its line, its text. builds.py does it for builds.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import shutil
 import signal
 import time
 from collections.abc import Callable, Sequence
@@ -18,7 +17,7 @@ from pathlib import Path
 from catkin_pkg.package import InvalidPackage, Package, parse_package
 
 from helpers.checks.errors import Failed, is_students
-from helpers.workspace import BuildResult, Process, Workspace, without_folders
+from helpers.workspace import Process, Workspace, without_folders
 
 POLL_S = 0.02
 DIED = 'process has died'
@@ -54,48 +53,6 @@ def needed(package: Package, moment: str) -> set[str]:
     else:
         depends = package.exec_depends
     return {depend.name for depend in depends}
-
-
-# --- Builds
-
-
-def builds(workspace: Workspace, *packages: str, anew: bool = True) -> bool | str:
-    """Build packages. Return True, or the first error. A warning of colcon counts as one.
-
-    With `anew`, what an earlier build has left is removed before.
-    """
-    for package in packages if anew else ():
-        for folder in 'build', 'install':
-            shutil.rmtree(workspace.file(f'{folder}/{package}'), ignore_errors=True)
-    result = workspace.build(*packages)
-    if result.ok and result.warnings:
-        return ' '.join(result.warnings[-1].split())
-    return result.ok or first_error(result)
-
-
-def first_error(result: BuildResult) -> str:
-    """Return the first error of a build that failed: where it is, and what it says."""
-    return error_of_build(result.errors or result.warnings)
-
-
-def error_of_build(lines: Sequence[str]) -> str:
-    """Return the first error of these lines, which `lines_that_matter` has found."""
-    place, said, margin = '', [], None  # the margin of the traceback that is being read
-    for number, line in enumerate(lines):
-        text, indent = line.strip(), len(line) - len(line.lstrip())
-        if number and re.match(r'CMake Error|\S+:\d+:(\d+:)? (fatal )?error: ', line):
-            break  # the next one
-        if TRACEBACK in line:
-            margin = indent
-        elif margin is not None and indent > margin:
-            if frame := FRAME.match(line):
-                place = f'{frame[1]}:{frame[2]}: '
-        elif cmake := re.match(r'CMake Error at (\S+:\d+)|called from (\S+:\d+)', text):
-            place = f'{cmake[1] or cmake[2]}: '
-        elif not re.match(r' *\d* \| ', line):  # below a compiler's error stands the code
-            margin = None
-            said.append(text)
-    return place + ' '.join(said)
 
 
 # --- Programs

@@ -44,7 +44,7 @@ from IPython.display import display
 
 from helpers.checks import classroom, progress
 from helpers.checks.apart import Apart, Ending
-from helpers.checks.errors import own_line, places, sentence
+from helpers.checks.errors import NeverEnds, own_line, places, sentence
 from helpers.checks.verdict import Point, Verdict, bundle
 from helpers.notebook import frames, somebody_watches
 
@@ -213,12 +213,15 @@ def _worker(points: Callable[[], Sequence[Test]], send: Callable) -> None:
     send(('points', [(what, hint) for what, _, hint in tests]))
     for number, (_, test, _) in enumerate(tests):
         failures.clear()
+        never_ends = False
         try:
             result = test()
             ok, found = (False, result) if isinstance(result, str) else (bool(result), '')
         except BaseException as error:  # whatever a student's code raises is an answer, not right
             ok, found = False, sentence(error)
+            never_ends = isinstance(error, NeverEnds)
         if failures and not ok:
+            found = found if found[-1:] in ('', '.', '!', '?') else f'{found}.'
             found = f'{found} {failures[0]}'.strip()
         if number == len(tests) - 1:
             left = [
@@ -229,6 +232,8 @@ def _worker(points: Callable[[], Sequence[Test]], send: Callable) -> None:
             if left and ok:
                 ok, found = False, _still_runs(left[0])
         send(('point', (ok, found)))
+        if never_ends:
+            break
 
 
 def _still_runs(thread: threading.Thread) -> str:

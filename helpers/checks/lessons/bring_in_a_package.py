@@ -2,7 +2,8 @@
 
 import re
 
-from helpers.checks.programs import builds, error_in, manifest, needed
+from helpers.checks.builds import builds
+from helpers.checks.programs import error_in, manifest, needed
 from helpers.checks.tasks import Tasks, once
 from helpers.workspace import COLLEAGUE
 

@@ -5,8 +5,8 @@ import re
 import signal
 import time
 
+from helpers.checks.builds import builds
 from helpers.checks.programs import (
-    builds,
     end_launch,
     error_in,
     error_of_launch,

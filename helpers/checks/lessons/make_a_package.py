@@ -8,9 +8,9 @@ import psutil
 from std_msgs.msg import String
 
 from helpers.checks.bench import Bench
+from helpers.checks.builds import builds
 from helpers.checks.errors import Failed
 from helpers.checks.programs import (
-    builds,
     error_in,
     line_of,
     manifest,

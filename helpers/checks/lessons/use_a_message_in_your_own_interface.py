@@ -9,7 +9,8 @@ from rosidl_adapter.parser import parse_service_file
 from sensor_msgs.msg import Image
 
 from helpers.checks.bench import Bench
-from helpers.checks.programs import builds, manifest, needed, sourced
+from helpers.checks.builds import builds
+from helpers.checks.programs import manifest, needed, sourced
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import ROOMS, Robot
 from helpers.ros import ros_session
