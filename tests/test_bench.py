@@ -268,3 +268,13 @@ def test_a_node_that_nobody_destroys_leaves_nothing(capsys):
 
     assert '[ok] it works' in verdict_on(make, capsys)
     assert kept == []
+
+
+def test_a_service_without_a_response_is_said(capsys):
+    class Forgets(Node):
+        def __init__(self):
+            super().__init__('forgets')
+            self.create_service(Trigger, 'ask', lambda request, response: None)
+
+    said = verdict_on(Forgets, capsys, lambda bench: bench.call('ask', Trigger))
+    assert 'TypeError: the callback of a service has returned no response of its type' in said

@@ -6,8 +6,10 @@ from helpers.checks.errors import Failed
 from helpers.checks.programs import (
     error_in,
     error_of_launch,
+    launch,
     line_of,
     manifest,
+    started,
     wait_until,
 )
 from helpers.workspace import Workspace
@@ -86,6 +88,16 @@ def test_a_line_of_a_program_comes_or_its_error_does(workspace):
         pytest.raises(Failed, match='python has ended: ModuleNotFoundError'),
     ):
         line_of(process, 'two')
+
+
+def test_a_launch_is_read_until_it_says_enough_and_its_end_is_no_part(workspace):
+    command = "sh -c 'echo hello; exec sleep 100'"
+    file = f'<launch><executable cmd="{command}" output="screen"/></launch>'
+    workspace.write('hello.launch.xml', file)
+    text = launch(workspace, 'hello.launch.xml', lambda text: 'hello' in text)
+    assert started(text) == ['sh']
+    assert text.endswith('[sh-1] hello')
+    assert not workspace.terminals['the launch'].running
 
 
 def test_waiting_says_whether_it_came():

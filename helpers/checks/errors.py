@@ -16,6 +16,12 @@ HELPERS = str(Path(__file__).resolve().parents[1]) + os.sep
 INSTALLED = tuple(
     os.path.realpath(sysconfig.get_path(name)) + os.sep for name in ('stdlib', 'purelib', 'platlib')
 )
+# What rclpy's TypeErrors without a text mean, by the function that raises them.
+WITHOUT_TEXT = {
+    'send_response': 'the callback of a service has returned no response of its type',
+    'call': 'a service is called with something that is no request of its type',
+    'call_async': 'a service is called with something that is no request of its type',
+}
 CELL = re.compile(r'[/\\]ipykernel_\d+[/\\]|^<(?:ipython-input|cell)')
 
 
@@ -72,6 +78,8 @@ def sentence(error: BaseException) -> str:
     text = re.sub(r' at 0x[0-9a-fA-F]+', '', text)
     text = re.sub(r'(?:\w+\.<locals>\.)+', '', text)  # of a function in a function: its name only
     name = type(error).__name__
+    if isinstance(error, TypeError) and not text and frames:
+        text = WITHOUT_TEXT.get(frames[-1].name, '')
     if isinstance(error, SyntaxError):
         place = f'Line {error.lineno}: {(error.text or "").strip()}' if error.lineno else place
     elif isinstance(error, RecursionError):

@@ -61,6 +61,8 @@ def a_file_for_all_floors(workspace, file):
     declared = once(declares)
 
     def starts_without():
+        if declared() is not True:
+            return 'they are not declared as the task says'
         return says(run(workspace, file, *ROBOT_AND_DRIVER, programs=2), *ROBOT_AND_DRIVER)
 
     def passes_on():
