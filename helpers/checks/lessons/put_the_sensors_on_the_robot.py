@@ -321,7 +321,7 @@ def complete_the_package(workspace):
             workspace.write(f'src/small_robot/{name}', text)
 
 
-@tasks.add(7)
+@tasks.add(7, limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
 def fix_three_faults(workspace, settings, StaticBroadcaster):
     drive = once(lambda: drive_by(workspace, StaticBroadcaster, settings, seconds=6))
 
@@ -407,7 +407,7 @@ def compare_types(file):
                 )
 
 
-@tasks.add(8)
+@tasks.add(8, limit_s=90, cpu_s=20)
 def let_it_doubt(workspace, settings, start, StaticBroadcaster):
     def drive(**options):
         return drive_by(workspace, StaticBroadcaster, settings, start, **options)
