@@ -145,6 +145,7 @@ def test_data_files_are_those_of_setup_py(package):
     ('arguments', 'sentence'),
     [
         ("data_files=[('share/robot', 'package.xml')]", 'not a pair of a folder and a list'),
+        ("data_files=[('/share/robot', ['package.xml'])]", 'it must not begin with a /'),
         ("data_files=['package.xml']", 'not a pair of a folder and a list'),
         ('data_files=files', "NameError: name 'files' is not defined"),
         ('data_files=3 3', 'Perhaps you forgot a comma? Line 3 of setup.py: setup('),

@@ -154,4 +154,6 @@ def data_files_of(workspace: Workspace, package: str) -> list[tuple[str, list[st
             and isinstance(pair[1], tuple | list)
         ):
             raise Failed(f'data_files has {pair!r}, not a pair of a folder and a list of files')
+        if pair[0].startswith('/'):
+            raise Failed(f'data_files has the folder {pair[0]}: it must not begin with a /')
     return [(folder, list(files)) for folder, files in pairs]

@@ -82,7 +82,10 @@ def three_sensors(workspace, file):
 
 def described(workspace, file=DESCRIPTION):
     """Return the robot of a URDF. Raises Failed if robot_state_publisher would refuse it."""
-    robot = parsed(workspace.file(file).read_text(encoding='utf-8'))
+    try:
+        robot = parsed(workspace.file(file).read_text(encoding='utf-8'))
+    except SyntaxError as error:  # that of XML, too
+        raise Failed(f'{file.split("/")[-1]} is no XML: {error.msg}') from None
     for kind, things in (('links', robot.links), ('joints', robot.joints)):
         name, count = Counter(thing.name for thing in things).most_common(1)[0]
         if count > 1:
@@ -262,6 +265,7 @@ def data_files(workspace):
     @once
     def installed():
         complete_the_package(workspace)
+        pairs()  # what is wrong with them is said better than by the build
         build(workspace, 'small_robot', anew=True)
         return workspace.file('install/small_robot/share')
 
@@ -316,7 +320,7 @@ def complete_the_package(workspace):
             workspace.write(f'src/small_robot/{name}', text)
 
 
-@tasks.add(7)
+@tasks.add(7, limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
 def fix_three_faults(workspace, settings, StaticBroadcaster):
     drive = once(lambda: drive_by(workspace, StaticBroadcaster, settings, seconds=6))
 
@@ -388,8 +392,8 @@ def compare_types(file):
     if not isinstance(sections, dict):
         raise Failed(f'{file.name} holds no sections, but {sections!r}')
     for name, section in sections.items():
-        parameters = (section or {}).get('ros__parameters') or {}
-        for key, topic in parameters.items():
+        parameters = section.get('ros__parameters') if isinstance(section, dict) else None
+        for key, topic in (parameters if isinstance(parameters, dict) else {}).items():
             wanted = {'odom': 'Odometry', 'imu': 'Imu'}.get(key.rstrip('0123456789'))
             if wanted is None or not key[-1].isdecimal():
                 continue
@@ -402,7 +406,7 @@ def compare_types(file):
                 )
 
 
-@tasks.add(8)
+@tasks.add(8, limit_s=90, cpu_s=20)
 def let_it_doubt(workspace, settings, start, StaticBroadcaster):
     def drive(**options):
         return drive_by(workspace, StaticBroadcaster, settings, start, **options)

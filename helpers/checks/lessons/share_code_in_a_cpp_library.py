@@ -301,7 +301,7 @@ threading.Thread(target=stop_it, daemon=True).start()
 print(m.search(stop, 4.0))"""
 
 
-@tasks.add(6, limit_s=60)
+@tasks.add(6, limit_s=BUILD_S)
 def bind(workspace):
     @once
     def compiled():
