@@ -38,14 +38,15 @@ class Reports:
         if report.when == 'call' and report.passed:
             self.passed += 1
         if report.failed:
-            crash = getattr(report.longrepr, 'reprcrash', None)
-            entry = _entry_of_the_test(report) or crash
+            name = report.nodeid.partition('::')[2] or report.nodeid
+            file, line, message = _place_and_message(report)
             self.failed.append(
                 {
-                    'test': report.nodeid.partition('::')[2] or report.nodeid,
-                    'file': str(getattr(entry, 'path', '')),
-                    'line': getattr(entry, 'lineno', 0),
-                    'message': crash.message if crash else str(report.longrepr),
+                    'test': name,
+                    'ran': report.when == 'call',
+                    'file': file,
+                    'line': line,
+                    'message': message,
                 }
             )
 
@@ -53,6 +54,17 @@ class Reports:
         """Keep why a file cannot be read."""
         if report.failed:
             self.problems.append(str(report.longrepr))
+
+
+def _place_and_message(report):
+    """Return the file and the line where a test failed, and why."""
+    problem = report.longrepr
+    if hasattr(problem, 'argname'):  # an argument of the test is no fixture
+        return str(problem.filename), problem.firstlineno + 1, problem.errorstring.strip()
+    crash = getattr(problem, 'reprcrash', None)
+    place = _entry_of_the_test(report) or crash
+    message = crash.message if crash else str(problem)
+    return str(getattr(place, 'path', '')), getattr(place, 'lineno', 0), message
 
 
 def _entry_of_the_test(report):
