@@ -2,7 +2,7 @@
 
 import pytest
 
-from helpers.checks.planted import run_tests
+from helpers.checks.planted import planted, run_tests
 from helpers.workspace import Workspace
 
 SPEED = 'def speed(distance_m):\n    return 0.25 if distance_m > 0.5 else 0.0\n'
@@ -122,9 +122,15 @@ def test_only_a_test_that_ran_finds_a_bug(runs, name):
     assert runs[name].fails == (name in ('assert', 'deep', 'error', 'row'))
 
 
+@pytest.mark.parametrize('old', ['0.5 m', '0'])
+def test_a_bug_is_planted_where_its_text_is_once(old):
+    with pytest.raises(AssertionError, match=old):
+        planted(SPEED, old, '1')
+
+
 def test_each_version_is_tested(workspace):
     tests = 'from brake_pkg.speed import speed\ndef test_wall():\n    assert speed(0.2) == 0.0\n'
-    wrong = SPEED.replace('else 0.0', 'else 0.1')
+    wrong = planted(SPEED, 'else 0.0', 'else 0.1')
     runs = runs_of(workspace, tests, {'yours': '', 'right': SPEED, 'wrong': wrong})
     assert {name: run.passes for name, run in runs.items()} == {
         'yours': True,

@@ -3,7 +3,7 @@
 A good test passes for each right version, and fails for each in which a bug was planted.
 
     runs = run_tests(workspace, 'src/brake_pkg', 'test/test_speed.py', 'brake_pkg.speed',
-                     {'right': RIGHT, 'wrong': RIGHT.replace('<=', '<')})
+                     {'right': RIGHT, 'wrong': planted(RIGHT, '<=', '<')})
     runs['right'].passes, runs['wrong'].says
 """
 
@@ -66,6 +66,12 @@ class TestRun:
         if self.problem:
             return self.problem
         return str(self.failed[0]) if self.failed else 'all tests pass'
+
+
+def planted(source: str, old: str, new: str) -> str:
+    """Return the source with a bug in it: new text in place of the old, which is there once."""
+    assert source.count(old) == 1, old
+    return source.replace(old, new)
 
 
 def run_tests(
