@@ -79,8 +79,8 @@ SAID = {
     'OSError: no camera',
     'missing': 'test_missing fails, line 38 of test_speed.py: def test_missing(again). '
     "fixture 'again' not found",
-    'endless': 'a test does not end',
-    'exit': 'a test ends Python itself',
+    'endless': 'test_endless does not end',
+    'exit': 'test_exit ends Python itself',
     'skipped': 'no test has run',
     'nothing': 'there are no tests',
 }
@@ -143,6 +143,10 @@ def test_each_version_is_tested(workspace):
 @pytest.mark.parametrize(
     ('tests', 'said'),
     [
+        (
+            'import os\nos._exit(0)\n',
+            'the file of the tests ends Python itself',
+        ),
         (
             'def test_wall(:\n    pass\n',
             'a file cannot be read: SyntaxError: invalid syntax (line 1 of test_speed.py)',

@@ -111,10 +111,10 @@ def run_tests(
 
 
 def _test_run(result: dict, folder: Path) -> TestRun:
-    if result['code'] == -1:
-        return TestRun(problem='a test does not end')
-    if result['code'] == -2:
-        return TestRun(problem='a test ends Python itself')
+    if result['code'] < 0:
+        test = result['test'] or 'the file of the tests'
+        ending = 'does not end' if result['code'] == -1 else 'ends Python itself'
+        return TestRun(problem=f'{test} {ending}')
     failed = [
         Failure(**entry | {'file': str(folder / entry['file'])}) for entry in result['failed']
     ]
