@@ -24,8 +24,8 @@ test-ros2: set_up ## the `ros2` command, a package of its own in ros2/
 test-tools: set_up ## the tools: an installation from nothing, a new lesson, two machines
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/tools $(PYTEST_ARGS)
 
-test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour; LESSON=02 for one
-	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(PYTEST_ARGS)
+test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour; LESSON=02 TASK=3
+	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(if $(TASK),-k "$(shell printf task_%02d $(TASK))") $(PYTEST_ARGS)
 
 test-browser: ## the real JupyterLab and the site in Chromium, as students use them; it takes minutes
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site

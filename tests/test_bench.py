@@ -15,7 +15,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
-from helpers.checks.bench import Bench
+from helpers.checks.bench import Bench, let, must_define, must_have
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks
 
@@ -119,6 +119,27 @@ def test_a_class_in_place_of_a_node_is_said():
         pytest.raises(Failed, match='^a node is wanted here.* the class Doubler'),
     ):
         bench.spin(Doubler)
+
+
+def test_what_is_not_written_yet_is_named():
+    with Bench(), pytest.raises(Failed, match=r'^there is no self\.timer yet$'):
+        must_have(Doubler(), 'publisher', 'timer')
+    must_define(Doubler, '__init__', 'number_callback')
+    with pytest.raises(Failed, match='^the class has no timer_callback yet$'):
+        must_define(Doubler, 'timer_callback')
+
+
+PERIOD_S = 0.5
+
+
+def period():
+    return PERIOD_S
+
+
+def test_a_constant_that_the_code_reads_gets_another_value(monkeypatch):
+    monkeypatch.setitem(globals(), 'PERIOD_S', PERIOD_S)
+    let(period, PERIOD_S=0.1)
+    assert period() == 0.1
 
 
 # --- What a verdict says of mistakes
@@ -247,3 +268,13 @@ def test_a_node_that_nobody_destroys_leaves_nothing(capsys):
 
     assert '[ok] it works' in verdict_on(make, capsys)
     assert kept == []
+
+
+def test_a_service_without_a_response_is_said(capsys):
+    class Forgets(Node):
+        def __init__(self):
+            super().__init__('forgets')
+            self.create_service(Trigger, 'ask', lambda request, response: None)
+
+    said = verdict_on(Forgets, capsys, lambda bench: bench.call('ask', Trigger))
+    assert 'TypeError: the callback of a service has returned no response of its type' in said

@@ -39,6 +39,7 @@ from typing import NoReturn
 
 import psutil
 
+from helpers.notebook import uninterrupted
 from helpers.ros import speak_udp_only
 
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
@@ -99,9 +100,10 @@ class Apart:
                     return
                 yield message
         finally:
-            os.close(hold)
-            messages.close()
-            os.waitpid(guard, 0)
+            with uninterrupted():
+                os.close(hold)
+                messages.close()
+                os.waitpid(guard, 0)
 
 
 def _fork() -> int:

@@ -14,6 +14,7 @@ came.
 
 from __future__ import annotations
 
+import sys
 import threading
 import time
 from collections.abc import Callable
@@ -272,6 +273,29 @@ class Goal:
             return 'RUNNING', None
         answer = self._result.result()
         return STATUS.get(answer.status, str(answer.status)), answer.result
+
+
+def must_have(thing: object, *names: str) -> None:
+    """Raise Failed if an object of the student lacks one of these attributes."""
+    for name in names:
+        if not hasattr(thing, name):
+            raise Failed(f'there is no self.{name} yet')
+
+
+def must_define(a_class: type, *methods: str) -> None:
+    """Raise Failed if the student's class does not define one of these methods itself."""
+    for method in methods:
+        if method not in vars(a_class):
+            raise Failed(f'the class has no {method} yet')
+
+
+def let(written: type | Callable, **constants: object) -> None:
+    """Give constants that the student's code reads another value: `let(Driver, PERIOD_S=0.1)`.
+
+    They are those of the notebook in which the class or function was written. The process ends with
+    the check, and with it what was changed.
+    """
+    vars(sys.modules[written.__module__]).update(constants)
 
 
 def _kind_of(value: object) -> str:
