@@ -52,6 +52,31 @@ Traceback (most recent call last):
 TypeError: a name is missing
 """
 
+CMAKE_RUNS_PYTHON = """CMake Error at /opt/ros/rosidl_adapt_interfaces.cmake:57 (message):
+  execute_process(/usr/bin/python -m rosidl_adapter)
+  returned error code 1:
+
+  Traceback (most recent call last):
+
+    File "rosidl_adapter/parser.py", line 851, in parse_service_string
+      raise InvalidServiceSpecification(
+
+  rosidl_adapter.parser.InvalidServiceSpecification: Could not find separator
+  '---' between request and response
+
+Call Stack (most recent call first):
+  CMakeLists.txt:8 (rosidl_generate_interfaces)
+
+
+"""
+GENERATOR = """Traceback (most recent call last):
+  File "/opt/generate.py", line 3, in <module>
+  File "rosidl_generator/__init__.py", line 160, in generate_type_hash
+    pkg_dir = include_map[pkg]
+KeyError: 'sensor_msgs'
+gmake[2]: *** [build.make:76: rosidl_generator] Error 1
+"""
+
 
 @pytest.mark.parametrize(
     ('output', 'sentence'),
@@ -66,6 +91,17 @@ TypeError: a name is missing
             'install TARGETS given no EXPORT. Line 14 of CMakeLists.txt: ament_export_targets(...)',
         ),
         (ONE_LINE, 'install(EXPORT "ours") given unknown export "ours"'),
+        (
+            CMAKE_RUNS_PYTHON,
+            'rosidl_adapter.parser.InvalidServiceSpecification: Could not find separator '
+            "'---' between request and response. Line 8 of CMakeLists.txt: "
+            'rosidl_generate_interfaces(...)',
+        ),
+        (
+            GENERATOR,
+            "KeyError: 'sensor_msgs'. Line 160 of __init__.py: pkg_dir = include_map[pkg]",
+        ),
+        ("error: can't copy 'x': no such file", "error: can't copy 'x': no such file"),
         (TRACEBACK, "TypeError: a name is missing. Line 3 of setup.py: setup(nam='robot')"),
     ],
 )  # fmt: skip

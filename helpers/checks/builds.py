@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from helpers.checks.errors import Failed
-from helpers.workspace import Workspace
-from helpers.workspace.build_output import BuildResult, lines_that_matter
+from helpers.workspace import BuildResult, Workspace, lines_that_matter
 
 LONGEST = 600  # characters of a reason
 # What CMake adds to its reason: advice for somebody who installs packages.
@@ -24,7 +23,7 @@ print(repr(run_setup('setup.py', script_args=['--dry-run'], stop_after='config')
 """
 
 
-def build(workspace: Workspace, *packages: str, anew: bool = False) -> None:
+def build(workspace: Workspace, *packages: str, anew: bool = False) -> BuildResult:
     """Build packages. Raises Failed with the first error of the build.
 
     A build takes nothing away, so that what an earlier try has installed stays. With `anew`, the
@@ -37,6 +36,16 @@ def build(workspace: Workspace, *packages: str, anew: bool = False) -> None:
     result = workspace.build(*packages)
     if not result.ok:
         raise Failed(why_it_failed(result))
+    return result
+
+
+def builds(workspace: Workspace, *packages: str, anew: bool = True) -> bool | str:
+    """Build packages. Return True, or the first error. A warning of colcon counts as one."""
+    try:
+        result = build(workspace, *packages, anew=anew)
+    except Failed as error:
+        return str(error)
+    return not result.warnings or ' '.join(result.warnings[-1].split())
 
 
 def why_it_failed(result: BuildResult) -> str:
@@ -82,12 +91,24 @@ def _cmake_error(first: str, rest: Sequence[str]) -> str:
             place = place or called
             break
         text.append(line)
-    said = ' '.join(' '.join(text).split())
+    said = ' '.join(' '.join(_without_traceback(text)).split())
     said = ADVICE.sub('', said) or re.sub(r'^CMake Error(?: at \S+ \(\w+\))?:\s*', '', first)
     if place is None:
         return said
     file, number, command = place.groups()
     return _with_line(said, number, file, f'{command}(...)')
+
+
+def _without_traceback(lines: Sequence[str]) -> list[str]:
+    """Leave out what stands before an exception that CMake quotes: the command and its frames."""
+    kept, margin = [], None
+    for line in lines:
+        indent = len(line) - len(line.lstrip())
+        if 'Traceback (' in line:
+            kept, margin = [], indent
+        elif margin is None or indent <= margin:
+            kept.append(line)
+    return kept
 
 
 def _python_error(lines: Sequence[str]) -> str:

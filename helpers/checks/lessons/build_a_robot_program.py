@@ -21,10 +21,10 @@ from sensor_msgs.msg import BatteryState, LaserScan
 from test_msgs.action import Fibonacci
 
 from helpers.checks.bench import STATUS
-from helpers.checks.planted import run_tests
+from helpers.checks.planted import planted, run_tests
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import CORRIDOR, EMPTY, ROOMS, Floor, Pose, Robot
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check
@@ -1028,12 +1028,6 @@ def one_file_starts_it(workspace):
 
 
 # --- Tests, and what they test: right programs, and wrong ones
-
-
-def planted(source, old, new):
-    """Return the source with a bug in it."""
-    assert source.count(old) == 1, old
-    return source.replace(old, new)
 
 
 LOGIC = """import math

@@ -14,7 +14,8 @@ from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
 from helpers.fusion import VARIANCES, simulate
-from helpers.fusion.messages import odometry_message, seconds_of, stamp_of, yaw_of
+from helpers.robot import odometry_message
+from helpers.ros import seconds_of, stamp_of, yaw_of
 
 tasks = Tasks()
 check = tasks.check

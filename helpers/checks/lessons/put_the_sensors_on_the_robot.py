@@ -18,9 +18,8 @@ from helpers.checks.bench import Bench
 from helpers.checks.builds import build, data_files_of
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
-from helpers.fusion import simulate
-from helpers.fusion.messages import quaternion
-from helpers.fusion.nodes import localize
+from helpers.fusion import localize, simulate
+from helpers.ros import quaternion
 
 tasks = Tasks()
 check = tasks.check
