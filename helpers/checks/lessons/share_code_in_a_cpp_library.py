@@ -8,13 +8,13 @@ import sysconfig
 import threading
 
 import numpy as np
-from catkin_pkg.package import InvalidPackage, parse_package
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 
 from helpers.checks.bench import Bench
 from helpers.checks.builds import compile_error, why_it_failed
 from helpers.checks.errors import Failed
+from helpers.checks.programs import manifest
 from helpers.checks.tasks import Tasks, once
 
 tasks = Tasks()
@@ -342,13 +342,7 @@ def bind(workspace):
 
 @tasks.add(7)
 def name_what_it_needs(workspace):
-    @once
-    def package():
-        try:
-            return parse_package(workspace.file('src/scan_tools_py'))
-        except InvalidPackage as error:
-            reason = str(error).replace(f'{workspace.path}/', '')
-            raise Failed(f'package.xml: {" ".join(reason.split())}') from None
+    package = once(lambda: manifest(workspace, 'src/scan_tools_py'))
 
     def needs(kind, *right):
         found = sorted(depend.name for depend in getattr(package(), f'{kind}_depends'))
