@@ -7,7 +7,7 @@ import pytest
 from support.packages import HOSTILE
 
 from helpers.machine import build_tools as module
-from helpers.machine.build_tools import build_environment, build_tools
+from helpers.machine.build_tools import build_environment, tools_of_a_build
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def hostile(monkeypatch) -> None:
 
 
 def missing() -> list[str]:
-    return [tool.name for tool in build_tools() if not tool.found]
+    return [tool.name for tool in tools_of_a_build() if not tool.found]
 
 
 def test_hostile_variables_reach_no_build(hostile, monkeypatch):
@@ -57,7 +57,7 @@ def test_without_wheels_the_sourced_ros_stays(hostile, monkeypatch):
 
 def test_missing_tools_are_found(monkeypatch, tmp_path):
     assert missing() == []
-    assert [tool.name for tool in build_tools(cmake=False)] == ['colcon']
+    assert [tool.name for tool in tools_of_a_build(cmake=False)] == ['colcon']
     # CMake belongs to this Python.
     monkeypatch.setenv('PATH', str(tmp_path))
     (tmp_path / 'cc').symlink_to('/bin/sh')
@@ -67,4 +67,4 @@ def test_missing_tools_are_found(monkeypatch, tmp_path):
     monkeypatch.setattr(module.sysconfig, 'get_path', lambda kind: '/nowhere')
     assert missing() == ['make', 'Python headers']
     python = f'python{sys.version_info.major}.{sys.version_info.minor}'
-    assert build_tools()[-1].install == f'sudo apt install {python}-dev'
+    assert tools_of_a_build()[-1].install == f'sudo apt install {python}-dev'

@@ -12,7 +12,7 @@ from support.nodes import Asker, Listener, Talker, spin
 from test_msgs.action import Fibonacci
 
 from helpers.recording import Recording
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 
 def said_by(wait, *arguments):

@@ -12,9 +12,8 @@ from rclpy.node import Node
 from support.nodes import LIMIT_S, Listener, spin
 from support.processes import run_python, running
 
-from helpers.ros import domain
+from helpers.ros import domain, graph_environment, ros_session
 from helpers.ros.domain import configure_discovery, reserve_domain_id
-from helpers.ros.session import graph_environment, ros_session
 
 
 def domain_of_session():
@@ -31,7 +30,7 @@ def test_no_domain_left():
         for number, taken in enumerate(sockets, 1):
             with contextlib.suppress(OSError):
                 taken.bind(('', 21000 + number))
-        from helpers.ros.session import ros_session
+        from helpers.ros import ros_session
         try:
             with ros_session():
                 print('never')
@@ -65,7 +64,7 @@ def is_free(domain_id):
 def test_only_processes_that_agree_hear_each_other(shared_id):
     other = """
         from support.nodes import Talker, spin
-        from helpers.ros.session import ros_session
+        from helpers.ros import ros_session
         with ros_session({}) as session:
             talker = Talker(10**6)
             talker.next_number = {}

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from support.javascript import Script
 from support.runs import tries
 
-from helpers.recording.queue_model import predict
+from helpers.recording import predict
 
 GLUE = 'const played = values => stories(predicted(values), 41);'
 numbers = st.tuples(

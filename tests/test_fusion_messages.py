@@ -8,15 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from helpers.fusion.messages import (
-    from_odometry,
-    odometry_message,
-    quaternion,
-    seconds_of,
-    stamp_of,
-    table_of,
-    yaw_of,
-)
+from helpers.fusion.messages import from_odometry, table_of
+from helpers.robot import odometry_message
+from helpers.ros import quaternion, seconds_of, stamp_of, yaw_of
 
 angles = st.floats(-3.1, 3.1)
 

@@ -9,10 +9,9 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, LaserScan
 
-from helpers.fusion.messages import yaw_of
 from helpers.fusion.nodes import PARTS, EkfNode
 from helpers.robot import ROOMS, Robot
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session, yaw_of
 
 
 def heard_from_a_robot(**options):

@@ -1,12 +1,19 @@
-"""The private names that we touch are all still there. Ruff keeps them in one module (SLF)."""
+"""The private names of other packages that helpers touch are all listed, and all still there."""
 
+import ast
 import inspect
+import re
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor, thread
-from importlib.metadata import version
+from pathlib import Path
+from types import SimpleNamespace
 
+import _quickjs
+import pexpect
 import pytest
 import rclpy
+from ipykernel.comm.comm import BaseComm
 from ipykernel.kernelbase import Kernel
 from rclpy.action import ActionClient
 from rclpy.executors import MultiThreadedExecutor
@@ -14,11 +21,19 @@ from rclpy.lifecycle import LifecycleNode
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
-from helpers.ros.private import NAMES
+import helpers
+from helpers.private_names import PRIVATE_NAMES
+
+HELPERS = Path(helpers.__file__).parent
+PRIVATE = re.compile(r'_[a-zA-Z]\w*')
+# Documented by Python and IPython; and texts that only look like names.
+NO_SECRETS = {
+    *('_asdict', '_config', '_exit_code', '_fields', '_pose_rejection_threshold', '_session_log'),
+}
 
 
 @pytest.fixture(scope='module')
-def things():
+def owners():
     """One of each kind of thing that has private names."""
     context = rclpy.Context()
     context.init(domain_id=101)
@@ -31,20 +46,80 @@ def things():
         'a lifecycle node': LifecycleNode('lifecycle', context=context),
         'an action client': ActionClient(node, Fibonacci, 'patrol'),
         'a ThreadPoolExecutor': ThreadPoolExecutor(),
+        'sys': sys,
         'a kernel': Kernel,
+        'a comm': BaseComm,
+        'a process of pexpect': pexpect.spawn,
+        'quickjs-ng': SimpleNamespace(_quickjs=_quickjs),
     }
     node.destroy_node()
     executor.shutdown()
     context.shutdown()
 
 
-@pytest.mark.parametrize(
-    ('kind', 'name'), [(kind, name) for kind, names in NAMES.items() for name in names]
-)
-def test_a_name_is_still_there(things, kind, name):
-    read = NAMES[kind][name]
-    now = f'rclpy {version("ros-rclpy")}' if 'rclpy' in read else f'not {read}'
-    assert hasattr(things[kind], name), f'{kind} has no {name} any more: this is {now}, not {read}.'
+def modules():
+    """Yield each module of helpers: its file, and what is in it."""
+    for file in sorted(HELPERS.rglob('*.py')):
+        path = file.relative_to(HELPERS)
+        if path.parts[0] != 'private_names.py':
+            yield path, list(ast.walk(ast.parse(file.read_text())))
+
+
+def used(things):
+    """Return the private names that a module uses, also those in texts, as for getattr."""
+    names = set()
+    # The end of an f-string, `f'{part}_covariance'`, is no name.
+    ends = {
+        id(part) for text in things if isinstance(text, ast.JoinedStr) for part in text.values[1:]
+    }
+    for thing in things:
+        match thing:
+            case ast.Constant() if id(thing) in ends:
+                continue
+            case ast.Attribute(attr=name) | ast.Constant(value=str(name)):
+                names.add(name)
+            case ast.ImportFrom(module=module, names=imported) if not module.startswith('helpers.'):
+                names.update(module.split('.'), (alias.name for alias in imported))
+            case ast.Import(names=imported):
+                names.update(part for alias in imported for part in alias.name.split('.'))
+    return set(filter(PRIVATE.fullmatch, names))
+
+
+def defined(things):
+    """Return the names that a module gives to things of its own."""
+    names = set()
+    for thing in things:
+        match thing:
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name) | ast.arg(arg=name):
+                names.add(name)
+            case ast.Name(id=name, ctx=ast.Store()):
+                names.add(name)
+            case ast.Attribute(attr=name, value=ast.Name(id='self'), ctx=ast.Store()):
+                names.add(name)
+    return names
+
+
+@pytest.mark.parametrize('entry', PRIVATE_NAMES, ids=lambda entry: entry.name)
+def test_a_name_is_still_there(owners, entry):
+    owner = owners[entry.owner]
+    # A class of which an instance gets the name later.
+    later = inspect.isclass(owner) and f'self.{entry.name} = ' in inspect.getsource(owner)
+    assert later or hasattr(owner, entry.name), (
+        f'{entry.owner} has no {entry.name} any more, as it had in {entry.version}.'
+    )
+
+
+def test_the_list_is_true():
+    listed = {(entry.file, entry.name) for entry in PRIVATE_NAMES}
+    names = {(str(path), name) for path, things in modules() for name in used(things)}
+    own = {(path.parts[0], name) for path, things in modules() for name in defined(things)}
+    foreign = {
+        (file, name)
+        for file, name in names
+        if (Path(file).parts[0], name) not in own and name not in NO_SECRETS
+    }
+    assert foreign <= listed, 'These are not in helpers/private_names.py.'
+    assert listed <= names, 'These are in helpers/private_names.py, and nobody uses them.'
 
 
 def test_where_a_thread_waits_can_be_seen():

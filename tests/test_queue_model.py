@@ -25,7 +25,7 @@ from support.waits import wait_for
 from helpers.notebook.values import RUN_COLUMNS, check_table
 from helpers.recording import Recording
 from helpers.recording.queue_model import ALLOWED_REST, explain, predict
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 # predict
 

@@ -13,7 +13,7 @@ from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 
 from helpers.notebook.values import RUN_COLUMNS, check_table
 from helpers.recording import CallbackRecording, Recording
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 TIMES = ['published_s', 'started_s', 'finished_s']
 

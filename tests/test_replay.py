@@ -19,10 +19,8 @@ from support.runs import (
     tries,
 )
 
-from helpers.recording.queue_model import explain, predict
-from helpers.replay import replay, side_by_side
-from helpers.replay.free import FreePlay
-from helpers.replay.levels import level
+from helpers.recording import explain, predict
+from helpers.replay import FreePlay, level, replay, side_by_side
 from tools.lessons.comparison import masked
 
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'

@@ -12,8 +12,8 @@ from std_srvs.srv import Trigger
 from support.nodes import LIMIT_S, call_in_executor, spin
 from test_msgs.action import Fibonacci
 
-from helpers.replay.actions import ActionRecording, replay_action
-from helpers.ros.session import ros_session
+from helpers.replay import ActionRecording, replay_action
+from helpers.ros import ros_session
 
 CANCEL = 2  # the place of cancel_goal
 

@@ -7,8 +7,8 @@ from std_srvs.srv import Trigger
 from support.nodes import LIMIT_S, Answerer, Asker, spin
 
 from helpers.recording import CallbackRecording
-from helpers.replay.calls import replay_calls
-from helpers.ros.session import ros_session
+from helpers.replay import replay_calls
+from helpers.ros import ros_session
 
 
 def record(threads, groups, style='call'):

@@ -9,7 +9,6 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from helpers.fusion import simulate
-from helpers.fusion.drives import said
 from helpers.robot import CORRIDOR, EMPTY, ROOMS, Floor, Pose
 from helpers.robot.body import (
     MAX_ACCELERATION,
@@ -22,7 +21,7 @@ from helpers.robot.body import (
     arc,
 )
 from helpers.robot.record import Command
-from helpers.robot.sensors import Sensors
+from helpers.robot.sensors import Sensors, without_noise
 
 speeds = st.floats(-MAX_SPEED, MAX_SPEED)
 turns = st.floats(-MAX_TURN, MAX_TURN)
@@ -139,11 +138,11 @@ def test_errors_of_its_sensors_are_those_of_simulate(slip):
         assert list(exact.read(body).values())[:3] == [body.v, body.w, yaw]
         truth = {'x': x, 'y': y, 'yaw': yaw, 'vx': body.v, 'vyaw': body.w, 'ax': body.ax}
         slipping = 0.5 if slip and slip[0] <= body.t_s < slip[1] else 0.0
-        without = said(truth | {'ay': body.v * body.w}, slipping)
+        without = without_noise(truth | {'ay': body.v * body.w}, slipping)
         rows.append(np.subtract(list(sensors.read(body).values()), list(without.values())))
         drive(body, 0.5, 0.3, seconds=1 / RATE_HZ)
     measured, true = simulate(7, 2.0)
-    errors = measured.drop(columns='t') - pd.DataFrame(said(true))
+    errors = measured.drop(columns='t') - pd.DataFrame(without_noise(true))
     fixes = errors['gps_x'].notna()
     np.testing.assert_allclose(np.array(rows)[fixes], errors[fixes], atol=1e-9)
     np.testing.assert_allclose(np.array(rows)[:, :6], errors.iloc[:, :6], atol=1e-9)

@@ -2,7 +2,10 @@
 
 import contextlib
 import math
+import os
 import signal
+import sys
+import tempfile
 import time
 
 import numpy as np
@@ -19,12 +22,12 @@ from support.nodes import LIMIT_S, Gate, spin
 from support.processes import running, traces
 from support.waits import wait_for
 
-from helpers.fusion.messages import yaw_of
-from helpers.robot import CORRIDOR, EMPTY, ROOMS, Pose, Robot, start_robot
+from helpers.robot import CORRIDOR, EMPTY, ROOMS, Pose, Robot
 from helpers.robot.body import MAX_ACCELERATION, RADIUS_M, Body
 from helpers.robot.messages import DATUM, SKY
 from helpers.robot.robot import TOPICS
-from helpers.ros.session import ros_session
+from helpers.ros import graph_environment, ros_session, yaw_of
+from helpers.workspace import Process
 
 
 class Wanderer(Node):
@@ -198,12 +201,20 @@ def test_a_robot_in_another_process_is_heard_and_ends():
         heard = []
         node.create_subscription(LaserScan, '/far/scan', heard.append, 10)
         spin(session, node)
-        with start_robot('corridor', '--ros-args', '-r', '__ns:=/far') as process:
+        with robot_process('corridor', '--ros-args', '-r', '__ns:=/far') as process:
+            process.wait_for('drives', LIMIT_S)
             session.wait_until(lambda: heard, LIMIT_S)
             assert heard[0].header.frame_id == 'far/base_scan'
         assert process.wait() == 0
-        with pytest.raises(RuntimeError, match='No such file.*nowhere.txt'):
-            start_robot('nowhere.txt')
+        gone = pytest.raises(RuntimeError, match='No such file.*nowhere.txt')
+        with robot_process('nowhere.txt') as process, gone:
+            process.wait_for('drives', LIMIT_S)
+
+
+def robot_process(floor, *arguments):
+    """Start the robot as a launch file does: as a program, in the graph of the session."""
+    command = [sys.executable, '-m', 'helpers.robot', '--floor', floor, *arguments]
+    return Process('robot', command, {**os.environ, **graph_environment()}, tempfile.gettempdir())
 
 
 def test_an_interrupt_ends_the_robot():

@@ -402,7 +402,7 @@ def run_cell(before_line):
 
     def trace(frame, event, _):
         code = frame.f_code
-        if code.co_filename not in files or code.co_name == 'find':  # 100,000 lines
+        if code.co_filename not in files:
             return None
         if event == 'line':
             line = code.co_filename, code.co_name, frame.f_lineno

@@ -25,8 +25,8 @@ from support.packages import (
 from support.processes import running
 from support.waits import wait_for
 
+from helpers.ros import ros_session
 from helpers.ros.domain import reserve_domain_id
-from helpers.ros.session import ros_session
 from helpers.workspace import Workspace, folders, processes
 from helpers.workspace.build_output import lines_that_matter
 from helpers.workspace.processes import Process

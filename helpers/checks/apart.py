@@ -39,7 +39,8 @@ from typing import NoReturn
 
 import psutil
 
-from helpers.ros.domain import speak_udp_only
+from helpers.notebook import uninterrupted
+from helpers.ros import speak_udp_only
 
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 POLL_S = 0.05
@@ -99,9 +100,10 @@ class Apart:
                     return
                 yield message
         finally:
-            os.close(hold)
-            messages.close()
-            os.waitpid(guard, 0)
+            with uninterrupted():
+                os.close(hold)
+                messages.close()
+                os.waitpid(guard, 0)
 
 
 def _fork() -> int:

@@ -15,7 +15,7 @@ from numbers import Integral, Real
 from IPython import get_ipython
 
 from helpers.checks import classroom
-from helpers.notebook.kernel import can_ask
+from helpers.notebook import can_ask
 
 NO_GUESS = 'No guess yet. Write one in place of the three dots, run that cell, then this one again.'
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from IPython import get_ipython
 from jupyter_core.paths import jupyter_data_dir
 
-from helpers.notebook import text
+from helpers import notebook as text
 
 FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progress is kept
 LESSON = re.compile(r'(?:^|/)\d\d_(\w+)\.ipynb$')

@@ -3,24 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from helpers.fusion.filter import STATE
-from helpers.fusion.tables import VARIANCES
+from helpers.robot import RATE_HZ, SLIP_SPEED, VARIANCES, without_noise
 
-RATE_HZ = 50
 GPS_EVERY = 50  # rows
-
-# What the wheels say: so many times the speed, so many times the turning rate, and so much more.
-WHEEL_SCALE = 1.04
-TURN_SCALE = 1.05
-TURN_BIAS = 0.012  # rad/s
-GYRO_BIAS = 0.002  # rad/s
-SLIP_SPEED = 0.5  # m/s, what the wheels say too much while they slip
 
 
 class Drive(NamedTuple):
@@ -58,31 +49,13 @@ def simulate(
     t = np.arange(round(seconds * RATE_HZ) + 1) / RATE_HZ
     truth = _path(t)
     rng = np.random.default_rng(seed)
-    measurements = pd.DataFrame(said(truth, slip_speed * _during(slip, t), imu_mounting))
+    measurements = pd.DataFrame(without_noise(truth, slip_speed * _during(slip, t), imu_mounting))
     sigma = np.sqrt([VARIANCES['ax' if name == 'ay' else name] for name in measurements])
     measurements += rng.normal(0, sigma, measurements.shape)
     measurements['imu_yaw'] = _angle(measurements['imu_yaw'])
     measurements.insert(0, 't', t)
     measurements.loc[np.arange(len(t)) % GPS_EVERY > 0, ['gps_x', 'gps_y']] = np.nan
     return Drive(measurements, truth)
-
-
-def said(truth: Mapping, slipping=0.0, imu_mounting: float = 0.0) -> dict:
-    """Return what the sensors would say without noise, of a moment (numbers) or of many (columns).
-
-    `truth` has x, y, yaw, vx, vyaw, ax and ay; `slipping` is what the wheels say too much (m/s).
-    """
-    cos, sin = math.cos(imu_mounting), math.sin(imu_mounting)
-    return {
-        'vx': WHEEL_SCALE * truth['vx'] + slipping,
-        'vyaw': TURN_SCALE * truth['vyaw'] + TURN_BIAS,
-        'imu_yaw': truth['yaw'] + imu_mounting,
-        'imu_vyaw': truth['vyaw'] + GYRO_BIAS,
-        'ax': cos * truth['ax'] + sin * truth['ay'],
-        'ay': cos * truth['ay'] - sin * truth['ax'],
-        'gps_x': truth['x'],
-        'gps_y': truth['y'],
-    }
 
 
 def _during(interval: tuple[float, float] | None, t: np.ndarray) -> np.ndarray:

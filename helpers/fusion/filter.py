@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from helpers.fusion import settings
-from helpers.notebook.values import shown
+from helpers.notebook import shown
 
 STATE = ('x', 'y', 'yaw', 'vx', 'vy', 'vyaw', 'ax', 'ay')
 

@@ -12,7 +12,7 @@ import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -26,20 +26,9 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter
-from helpers.fusion.messages import (
-    ON_THE_FLOOR,
-    from_odometry,
-    odometry_message,
-    quaternion,
-    seconds_of,
-    stamp_of,
-    table_of,
-    yaw_of,
-)
-from helpers.ros.session import ros_session
-
-if TYPE_CHECKING:
-    from helpers.robot import Robot
+from helpers.fusion.messages import from_odometry, table_of
+from helpers.robot import EMPTY, ON_THE_FLOOR, Pose, Robot, odometry_message, trip
+from helpers.ros import quaternion, ros_session, seconds_of, stamp_of, yaw_of
 
 # The 15 numbers of each `..._config` and covariance, in their order.
 PARTS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw', 'vx', 'vy', 'vz', 'vroll', 'vpitch', 'vyaw')
@@ -55,7 +44,9 @@ class _Configured(Node):
         super().__init__(
             name, cli_args=arguments, automatically_declare_parameters_from_overrides=True
         )
-        self.given = {key: one.value for key, one in self.get_parameters_by_prefix('').items()}
+        self.given = {
+            key: parameter.value for key, parameter in self.get_parameters_by_prefix('').items()
+        }
 
     def hear(self, kind: type, topic: str, callback, qos=DEPTH) -> None:
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
@@ -181,15 +172,15 @@ class EkfNode(_Configured):
         return ways[0][common[0]] - ways[1][common[0]] if common else None
 
     def _on_static(self, message) -> None:
-        for one in message.transforms:
-            yaw = yaw_of(one.transform.rotation)
-            self._parents[one.child_frame_id] = one.header.frame_id, yaw
+        for stamped in message.transforms:
+            yaw = yaw_of(stamped.transform.rotation)
+            self._parents[stamped.child_frame_id] = stamped.header.frame_id, yaw
 
     def _on_tf(self, message) -> None:
-        for one in message.transforms:
-            if (one.header.frame_id, one.child_frame_id) == ('odom', self.base):
-                place = one.transform.translation
-                self._in_odom = place.x, place.y, yaw_of(one.transform.rotation)
+        for stamped in message.transforms:
+            if (stamped.header.frame_id, stamped.child_frame_id) == ('odom', self.base):
+                place = stamped.transform.translation
+                self._in_odom = place.x, place.y, yaw_of(stamped.transform.rotation)
 
     def _publish(self) -> None:
         ekf = self.ekf
@@ -204,11 +195,11 @@ class EkfNode(_Configured):
             child, yaw = 'odom', yaw - turn
             x -= math.cos(yaw) * far - math.sin(yaw) * left
             y -= math.sin(yaw) * far + math.cos(yaw) * left
-        made = TransformStamped(child_frame_id=child)
-        made.header.stamp, made.header.frame_id = stamp_of(ekf.t), self.world
-        made.transform.translation.x, made.transform.translation.y = x, y
-        made.transform.rotation = quaternion(0, 0, yaw)
-        self._tf.publish(self._tf.msg_type(transforms=[made]))
+        stamped = TransformStamped(child_frame_id=child)
+        stamped.header.stamp, stamped.header.frame_id = stamp_of(ekf.t), self.world
+        stamped.transform.translation.x, stamped.transform.translation.y = x, y
+        stamped.transform.rotation = quaternion(0, 0, yaw)
+        self._tf.publish(self._tf.msg_type(transforms=[stamped]))
 
 
 class NavSatNode(_Configured):
@@ -291,15 +282,13 @@ def localize(
     """
     from tf2_msgs.msg import TFMessage
 
-    from helpers.robot import EMPTY, Pose, Robot
-
     heard: dict[str, list] = {'ekf_odom': [], 'ekf_map': []}
     frames: dict[str, tuple[str, str, str]] = {}
 
     def note(topic: str) -> Callable:
         return lambda message: frames.update(
-            (one.child_frame_id, (one.header.frame_id, one.child_frame_id, topic))
-            for one in message.transforms
+            (stamped.child_frame_id, (stamped.header.frame_id, stamped.child_frame_id, topic))
+            for stamped in message.transforms
         )
 
     with ros_session():
@@ -325,12 +314,3 @@ def localize(
         pd.DataFrame(list(frames.values()), columns=['parent', 'child', 'publisher']),
         *of_filters,
     )
-
-
-def trip(robot: Robot, *executors, seconds: float = 60.0) -> None:
-    """Drive a robot in sim time as `simulate` does: to and fro, to the left and to the right."""
-    for tenth in range(round(seconds * 10)):
-        t = tenth / 10
-        v = 0.5 * min(t, 2) + 0.75 * (math.sin(0.4 * t) - math.sin(0.8)) * (t > 2)
-        robot.command(v, 0.05 + 0.3 * math.sin(0.2 * t))
-        robot.run(0.1, *executors)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 
-from helpers.notebook.values import shown
+from helpers.notebook import chosen, shown
 
 
 def positive(name: str, value, or_zero: bool = False) -> float:
@@ -19,25 +19,14 @@ def positive(name: str, value, or_zero: bool = False) -> float:
 
 def some_of(name: str, given: Sequence[str], allowed: Iterable[str]) -> None:
     """Raise ValueError unless each name is allowed, and there is one. A str is no list of names."""
-    if isinstance(given, str) or not given or not all(one in allowed for one in given):
+    if isinstance(given, str) or not given or not all(key in allowed for key in given):
         raise ValueError(
             f'{name} must be a list of some of {", ".join(allowed)}, not {shown(given)}.'
         )
 
 
-def chosen(name: str, given: Mapping | None, allowed: Iterable[str]) -> dict:
-    """Return a dict (None: an empty one) whose keys are all allowed."""
-    if not isinstance(given, Mapping | None):
-        raise TypeError(f'{name} must be a dict, not {shown(given)}.')
-    for key in given or {}:
-        if key not in allowed:
-            raise ValueError(f'{name} can name {", ".join(allowed)}, not {shown(key)}.')
-    return dict(given or {})
-
-
 def variances(
     name: str, given: Mapping | None, defaults: Mapping[str, float], or_zero: bool = False
 ) -> dict[str, float]:
-    """Return the default variances, some of them replaced."""
     changed = chosen(name, given, defaults)
     return defaults | {key: positive(f'{name}[{key!r}]', changed[key], or_zero) for key in changed}

@@ -14,20 +14,8 @@ import pandas as pd
 
 from helpers.fusion import settings
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter, Innovation, part_of_state
-from helpers.notebook.values import check_columns, column_of_numbers
-
-# The variance of the noise of each column, per axis. `vy` is no column: wheels that cannot move
-# sideways say 0.
-VARIANCES = {
-    'vx': 0.0025,
-    'vy': 0.01,
-    'vyaw': 0.0025,
-    'imu_yaw': 0.0004,
-    'imu_vyaw': 0.0001,
-    'ax': 0.01,
-    'gps_x': 0.25,
-    'gps_y': 0.25,
-}
+from helpers.notebook import check_columns, chosen, column_of_numbers
+from helpers.robot import VARIANCES
 
 # What a row says, in the order in which it is applied: each message has the column of each part of
 # the state that it measures. The IMU's parts are applied one after the other.
@@ -82,7 +70,6 @@ def fuse_with_innovations(
 
 
 def columns_of(table: pd.DataFrame, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return columns as arrays of numbers."""
     names = list(names)
     check_columns(table, names)
     return {name: column_of_numbers(table, name) for name in names}
@@ -119,10 +106,10 @@ def _innovations(steps: list[_Step]) -> pd.DataFrame:
 
 def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -> list[_Step]:
     """Feed the rows to a filter. A message of which one number is NaN is left out."""
-    settings.chosen('options', options, ('process_noise', 'variances', 'config', 'gate'))
+    chosen('options', options, ('process_noise', 'variances', 'config', 'gate'))
     ekf = ExtendedKalmanFilter(options.get('process_noise'))
     variances = settings.variances('variances', options.get('variances'), VARIANCES)
-    gates = settings.chosen('gate', options.get('gate'), SENSORS)
+    gates = chosen('gate', options.get('gate'), SENSORS)
     gates = {sensor: settings.positive(f'gate[{sensor!r}]', gates[sensor]) for sensor in gates}
     messages = _messages(sensors, options.get('config'))
     table = _table(measurements, {name for _, parts in messages for name in parts.values()})
@@ -130,13 +117,15 @@ def _run(measurements: pd.DataFrame, sensors: Iterable[str], options: Mapping) -
     for sensor, parts in messages:
         values = np.column_stack([table[column] for column in parts.values()])
         noise = np.diag([variances[column] for column in parts.values()])
-        said = ~np.isnan(values).any(axis=1)
-        prepared.append((sensor, tuple(parts), part_of_state(tuple(parts)), noise, values, said))
+        is_complete = ~np.isnan(values).any(axis=1)
+        prepared.append(
+            (sensor, tuple(parts), part_of_state(tuple(parts)), noise, values, is_complete)
+        )
     steps = []
     for row, t in enumerate(table['t'].tolist()):
         heard = []
-        for sensor, names, part, noise, values, said in prepared:
-            if said[row]:
+        for sensor, names, part, noise, values, is_complete in prepared:
+            if is_complete[row]:
                 gate = gates.get(sensor)
                 innovation = ekf.process_unchecked(t, part, values[row], noise, gate)
                 if innovation is not None:
@@ -152,7 +141,7 @@ def _messages(sensors: Iterable[str], config) -> list[tuple[str, dict[str, str]]
     """Return the messages of the sensors, without the parts that are not to be used."""
     sensors = sensors if isinstance(sensors, str) else tuple(sensors)
     settings.some_of('sensors', sensors, SENSORS)
-    config = settings.chosen('config', config, SENSORS)
+    config = chosen('config', config, SENSORS)
     for sensor, names in config.items():
         can = [name for parts in MESSAGES[sensor] for name in parts]
         settings.some_of(f'config[{sensor!r}]', names, can)
@@ -166,7 +155,6 @@ def _messages(sensors: Iterable[str], config) -> list[tuple[str, dict[str, str]]
 
 
 def _table(measurements: pd.DataFrame, columns: set[str]) -> dict[str, np.ndarray]:
-    """Return `t` and the columns as arrays."""
     if 'vy' in columns:  # no column: the wheels say 0 whenever they say vx
         columns = columns - {'vy'} | {'vx'}
     table = columns_of(measurements, ['t', *sorted(columns)])

@@ -81,7 +81,7 @@ class Tool(NamedTuple):
     install: str
 
 
-def build_tools(cmake: bool = True) -> list[Tool]:
+def tools_of_a_build(cmake: bool = True) -> list[Tool]:
     """Look for the tools of a build, in the order in which it needs them.
 
     `cmake` says whether a package is built with CMake: one of pure Python needs colcon only.

@@ -18,9 +18,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from helpers.machine.build_tools import build_tools, from_wheels
-from helpers.notebook.interrupts import uninterrupted
-from helpers.notebook.text import table
+from helpers.machine.build_tools import from_wheels, tools_of_a_build
+from helpers.notebook import table, uninterrupted
 
 JAZZY = '7.1.'  # the versions of rclpy in ROS 2 Jazzy
 SHARED_MEMORY = Path('/dev/shm')
@@ -68,10 +67,9 @@ def checks() -> list[Check]:
 
 
 def check_python() -> Check:
-    """Check the version of this Python."""
-    found = f'{platform.python_implementation()} {platform.python_version()}'
+    python = f'{platform.python_implementation()} {platform.python_version()}'
     fits = sys.implementation.name == 'cpython' and sys.version_info >= (3, 11)
-    return Check('Python', found, '' if fits else 'use CPython 3.11 or newer')
+    return Check('Python', python, '' if fits else 'use CPython 3.11 or newer')
 
 
 def check_platform(has_rclpy: bool) -> Check:
@@ -107,7 +105,7 @@ def _why_import_failed(trial: subprocess.CompletedProcess[str]) -> tuple[str, st
 
 def check_domain() -> Check:
     """Reserve this process's domain id."""
-    from helpers.ros.session import graph_environment
+    from helpers.ros import graph_environment
 
     name = 'domain and discovery'
     try:
@@ -140,7 +138,7 @@ def _seconds_to_hear() -> float:
     from rclpy.qos import DurabilityPolicy, QoSProfile
     from std_msgs.msg import String
 
-    from helpers.ros.session import ros_session
+    from helpers.ros import ros_session
 
     # Transient local: the message arrives also if discovery ends after publish().
     qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -157,7 +155,6 @@ def _seconds_to_hear() -> float:
 
 
 def check_shared_memory() -> Check:
-    """Check the free space of the memory that Fast DDS shares between processes."""
     name = 'shared memory'
     if not SHARED_MEMORY.is_dir():
         return Check(name, f'no {SHARED_MEMORY} on this system', required=False)
@@ -180,9 +177,8 @@ def _more_shared_memory() -> str:
 
 
 def check_build_tools() -> list[Check]:
-    """Check that what builds packages is there, and runs."""
     rows = []
-    for tool in build_tools():
+    for tool in tools_of_a_build():
         found, to_do = tool.found, f'to build packages in the lessons, run `{tool.install}`'
         if os.path.isabs(found):  # a command
             found = _run([found, '--version']).stdout.partition('\n')[0]

@@ -15,7 +15,6 @@ class FreshLessons(AsyncLargeFileManager):
     """Reads and writes files as JupyterLab does, and opens a lesson of the repository empty."""
 
     async def get(self, path, content=True, **options) -> dict:
-        """Return the model of a file, as the Jupyter Server API wants it."""
         model = await super().get(path, content=content, **options)
         notebook = model['content']
         if model['type'] == 'notebook' and content and notebook.metadata.pop(MARK, None):

@@ -6,7 +6,6 @@ import contextlib
 import os
 import signal
 import socket
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
@@ -64,42 +63,32 @@ def at_each_signal(call: Callable[[], None]) -> Iterator[None]:
         reader.close()
 
 
-def _end_cell_with_its_command() -> None:
-    """Let an Interrupt of a `!command` end the cell, too: IPython itself ends the command only."""
-    kernel_shell = sys.modules['ipykernel.zmqshell']
-    run = kernel_shell.system
+def run_command(run: Callable[[str], int], command: str) -> int:
+    """Run a `!command`. An Interrupt ends the cell, too: IPython itself ends the command only."""
+    if threading.current_thread() is not threading.main_thread():
+        return run(command)
+    interrupts = []
 
-    def system(command: str) -> int:
-        if threading.current_thread() is not threading.main_thread():
-            return run(command)
-        interrupts = []
+    def handle(number: int, frame: FrameType | None) -> None:
+        again = threading.Timer(MOMENT_S, os.kill, (os.getpid(), number))
+        interrupts.append(again)
+        if _runs('_spawnpty', frame):  # pexpect would lose the process that it starts
+            again.start()
+        else:
+            before(number, frame)
 
-        def handle(number: int, frame: FrameType | None) -> None:
-            again = threading.Timer(MOMENT_S, os.kill, (os.getpid(), number))
-            interrupts.append(again)
-            if _runs('_spawnpty', frame):  # pexpect would lose the process that it starts
-                again.start()
-            else:
-                before(number, frame)
-
-        before = signal.signal(signal.SIGINT, handle)
-        try:
-            return run(command)
-        finally:
-            signal.signal(signal.SIGINT, before)
-            for again in interrupts:
-                again.cancel()
-            if interrupts:
-                raise KeyboardInterrupt
-
-    kernel_shell.system = system
+    before = signal.signal(signal.SIGINT, handle)
+    try:
+        return run(command)
+    finally:
+        signal.signal(signal.SIGINT, before)
+        for again in interrupts:
+            again.cancel()
+        if interrupts:
+            raise KeyboardInterrupt
 
 
 def _runs(function: str, frame: FrameType | None) -> bool:
     while frame is not None and frame.f_code.co_name != function:
         frame = frame.f_back
     return frame is not None
-
-
-if 'ipykernel.zmqshell' in sys.modules:
-    _end_cell_with_its_command()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numbers
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import pandas as pd
@@ -23,6 +23,16 @@ def check_count(name: str, value: int) -> None:
     """Raise ValueError unless the value is a whole number from 1 up."""
     if not isinstance(value, numbers.Integral) or value < 1:
         raise ValueError(f'{name} must be a whole number from 1 up, not {shown(value)}.')
+
+
+def chosen(name: str, given: Mapping | None, allowed: Iterable[str]) -> dict:
+    """Return a dict (None: an empty one) whose keys are all allowed."""
+    if not isinstance(given, Mapping | None):
+        raise TypeError(f'{name} must be a dict, not {shown(given)}.')
+    for key in given or {}:
+        if key not in allowed:
+            raise ValueError(f'{name} can name {", ".join(allowed)}, not {shown(key)}.')
+    return dict(given or {})
 
 
 def natural(name: str) -> list:

@@ -20,7 +20,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
-from helpers.notebook.values import check_table, natural
+from helpers.notebook import check_table, natural
 from helpers.plots.alt_text import describe
 from helpers.plots.style import (
     DPI,
@@ -139,7 +139,6 @@ def _label_gaps(ax: Axes, table: pd.DataFrame) -> None:
 
 
 def _label(ax: Axes, text: str, x: float, y: float, look: dict) -> Text:
-    """Write a text beside the point (x, y)."""
     return ax.annotate(text, (x, y), textcoords='offset points', fontsize=SMALL, zorder=5, **look)
 
 

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
 
-from helpers.notebook.look import LOOK
+from helpers.notebook import LOOK
 
 HEARD, LOST, WAITING, ROBOT, INK, PALE = (
     LOOK[name] for name in ('heard', 'lost', 'waiting', 'robot', 'ink', 'line')
@@ -75,12 +75,10 @@ def crosses(ax: Axes, x, y, label: str, scale: float = 1.0) -> PathCollection:
 
 
 def say(ax: Axes, text: str) -> None:
-    """Write a text into the middle of empty axes."""
     ax.text(0.5, 0.5, text, transform=ax.transAxes, ha='center', va='center', fontsize=LARGE)
 
 
 def in_words(names: Iterable) -> str:
-    """Return a list of names for a sentence."""
     return '; '.join(map(str, names))
 
 

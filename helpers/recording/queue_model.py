@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pandas as pd
 
-from helpers.notebook.values import check_count, check_table, shown
+from helpers.notebook import check_count, check_table, shown
 
 # A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
 # long as callbacks and timers of the same run were late.
@@ -81,7 +81,6 @@ class Explanation:
 
     @property
     def lost(self) -> int:
-        """How many messages were lost."""
         return len(self.losses)
 
     @property

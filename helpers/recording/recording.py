@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import pandas as pd
 from rclpy.service import Service
 
-from helpers.notebook.values import RUN_COLUMNS
+from helpers.notebook import RUN_COLUMNS
 
 
 def number_of(message) -> int:
@@ -48,7 +48,6 @@ class CallbackRun:
 
     @property
     def running(self) -> bool:
-        """Whether it has not finished yet."""
         return self.finished_s is None
 
 
@@ -113,7 +112,6 @@ class Recording:
 
     @property
     def published(self) -> int:
-        """How many messages were published."""
         return len(self._published)
 
     @property
@@ -130,6 +128,12 @@ class Recording:
     def started_s(self) -> float:
         """When `table` has its second 0, in seconds of `time.monotonic`; NaN before that."""
         return min((at_s for _, at_s in self._published), default=float('nan'))
+
+    def runs_here(self) -> int:
+        """Return the number of the message whose callback runs in this thread, or -1."""
+        here = threading.get_ident()
+        runs = (run for run in reversed(self._heard) if run.running)
+        return next((run.seq for run in runs if run.thread == here), -1)
 
     def now(self, depth: int) -> tuple[dict[int, float], list[int]]:
         """Return which messages have a callback now, and which wait in a queue of this depth.
@@ -150,7 +154,7 @@ class Recording:
         Raises ValueError for a count below 1, TimeoutError after `timeout_s` seconds, and the
         exception of a callback that failed.
         """
-        from helpers.ros.session import current_session
+        from helpers.ros import current_session
 
         __tracebackhide__ = True
         if messages < 1:
@@ -255,11 +259,13 @@ class CallbackRecording:
         @functools.wraps(call_async)
         def recorded_call_async(request):
             caller = self._running() if getattr(waits, 'here', False) else None
-            services = (one for one in self.watched if _serves(self.watched[one], client))
-            made = Call(name, next(services, None), caller, time.monotonic())
-            self.calls.append(made)
-            made.future = call_async(request)
-            return made.future
+            services = (
+                service for service in self.watched if _serves(self.watched[service], client)
+            )
+            recorded = Call(name, next(services, None), caller, time.monotonic())
+            self.calls.append(recorded)
+            recorded.future = call_async(request)
+            return recorded.future
 
         @functools.wraps(pending)
         def recorded_pending(sequence_number):

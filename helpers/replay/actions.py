@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from helpers.notebook.values import check_count
-from helpers.recording.recording import CallbackRecording
-from helpers.replay import Replay
+from helpers.notebook import check_count
+from helpers.recording import CallbackRecording
 from helpers.replay.recorded import GO, Callback, Move, count_of, moves_of, run_of
+from helpers.replay.replays import Replay
 
 REQUESTS = {'goal': 'send_goal', 'cancel': 'cancel_goal'}  # in `Waitable.execute`, and the service
 SAYS = 'publish_feedback', 'succeed', 'canceled', 'abort'  # methods of a goal handle
@@ -67,7 +67,7 @@ def replay_action(recording: ActionRecording, threads: int, cancelled_s: float) 
     """
     check_count('threads', threads)
     runs = recording.runs
-    if any(len(runs[one]) != 1 for one in ('execute_callback', 'cancel_goal')):
+    if any(len(runs[name]) != 1 for name in ('execute_callback', 'cancel_goal')):
         raise ValueError('A replay shows one job and its cancel: record the run of one goal.')
     late = runs['cancel_goal'][0].started_s > runs['execute_callback'][0].finished_s
     taken = 'is taken when the job has ended' if late else 'is taken while the job runs'

@@ -6,10 +6,10 @@ import inspect
 from collections.abc import Iterator
 from dataclasses import replace
 
-from helpers.notebook.values import check_count
-from helpers.recording.recording import Call, CallbackRecording
-from helpers.replay import Replay
+from helpers.notebook import check_count
+from helpers.recording import Call, CallbackRecording
 from helpers.replay.recorded import GO, Callback, Move, count_of, moves_of, run_of
+from helpers.replay.replays import Replay
 from helpers.replay.script import javascript
 
 WORDS = {'Timer': 'tick', 'Service': 'request', 'Client': 'answer'}

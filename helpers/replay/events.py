@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from helpers.recording.queue_model import take_bounds
+from helpers.recording import take_bounds
 
 ARRIVE, TAKE, END = 'arrive', 'take', 'end'
 
@@ -41,7 +41,7 @@ def events(table: pd.DataFrame, depth: int, workers: int) -> list[Event]:
     takes = _takes(table, heard, depth, workers)
     arrivals = _arrivals(table, takes, depth)
     seqs = table['seq'].tolist()
-    made: list[Event] = []
+    steps: list[Event] = []
     running: list[tuple[float, int, str]] = []  # a heap: the first to end
     arrived = 0
 
@@ -50,14 +50,14 @@ def events(table: pd.DataFrame, depth: int, workers: int) -> list[Event]:
         nonlocal arrived
         while arrived < arrivals_wanted or arrived < at_most and arrivals[arrived] <= until_s:
             end(arrivals[arrived])
-            made.append(Event(arrivals[arrived], ARRIVE, seqs[arrived], None))
+            steps.append(Event(arrivals[arrived], ARRIVE, seqs[arrived], None))
             arrived += 1
         end(until_s)
 
     def end(until_s: float) -> None:
         while running and running[0][0] <= until_s:
             finished_s, seq, thread = heapq.heappop(running)
-            made.append(Event(finished_s, END, seq, thread))
+            steps.append(Event(finished_s, END, seq, thread))
 
     expected = 0
     for index, seq, finished_s, thread in heard[['seq', 'finished_s', 'thread']].itertuples(
@@ -66,12 +66,12 @@ def events(table: pd.DataFrame, depth: int, workers: int) -> list[Event]:
         # After a gap, those that pushed out the ones in front of it had arrived.
         full = min(index + depth, len(seqs))
         go_on(takes[index], full if index > expected else index + 1, full)
-        made.append(Event(takes[index], TAKE, seq, thread))
+        steps.append(Event(takes[index], TAKE, seq, thread))
         # One that was still running when the record ended has no end: NaN.
         heapq.heappush(running, (math.inf if math.isnan(finished_s) else finished_s, seq, thread))
         expected = index + 1
     go_on(math.nextafter(math.inf, 0), len(seqs), len(seqs))
-    return made
+    return steps
 
 
 def _takes(table: pd.DataFrame, heard: pd.DataFrame, depth: int, workers: int) -> dict[int, float]:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
-from helpers.notebook.values import shown
+from helpers.notebook import shown
 from helpers.replay.script import played
 
 SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'element.js', 'board.js', 'level.js'
@@ -59,11 +59,10 @@ class Level:
         return f'A level to play: {self.task}'
 
     def html(self) -> str:
-        """Return the level as a part of a page."""
         record = {
             'goal': self.goal,
             'options': [{'name': name, 'values': of} for name, of in self.options.items()],
-            'variants': [vars(one) for one in self.variants().values()],
+            'variants': [vars(variant) for variant in self.variants().values()],
         }
         return played('level', record, self.task, *SCRIPT)
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 
-from helpers.recording.recording import CallbackRecording, CallbackRun
-from helpers.replay import KINDS, Run, fill_up
+from helpers.recording import CallbackRecording, CallbackRun
 from helpers.replay.events import ARRIVE, END, TAKE
+from helpers.replay.replays import KINDS, Run, fill_up
 
 DEPTH = 10  # of services and clients, by default; a timer's tick is taken when it is recorded
 GO = 'go'
@@ -56,13 +56,13 @@ def run_of(
     time_label: str,
 ) -> Run:
     """Return recorded callbacks as a run, which has no summary yet."""
-    zero, found = recording.zero_and_threads()
+    zero, names_of_threads = recording.zero_and_threads()
     members: dict[CallbackGroup | None, list[str]] = {}
-    for one in callbacks:
-        members.setdefault(one.group, []).append(one.name)
+    for callback in callbacks:
+        members.setdefault(callback.group, []).append(callback.name)
     groups = list(members)
     setup = {
-        'threads': fill_up(set(found.values()), threads),
+        'threads': fill_up(set(names_of_threads.values()), threads),
         'groups': [
             {
                 'name': f'the group of {" and ".join(names)}' if group else 'no group',
@@ -71,10 +71,11 @@ def run_of(
             for group, names in members.items()
         ],
         'callbacks': [
-            one._asdict() | {'group': groups.index(one.group), 'depth': DEPTH} for one in callbacks
+            callback._asdict() | {'group': groups.index(callback.group), 'depth': DEPTH}
+            for callback in callbacks
         ],
     }
-    place = {ident: setup['threads'].index(name) for ident, name in found.items()}
+    place = {ident: setup['threads'].index(name) for ident, name in names_of_threads.items()}
     in_short = [
         [
             round(1e6 * (at_s - zero)),

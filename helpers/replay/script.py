@@ -1,4 +1,7 @@
-"""The scripts and styles of this folder, as a page gets them, or Python runs them."""
+"""The scripts and styles of this folder, as a page gets them, or Python runs them.
+
+A file of another room, such as the drive of the robot, is given as its path.
+"""
 
 import json
 import re
@@ -10,7 +13,7 @@ from pathlib import Path
 from _quickjs import Context
 from rjsmin import jsmin
 
-from helpers.notebook.look import LOOK, LOOK_CSS
+from helpers.notebook import LOOK, LOOK_CSS
 
 DRAWN = 'model.js', 'rules.js', 'walk.js', 'stories.js', 'picture.js'
 COLOURS = f'const LOOK = {json.dumps(LOOK)};\n'
@@ -22,23 +25,24 @@ def short(css: str) -> str:
 
 
 @cache
-def source(name: str) -> str:
-    """Return a file of this folder without comments and needless spaces."""
-    text = Path(__file__).with_name(name).read_text()
-    return jsmin(text) + '\n' if name.endswith('.js') else short(text)
+def source(file: str | Path) -> str:
+    """Return a file without comments and needless spaces."""
+    path = Path(__file__).parent / file
+    text = path.read_text()
+    return jsmin(text) + '\n' if path.suffix == '.js' else short(text)
 
 
 @cache
-def script(*names: str) -> str:
-    """Return files of this folder as one script that leaves no name on the page."""
-    look = COLOURS if 'picture.js' in names else ''
-    return f'(() => {{\n{look}{"".join(map(source, names))}}})();'
+def script(*files: str | Path) -> str:
+    """Return files as one script that leaves no name on the page."""
+    look = COLOURS if 'picture.js' in files else ''
+    return f'(() => {{\n{look}{"".join(map(source, files))}}})();'
 
 
 @cache
-def style(*names: str) -> str:
-    """Return the look that all share, and files of this folder, as an element of HTML."""
-    return f'<style>{short(LOOK_CSS)}{"".join(map(source, ("style.css", *names)))}</style>'
+def style(*files: str | Path) -> str:
+    """Return the look that all share, and files, as an element of HTML."""
+    return f'<style>{short(LOOK_CSS)}{"".join(map(source, ("style.css", *files)))}</style>'
 
 
 def played(kind: str, record: dict, says: str, *names: str) -> str:

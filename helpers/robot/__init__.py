@@ -6,7 +6,8 @@
         robot.run(20, until=lambda: robot.stopped or robot.bumps)
 
 `floor` has the floors, `body` how it moves, `sensors` what it measures, `messages` how it says so,
-`robot` its node, and `record` what it did.
+`robot` its node, `record` what it did, `trip` a drive for filters, and `view` how one sees it and
+drives it by hand.
 
 It is no physics engine. As on a TurtleBot 3 are topics, types, frames, units, the limits of
 acceleration, what each sensor can know, and that it goes on while your program thinks. Not so here:
@@ -16,19 +17,41 @@ robots drive through each other; it is faster (1 m/s), it looks at the front hal
 Twist, where newer TurtleBots want TwistStamped.
 """
 
+from helpers.robot.body import MAX_ACCELERATION, MAX_TURN_ACCELERATION, RADIUS_M, RATE_HZ
 from helpers.robot.floor import CORRIDOR, EMPTY, FLOORS, ROOMS, Floor, Pose
-from helpers.robot.process import start_robot
+from helpers.robot.messages import ON_THE_FLOOR, odometry_message
 from helpers.robot.record import DriveRecord
 from helpers.robot.robot import Robot
+from helpers.robot.sensors import SLIP_SPEED, VARIANCES, without_noise
+from helpers.robot.trip import trip
+from helpers.robot.view.by_hand import drive_by_hand
+from helpers.robot.view.live import watch
+from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
+from helpers.robot.view.replay import replay_drive
 
 __all__ = [
     'CORRIDOR',
+    'DRIVE_CSS',
     'EMPTY',
     'FLOORS',
+    'MAX_ACCELERATION',
+    'MAX_TURN_ACCELERATION',
+    'ON_THE_FLOOR',
+    'RADIUS_M',
+    'RATE_HZ',
     'ROOMS',
+    'SLIP_SPEED',
+    'VARIANCES',
     'DriveRecord',
     'Floor',
     'Pose',
     'Robot',
-    'start_robot',
+    'drive_by_hand',
+    'floor_in_words',
+    'floor_picture',
+    'odometry_message',
+    'replay_drive',
+    'trip',
+    'watch',
+    'without_noise',
 ]

@@ -105,7 +105,6 @@ def arc(pose: Pose, v: float, w: float, seconds: float) -> Pose:
 
 
 def wrapped(angle: float) -> float:
-    """Return the same angle from -pi to pi."""
     return math.remainder(angle, math.tau)
 
 

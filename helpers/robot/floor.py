@@ -139,7 +139,6 @@ def _rows(text: str) -> list[str]:
 
 
 def _check(marks: dict[tuple[int, int], str]) -> None:
-    """Raise ValueError for marks that make no floor."""
     for mark in marks.values():
         if mark not in (WALL, BOX, FREE, *HEADINGS) and not mark.isalnum():
             raise ValueError(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from collections.abc import Sequence
 
 import numpy as np
 import pymap3d
@@ -11,13 +12,14 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 
-from helpers.fusion.messages import odometry_message, quaternion
-from helpers.fusion.tables import VARIANCES
 from helpers.robot.floor import Floor, Pose
-from helpers.robot.sensors import ANGLES, RANGE_MAX, RANGE_MIN
+from helpers.robot.sensors import ANGLES, RANGE_MAX, RANGE_MIN, VARIANCES
+from helpers.ros import quaternion, stamp_of
 
 DATUM = 10.7769, 106.7009, 0.0  # where x, y = 0, 0 is: degrees north and east, m. As in lesson 16
 FULL_V, EMPTY_V, CAPACITY_AH, LASTS_S = 12.6, 11.0, 1.8, 2.5 * 3600  # as the battery of a Waffle
+ON_THE_FLOOR = np.ix_([0, 1, 5], [0, 1, 5])  # x, y and yaw of the six
+TINY = 1e-9  # the variance of what is zero on a floor: z, roll and pitch
 # Nothing but the wheels says where the robot is, so a filter takes their speeds alone.
 POSE_COVARIANCE = np.diag([1.0, 1.0, 0.1])
 TWIST_COVARIANCE = np.diag([VARIANCES[name] for name in ('vx', 'vy', 'vyaw')])
@@ -30,32 +32,63 @@ COLOURS = {'wall': (190, 185, 175), 'box': (200, 120, 50), 'nothing': (0, 0, 0)}
 SKY, GROUND = (200, 220, 240), (110, 100, 90)
 
 
-def odometry(header: Header, child_frame: str, pose: Pose, said: dict[str, float]) -> Odometry:
+def odometry_message(
+    t: float,
+    frame: str,
+    state: Sequence[float],
+    pose_covariance: np.ndarray,
+    twist_covariance: np.ndarray,
+) -> Odometry:
+    """Return the message of a pose in `frame` and of a speed in base_footprint.
+
+    `state` begins with x, y (m), yaw (rad), vx, vy (m/s) and vyaw (rad/s), in this order.
+    The covariances (3, 3) are those of the first and of the last three.
+    """
+    x, y, yaw, vx, vy, vyaw = map(float, state[:6])
+    message = Odometry(child_frame_id='base_footprint')
+    message.header.stamp, message.header.frame_id = stamp_of(t), frame
+    message.pose.pose.position.x, message.pose.pose.position.y = x, y
+    message.pose.pose.orientation = quaternion(0, 0, yaw)
+    message.twist.twist.linear.x, message.twist.twist.linear.y = vx, vy
+    message.twist.twist.angular.z = vyaw
+    message.pose.covariance = _six_by_six(pose_covariance)
+    message.twist.covariance = _six_by_six(twist_covariance)
+    return message
+
+
+def _six_by_six(covariance: np.ndarray) -> np.ndarray:
+    """Return the covariance of x, y, yaw (3, 3) as a message has it: 36 numbers, row by row."""
+    full = TINY * np.eye(6)
+    full[ON_THE_FLOOR] = covariance
+    return full.ravel()
+
+
+def odometry(header: Header, child_frame: str, pose: Pose, readings: dict[str, float]) -> Odometry:
     """Return where the wheels think that the robot is, in their own frame, and how fast."""
-    state = *pose, said['vx'], 0.0, said['vyaw']
+    state = *pose, readings['vx'], 0.0, readings['vyaw']
     message = odometry_message(0.0, header.frame_id, state, POSE_COVARIANCE, TWIST_COVARIANCE)
     message.header, message.child_frame_id = header, child_frame
     return message
 
 
-def imu(header: Header, said: dict[str, float]) -> Imu:
+def imu(header: Header, readings: dict[str, float]) -> Imu:
     """Return what the IMU says. At rest it feels gravity, upwards."""
-    message = Imu(header=header, orientation=quaternion(0, 0, said['imu_yaw']))
-    message.angular_velocity.z = said['imu_vyaw']
+    message = Imu(header=header, orientation=quaternion(0, 0, readings['imu_yaw']))
+    message.angular_velocity.z = readings['imu_vyaw']
     acceleration = message.linear_acceleration
-    acceleration.x, acceleration.y, acceleration.z = said['ax'], said['ay'], 9.81
+    acceleration.x, acceleration.y, acceleration.z = readings['ax'], readings['ay'], 9.81
     message.orientation_covariance = VARIANCES['imu_yaw'] * np.eye(3).ravel()
     message.angular_velocity_covariance = VARIANCES['imu_vyaw'] * np.eye(3).ravel()
     message.linear_acceleration_covariance = VARIANCES['ax'] * np.eye(3).ravel()
     return message
 
 
-def fix(header: Header, said: dict[str, float]) -> NavSatFix:
+def fix(header: Header, readings: dict[str, float]) -> NavSatFix:
     """Return where GPS thinks that the robot is: x of the floor is east, y is north."""
     message = NavSatFix(header=header)
     message.status.status = NavSatStatus.STATUS_FIX
     message.status.service = NavSatStatus.SERVICE_GPS
-    place = pymap3d.enu2geodetic(said['gps_x'], said['gps_y'], 0.0, *DATUM)
+    place = pymap3d.enu2geodetic(readings['gps_x'], readings['gps_y'], 0.0, *DATUM)
     message.latitude, message.longitude, message.altitude = map(float, place)
     variances = VARIANCES['gps_x'], VARIANCES['gps_y'], 1.0
     message.position_covariance = np.diag(variances).ravel()

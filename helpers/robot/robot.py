@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -12,25 +11,22 @@ from geometry_msgs.msg import TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.time import Time
-from rclpy.utilities import get_default_context
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan, NavSatFix
 from std_msgs.msg import Bool, Header
 from std_srvs.srv import Trigger
 
-from helpers.fusion.messages import START_NS, quaternion
-from helpers.notebook.interrupts import uninterrupted
+from helpers.notebook import uninterrupted
 from helpers.robot import messages
 from helpers.robot.body import RATE_HZ, Body, wrapped
 from helpers.robot.floor import EMPTY, Floor, Pose
 from helpers.robot.record import Command, DriveRecord, Event, Scan, Step
 from helpers.robot.sensors import Sensors
-from helpers.ros.session import current_session, find
+from helpers.ros import START_NS, current_session, quaternion
 
 # RELIABLE, which both kinds of subscriptions hear, as a TurtleBot 3 in Gazebo has it. The drivers
 # of its real lasers are BEST_EFFORT.
@@ -87,7 +83,7 @@ class Robot(Node):
         self._sensors = Sensors(seed, noise, slip, mounting)
         if spin:
             session = current_session()
-            check_names(name, namespace.strip('/'))
+            check_names(session.node, name, namespace.strip('/'))
         super().__init__(name, namespace=namespace)
         self.floor, self.sim_time, self.record = floor, sim_time, DriveRecord(floor)
         self._arrived: list[Command] = []
@@ -129,7 +125,7 @@ class Robot(Node):
         self._remote = None
         try:
             from tf2_msgs.msg import TFMessage
-        except ImportError:  # the wheels lack it: see helpers.fusion.tf2_msgs
+        except ImportError:  # the wheels lack it: see provide_tf2_msgs of helpers.workspace
             return
         # Where its parts are on it, a robot_state_publisher knows from the URDF.
         self._topics['/tf'] = self._publisher(TFMessage, '/tf')
@@ -272,16 +268,19 @@ class Robot(Node):
             stamp_ns = self.get_clock().now().nanoseconds - round(late_s * 1e9)
         self._stamp = Time(nanoseconds=stamp_ns).to_msg()
         record.poses.append(Step(body.t_s, *body.pose, body.v, body.w))
-        said = self._sensors.read(body)
+        readings = self._sensors.read(body)
         if self.sim_time:
             self._clock_topic.publish(ClockMessage(clock=self._stamp))
         self._say(
             'odom',
             lambda: messages.odometry(
-                self._header('odom'), f'{self._prefix}base_footprint', self._sensors.odometry, said
+                self._header('odom'),
+                f'{self._prefix}base_footprint',
+                self._sensors.odometry,
+                readings,
             ),
         )
-        self._say('imu/data', lambda: messages.imu(self._header('imu_link'), said))
+        self._say('imu/data', lambda: messages.imu(self._header('imu_link'), readings))
         self._say('/tf', self._moving_frame)
         if number % SCAN_EVERY == 0:
             ranges = self._sensors.scan(body)
@@ -291,7 +290,7 @@ class Robot(Node):
         if number % PICTURE_EVERY == 0:
             self._say('camera/image_raw', self._picture)
         if number % RATE_HZ == 0:
-            self._say('gps/fix', lambda: messages.fix(self._header('gps_link'), said))
+            self._say('gps/fix', lambda: messages.fix(self._header('gps_link'), readings))
             self._say('battery_state', lambda: messages.battery(self._header(''), body.t_s))
             for topic, sentence in other_types(self, self.get_namespace().strip('/')):
                 self._warn(topic, sentence)
@@ -308,11 +307,11 @@ class Robot(Node):
         return messages.picture(self._header(CAMERA_FRAME), self.floor, looks)
 
     def _moving_frame(self):
-        made = TransformStamped(header=self._header('odom'))
-        made.child_frame_id = f'{self._prefix}base_footprint'
-        place, (x, y, yaw) = made.transform, self._sensors.odometry
+        stamped = TransformStamped(header=self._header('odom'))
+        stamped.child_frame_id = f'{self._prefix}base_footprint'
+        place, (x, y, yaw) = stamped.transform, self._sensors.odometry
         place.translation.x, place.translation.y, place.rotation = x, y, quaternion(0, 0, yaw)
-        return self._topics['/tf'].msg_type(transforms=[made])
+        return self._topics['/tf'].msg_type(transforms=[stamped])
 
     # --- Small things
 
@@ -322,23 +321,24 @@ class Robot(Node):
     def _event(self, kind: str, text: str) -> None:
         self.record.events.append(Event(self.t_s, kind, text))
 
-    def _warn(self, what: str, text: str) -> None:
-        if what not in self._warned:
-            self._warned.add(what)
+    def _warn(self, topic: str, text: str) -> None:
+        if topic not in self._warned:
+            self._warned.add(topic)
             self.get_logger().warning(text)
 
 
-def check_names(name: str, namespace: str) -> None:
-    """Raise ValueError for names that are taken, before a node spoils those of another."""
-    for node in find(Node, get_default_context()):  # each sees the same: the session has one
-        with contextlib.suppress(InvalidHandle):  # it was destroyed
-            if (name, f'/{namespace}') in node.get_node_names_and_namespaces():
-                raise ValueError(
-                    f'There is a node {name} already: give this robot another name and namespace, '
-                    "as in Robot(name='robot_2', namespace='two')."
-                )
-            for _, sentence in other_types(node, namespace):
-                raise ValueError(sentence)
+def check_names(node: Node, name: str, namespace: str) -> None:
+    """Raise ValueError for names that are taken, before a robot spoils those of another.
+
+    `node` is asked which there are.
+    """
+    if (name, f'/{namespace}') in node.get_node_names_and_namespaces():
+        raise ValueError(
+            f'There is a node {name} already: give this robot another name and namespace, '
+            "as in Robot(name='robot_2', namespace='two')."
+        )
+    for _, sentence in other_types(node, namespace):
+        raise ValueError(sentence)
 
 
 def other_types(node: Node, namespace: str) -> Iterator[tuple[str, str]]:

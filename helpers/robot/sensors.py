@@ -1,4 +1,8 @@
-"""What the robot's sensors say: the truth, with the errors of `helpers.fusion.simulate`."""
+"""What the robot's sensors say: the truth, with their errors.
+
+Wheels and gyro are wrong in the same way each time, and each sensor has its noise. `simulate` of
+`helpers.fusion` makes whole tables of the same.
+"""
 
 from __future__ import annotations
 
@@ -7,18 +11,52 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from helpers.fusion.drives import SLIP_SPEED, said
-from helpers.fusion.settings import chosen
-from helpers.fusion.tables import VARIANCES
+from helpers.notebook import chosen
 from helpers.robot.body import RATE_HZ, Body, arc
 from helpers.robot.floor import Pose
 
+# The variance of the noise of each number, per axis. `vy` is never measured: wheels that cannot
+# move sideways say 0.
+VARIANCES = {
+    'vx': 0.0025,
+    'vy': 0.01,
+    'vyaw': 0.0025,
+    'imu_yaw': 0.0004,
+    'imu_vyaw': 0.0001,
+    'ax': 0.01,
+    'gps_x': 0.25,
+    'gps_y': 0.25,
+}
+# What the wheels say: so many times the speed, so many times the turning rate, and so much more.
+WHEEL_SCALE = 1.04
+TURN_SCALE = 1.05
+TURN_BIAS = 0.012  # rad/s
+GYRO_BIAS = 0.002  # rad/s
+SLIP_SPEED = 0.5  # m/s, what the wheels say too much while they slip
 ANGLES = np.radians(np.arange(-90.0, 91.0))  # of the beams: right, ahead (number 90), left
 RANGE_MIN, RANGE_MAX = 0.1, 8.0  # m; the robot that touches a wall sees it at 0.11 m
 LASER_SIGMA = 0.01  # m
 EXACT = {'vx': 'vx', 'vyaw': 'vyaw', 'imu_yaw': 'yaw', 'imu_vyaw': 'vyaw', 'ax': 'ax', 'ay': 'ay'}
 EXACT |= {'gps_x': 'x', 'gps_y': 'y'}
 SIGMA = np.sqrt([VARIANCES['ax' if name == 'ay' else name] for name in EXACT])
+
+
+def without_noise(truth: Mapping, slipping=0.0, imu_mounting: float = 0.0) -> dict:
+    """Return what the sensors would say without noise, of a moment (numbers) or of many (columns).
+
+    `truth` has x, y, yaw, vx, vyaw, ax and ay; `slipping` is what the wheels say too much (m/s).
+    """
+    cos, sin = math.cos(imu_mounting), math.sin(imu_mounting)
+    return {
+        'vx': WHEEL_SCALE * truth['vx'] + slipping,
+        'vyaw': TURN_SCALE * truth['vyaw'] + TURN_BIAS,
+        'imu_yaw': truth['yaw'] + imu_mounting,
+        'imu_vyaw': truth['vyaw'] + GYRO_BIAS,
+        'ax': cos * truth['ax'] + sin * truth['ay'],
+        'ay': cos * truth['ay'] - sin * truth['ax'],
+        'gps_x': truth['x'],
+        'gps_y': truth['y'],
+    }
 
 
 class Sensors:
@@ -50,12 +88,12 @@ class Sensors:
         truth['ay'] = body.v * body.w
         if self._noise:
             slipping = SLIP_SPEED * (self._slip[0] <= body.t_s < self._slip[1])
-            values = said(truth, slipping, self._imu_yaw)
+            values = without_noise(truth, slipping, self._imu_yaw)
             for name, error in zip(EXACT, self._rng.normal(0, SIGMA).tolist(), strict=True):
                 values[name] += error
         else:
             values = {name: truth[of] for name, of in EXACT.items()}
-            turned = said(truth, imu_mounting=self._imu_yaw)
+            turned = without_noise(truth, imu_mounting=self._imu_yaw)
             values |= {name: turned[name] for name in ('imu_yaw', 'ax', 'ay')}
         if self._said:  # as the body moves: with the means over the step
             v, w = ((values[name] + self._said[name]) / 2 for name in ('vx', 'vyaw'))

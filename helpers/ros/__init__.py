@@ -1,5 +1,31 @@
 """A ROS session in a kernel: its domain, its threads, its log, and what waits for what."""
 
-from helpers.ros.session import frames, ros_session
+from helpers.ros.connections import NOT_OF_A_LESSON, nearly
+from helpers.ros.conversions import START_NS, quaternion, seconds_of, stamp_of, yaw_of
+from helpers.ros.domain import one_process_at_a_time, speak_udp_only
+from helpers.ros.session import (
+    Session,
+    current_session,
+    find,
+    frames,
+    graph_environment,
+    ros_session,
+)
 
-__all__ = ['frames', 'ros_session']
+__all__ = [
+    'NOT_OF_A_LESSON',
+    'START_NS',
+    'Session',
+    'current_session',
+    'find',
+    'frames',
+    'graph_environment',
+    'nearly',
+    'one_process_at_a_time',
+    'quaternion',
+    'ros_session',
+    'seconds_of',
+    'speak_udp_only',
+    'stamp_of',
+    'yaw_of',
+]

@@ -110,19 +110,17 @@ def _node_name(end) -> str:
 def nearly(name: str, others: list[str]) -> str:
     """Return a sentence that names which of the other names may be meant, or nothing."""
     by_lower = {other.lower(): other for other in others}
-    found = get_close_matches(name.lower(), by_lower, n=1, cutoff=0.8)
-    return f' Nearly the same name: {by_lower[found[0]]}.' if found else ''
+    matches = get_close_matches(name.lower(), by_lower, n=1, cutoff=0.8)
+    return f' Nearly the same name: {by_lower[matches[0]]}.' if matches else ''
 
 
 def _pairs_that_do_not_fit(name: str, publishers: list, subscriptions: list) -> Iterator[str]:
-    for one, other in product(publishers, subscriptions):
-        fit, reason = qos_check_compatible(one.qos_profile, other.qos_profile)
+    for publisher, subscription in product(publishers, subscriptions):
+        fit, reason = qos_check_compatible(publisher.qos_profile, subscription.qos_profile)
         if fit == QoSCompatibility.ERROR:
             reason = reason.replace('ERROR: ', '').strip('; ')
-            yield (
-                f'On the topic {name}, the QoS of {one.node_name} and {other.node_name} do not '
-                f'fit: {reason}.'
-            )
+            ends = f'{publisher.node_name} and {subscription.node_name}'
+            yield f'On the topic {name}, the QoS of {ends} do not fit: {reason}.'
 
 
 def _services(nodes: list[Node]) -> Iterator[str]:
@@ -139,7 +137,7 @@ def _services(nodes: list[Node]) -> Iterator[str]:
 
 
 def _of_actions(node: Node, *kinds: type) -> list:
-    return [one for one in node.waitables if isinstance(one, kinds)]
+    return [waitable for waitable in node.waitables if isinstance(waitable, kinds)]
 
 
 def _actions(nodes: list[Node]) -> Iterator[str]:

@@ -10,7 +10,7 @@ import socket
 import time
 from collections.abc import Iterator
 
-from helpers.ros2._sessions import recorded
+from helpers.ros.session_record import recorded
 
 SHARED_MEMORY = '/dev/shm'
 MARK_ADDRESS = '127.0.0.2'  # of this machine; no connection comes from it
@@ -36,7 +36,8 @@ def reserve_domain_id() -> int:
         try:
             _domain_id = _reserved.enter_context(domain_id())
             # For the ros2 command, which looks where this user's kernels are.
-            _reserved.enter_context(recorded(domain_variables(_domain_id, 'LOCALHOST'), False))
+            variables = domain_variables(_domain_id, 'LOCALHOST')
+            _reserved.enter_context(recorded(variables, 'reserved'))
         except RuntimeError as error:
             raise RuntimeError(
                 'All 100 ROS domain ids of this machine are in use: '

@@ -1,7 +1,6 @@
-"""Every private name of rclpy that we touch, and of the Python that it runs in.
+"""What a session does inside of rclpy, and of the Python that it runs in.
 
-A new version may take one away. `NAMES` says in which version each was read. A test says which one
-is gone, and another one that no other module touches any.
+A new version may take away a private name: helpers/private_names.py lists them.
 """
 
 from __future__ import annotations
@@ -11,27 +10,14 @@ import threading
 import warnings
 from concurrent.futures import thread as thread_pool
 from types import FrameType
+from typing import NamedTuple
 
 from rclpy.action import ActionClient
 from rclpy.client import Client
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from helpers.notebook.threads import frames
-
-# What has the name: the name, and the versions in which it was read.
-NAMES = {
-    'an executor': {
-        '_is_shutdown': 'rclpy 7.1.6',
-        '_tasks': 'rclpy 7.1.6',
-        '_wait_for_ready_callbacks': 'rclpy 7.1.6',
-    },
-    'a MultiThreadedExecutor': {'_executor': 'rclpy 7.1.6', '_futures': 'rclpy 7.1.6'},
-    'a client': {'_pending_requests': 'rclpy 7.1.6'},
-    'an action client': {'_action_name': 'rclpy 7.1.6'},
-    'a lifecycle node': {'_state_machine': 'rclpy 7.1.6'},
-    'a ThreadPoolExecutor': {'_threads': 'Python 3.11.7', '_max_workers': 'Python 3.11.7'},
-}
+from helpers.notebook import frames
 
 
 def end_spin(executor: Executor) -> None:
@@ -41,7 +27,6 @@ def end_spin(executor: Executor) -> None:
 
 
 def pool_threads(executor: Executor) -> list[threading.Thread]:
-    """Return the threads of the pool of an executor that has one."""
     pool = getattr(executor, '_executor', None)
     return [] if pool is None else list(pool._threads)
 
@@ -87,31 +72,18 @@ def end_lifecycle(node: Node) -> None:
         machine.destroy_when_not_in_use()
 
 
-def end_answered_call(thread: threading.Thread) -> None:
-    """Let a thread go on that waits in `Client.call` for an answer which is there.
-
-    The executor that took the answer has ended before it could wake the thread.
-    """
-    for _, frame in frames([thread]):
-        while frame is not None and frame.f_code is not Client.call.__code__:
-            frame = frame.f_back
-        if frame is not None and 'future' in frame.f_locals and frame.f_locals['future'].done():
-            frame.f_locals['event'].set()
-
-
 def action_name(client: ActionClient) -> str:
-    """Return the name of an action, as its client was given it."""
     return client._action_name
 
 
-def states(executor: Executor, spin_thread: threading.Thread) -> set[str]:
+def states_of(executor: Executor, spin_thread: threading.Thread) -> set[str]:
     """Return what the threads that run an executor's callbacks do: 'working', 'waiting', 'free'."""
     pool = getattr(executor, '_executor', None)
     threads = [spin_thread] if pool is None else list(pool._threads)
-    found = {_state(frame) for _, frame in frames(threads)}
+    states = {_state(frame) for _, frame in frames(threads)}
     if pool is not None and len(threads) < pool._max_workers:
-        found.add('free')  # the pool starts a thread when it needs one
-    return found
+        states.add('free')  # the pool starts a thread when it needs one
+    return states
 
 
 def _state(frame: FrameType) -> str:
@@ -124,15 +96,28 @@ def _state(frame: FrameType) -> str:
     return 'working'
 
 
-def end_wait(thread: threading.Thread, longer_than_s: float) -> None:
-    """Set the Event at which a thread waits, if it would wait longer than this."""
+class Wait(NamedTuple):
+    """The Event at which a thread waits, for how long (None: without end), and for an answer?"""
+
+    event: threading.Event
+    timeout_s: float | None
+    in_call: bool
+
+
+def wait_of(thread: threading.Thread) -> Wait | None:
+    """Return the wait of a thread: only its frame of `Event.wait` knows which Event it is.
+
+    `in_call` says that it waits in `Client.call`. The executor that took the answer may have ended
+    before it could wake the thread.
+    """
     for _, frame in frames([thread]):
         while frame is not None and frame.f_code is not threading.Event.wait.__code__:
             frame = frame.f_back
         if frame is not None:
-            event, timeout_s = frame.f_locals['self'], frame.f_locals['timeout']
-            if timeout_s is None or timeout_s > longer_than_s:
-                event.set()
+            caller = frame.f_back
+            in_call = caller is not None and caller.f_code is Client.call.__code__
+            return Wait(frame.f_locals['self'], frame.f_locals['timeout'], in_call)
+    return None
 
 
 def break_off(thread: threading.Thread, error: type[Exception]) -> None:

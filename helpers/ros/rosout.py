@@ -12,8 +12,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 @dataclass
 class Record:
-    """One message of `/rosout`."""
-
     level: str
     node: str
     text: str
@@ -29,7 +27,7 @@ class Rosout:
     """The records of all nodes of a domain, from now on. `node` is the log's own."""
 
     def __init__(self, node: Node) -> None:
-        self._node = node  # or it would be collected, outside of the turn of this process
+        self.node = node  # or it would be collected, outside of the turn of this process
         self._records: list[Record] = []
         self._subscription = node.create_subscription(
             Log,

@@ -17,8 +17,7 @@ from collections.abc import Callable, Iterator
 from itertools import chain
 from traceback import clear_frames
 
-from helpers.notebook.interrupts import at_each_signal, uninterrupted
-from helpers.notebook.threads import frames as frames
+from helpers.notebook import ProgressBar, at_each_signal, frames, uninterrupted
 from helpers.ros.domain import (
     check_domain,
     configure_discovery,
@@ -28,7 +27,7 @@ from helpers.ros.domain import (
     share_domain_id,
 )
 from helpers.ros.fields import check_fields
-from helpers.ros2._sessions import recorded
+from helpers.ros.session_record import recorded
 
 try:
     import rclpy
@@ -42,7 +41,6 @@ try:
     from rclpy.signals import SignalHandlerOptions
     from rclpy.subscription import Subscription
 
-    from helpers.notebook.progress_bar import ProgressBar
     from helpers.ros import connections, private
     from helpers.ros.rosout import Record, Rosout
 except ImportError as error:
@@ -138,7 +136,7 @@ class Session:
         try:
             with uninterrupted():
                 # For the ros2 command, which looks where a session is open.
-                self._shared.enter_context(recorded(self.environment, is_open=True))
+                self._shared.enter_context(recorded(self.environment, 'open'))
                 self._context = rclpy.get_default_context()
                 _open_session = self
                 self._initialise()
@@ -161,6 +159,11 @@ class Session:
         with one_process_at_a_time():  # the first node makes the participant
             node = Node(LOG_NODE, enable_rosout=False, start_parameter_services=False)
         self._rosout = Rosout(node)
+
+    @property
+    def node(self) -> Node:
+        """The session's own node: it hears the log, and can be asked who else is there."""
+        return self._rosout.node
 
     def _wake(self) -> None:
         # The executors that a cell spins itself, too: `rclpy.spin(node)`.
@@ -242,7 +245,7 @@ class Session:
         soon as one has failed.
         """
         __tracebackhide__ = True  # IPython shows the cell, and the callback that failed
-        started, said = time.monotonic(), False
+        started, explained = time.monotonic(), False
         # It is never set: an interruptible pause between two looks at the predicate.
         pause = threading.Event()
         with ProgressBar(progress) as bar:
@@ -254,8 +257,8 @@ class Session:
                 if waited_s > timeout_s:
                     raise TimeoutError(self._why(f'Gave up after {timeout_s:g} s.', status))
                 bar.update(waited_s)
-                if waited_s > SAY_AFTER_S and not said:
-                    said = True
+                if waited_s > SAY_AFTER_S and not explained:
+                    explained = True
                     if self._findings():
                         bar.say(self._why(f'Waited {SAY_AFTER_S:g} s so far.', status))
                 pause.wait(POLL_S)
@@ -288,7 +291,7 @@ class Session:
 
         def is_quiet() -> bool:
             nonlocal task, rounds, states
-            states = private.states(executor, self._spinning[executor])
+            states = private.states_of(executor, self._spinning[executor])
             if 'working' in states:
                 rounds = 0
             elif task.done():
@@ -390,14 +393,18 @@ class Session:
         while thread.is_alive() and time.monotonic() < deadline:
             if self._ended_by_exception and time.monotonic() > started + BREAK_OFF_S:
                 private.break_off(thread, SessionClosedError)
+            wait = private.wait_of(thread)
             for client in find(Client, self._context):
                 private.fail_calls(client, SessionClosedError('The session closes.'))
-            private.end_answered_call(thread)
-            if self._ended_by_exception:
-                # A long wait at once. A short one ends by itself, unless it comes again and again.
-                left_s = deadline - time.monotonic()
-                private.end_wait(thread, longer_than_s=left_s - CLOSE_TIMEOUT_S / 2)
+            if wait is not None and (wait.in_call or self._ends_wait(wait, deadline)):
+                wait.event.set()
             thread.join(25 * POLL_S)  # less often than POLL_S: to look for calls takes long
+
+    def _ends_wait(self, wait: private.Wait, deadline: float) -> bool:
+        """Whether a wait ends now: a short one ends by itself, unless it comes again and again."""
+        left_s = deadline - time.monotonic()
+        is_long = wait.timeout_s is None or wait.timeout_s > left_s - CLOSE_TIMEOUT_S / 2
+        return self._ended_by_exception and is_long
 
     def threads(self) -> list[threading.Thread]:
         """Return the threads that run callbacks."""
@@ -420,14 +427,14 @@ def destroy_nodes(context: rclpy.Context) -> list[Exception]:
     Python collects the node of `Node('talker').create_publisher(...)`. What it has made stays, and
     keeps the participant. Returns the failures.
     """
-    found = _objects(Node, *MADE_BY_NODES)
-    nodes = [thing for thing in found if isinstance(thing, Node)]
-    kept = {id(made) for node in nodes if hasattr(node, 'handle') for made in _made_by(node)}
+    things = _objects(Node, *MADE_BY_NODES)
+    nodes = [thing for thing in things if isinstance(thing, Node)]
+    kept = {id(end) for node in nodes if hasattr(node, 'handle') for end in _made_by(node)}
     failures: list[Exception] = []
     with one_process_at_a_time():  # the last node ends the participant
         for node in _of(context, nodes):
             failures += _destroy(node)
-        for thing in found:
+        for thing in things:
             if isinstance(thing, MADE_BY_NODES) and id(thing) not in kept:
                 failures += _failure(thing.destroy)
     return failures
@@ -469,9 +476,9 @@ def _failure(
 
 def _destroy_actions(node: Node) -> None:
     """Destroy what destroy_node leaves, and with it the participant while a variable holds it."""
-    for one in list(node.waitables):
-        if isinstance(one, ActionClient | ActionServer):
-            one.destroy()
+    for waitable in list(node.waitables):
+        if isinstance(waitable, ActionClient | ActionServer):
+            waitable.destroy()
 
 
 def find(kind: type, context: rclpy.Context) -> Iterator:
@@ -484,7 +491,16 @@ def _of(context: rclpy.Context, things: list) -> Iterator:
 
 
 def _objects(*kinds: type) -> list:
-    return [thing for thing in gc.get_objects() if issubclass(type(thing), kinds)]
+    """Return all objects of these kinds. rclpy keeps no list of them, but each refers to its class.
+
+    So Python's collector finds them: it looks through all that the kernel has, in C.
+    """
+    classes = set().union(*map(_with_subclasses, kinds))
+    return [thing for thing in gc.get_referrers(*classes) if issubclass(type(thing), kinds)]
+
+
+def _with_subclasses(kind: type) -> set[type]:
+    return {kind}.union(*map(_with_subclasses, kind.__subclasses__()))
 
 
 @atexit.register

@@ -8,12 +8,27 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
     folders       the folder of a workspace, which no two kernels share
     wheels        CMake files of the ROS 2 wheels, made to fit this machine
     processes     a process that prints lines, and ends
+    tf2_msgs      the package of the message of /tf, which the wheels lack
     build_output  what a build says, and which of its lines matter
     small_rclcpp  a package in C++: the part of rclcpp that lesson 13 needs, over rcl
     colleague.sh  makes the repository of somebody else that lesson 10 brings in
     sourcing      what `source install/setup.bash` gives, for a kernel that already runs
 """
 
+from helpers.workspace.build_output import BuildResult, lines_that_matter, without_folders
+from helpers.workspace.processes import Process
+from helpers.workspace.tf2_msgs import provide_tf2_msgs
+from helpers.workspace.wheels import fix_wheels
 from helpers.workspace.workspace import COLLEAGUE, SMALL_RCLCPP, Workspace
 
-__all__ = ['COLLEAGUE', 'SMALL_RCLCPP', 'Workspace']
+__all__ = [
+    'COLLEAGUE',
+    'SMALL_RCLCPP',
+    'BuildResult',
+    'Process',
+    'Workspace',
+    'fix_wheels',
+    'lines_that_matter',
+    'provide_tf2_msgs',
+    'without_folders',
+]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from helpers.notebook.text import wrap
+from helpers.notebook import wrap
 
 STANDARD_LIBRARY = '.../lib/python3/'
 

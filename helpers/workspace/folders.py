@@ -32,7 +32,6 @@ def claim(name: str) -> Path:
 
 
 def locks() -> tuple[int, ...]:
-    """Return the open files that lock this process's workspaces."""
     return tuple(_locks.values())
 
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import psutil
 
-from helpers.notebook.interrupts import uninterrupted
-from helpers.ros.connections import NOT_OF_A_LESSON, nearly
+from helpers.notebook import uninterrupted
+from helpers.ros import NOT_OF_A_LESSON, nearly
 from helpers.workspace.folders import locks
 
 STOP_TIMEOUT_S = 5.0
@@ -87,6 +87,11 @@ class Process:
             )
             _started.add(self)
             _of_this_cell.add(self)
+
+    @property
+    def pid(self) -> int:
+        """The id of the process; what it has started has others."""
+        return self._process.pid
 
     @property
     def lines(self) -> list[str]:
@@ -189,8 +194,8 @@ def _lonely_topics(environment: dict[str, str]) -> Iterator[str]:
     if ros2 is None or 'ROS_DOMAIN_ID' not in environment:
         return
     command = [ros2, 'topic', 'list', '--verbose']
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=20)
-    published, _, subscribed = said.stdout.partition('Subscribed topics:')
+    listing = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=20)
+    published, _, subscribed = listing.stdout.partition('Subscribed topics:')
     sides = [set(re.findall(r'^ \* (/\S+)', part, re.M)) for part in (published, subscribed)]
     for own, others, there in ((*sides, 'publisher'), (*sides[::-1], 'subscription')):
         missing = {'publisher': 'subscription', 'subscription': 'publisher'}[there]

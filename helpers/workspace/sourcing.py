@@ -10,8 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from helpers.machine.build_tools import build_environment
-from helpers.notebook.interrupts import uninterrupted
+from helpers.machine import build_environment
+from helpers.notebook import uninterrupted
 
 SOURCE_TIMEOUT_S = 20.0
 
@@ -71,12 +71,12 @@ def use(install: Path, sourced: dict[str, str]) -> None:
 
 def _libraries(install: Path) -> dict[str, list[Path]]:
     """Return the shared libraries of each package, those of `lib` before Python's extensions."""
-    found = {}
+    libraries = {}
     for package in sorted(install.iterdir()):
         files = sorted(package.glob('lib/*.so*')) + sorted(package.glob('**/site-packages/**/*.so'))
         if files:
-            found[package.name] = files
-    return found
+            libraries[package.name] = files
+    return libraries
 
 
 def _load(files: list[Path]) -> None:

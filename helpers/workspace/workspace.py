@@ -11,12 +11,11 @@ import time
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
-from helpers.machine.build_tools import build_environment, build_tools, from_wheels
-from helpers.notebook.interrupts import uninterrupted
-from helpers.notebook.progress_bar import ProgressBar, somebody_watches
-from helpers.ros.session import graph_environment
-from helpers.ros2._commands import CommandError
-from helpers.ros2.run import command_of
+from ros2_command.api import CommandError, command_of
+
+from helpers.machine import build_environment, from_wheels, tools_of_a_build
+from helpers.notebook import ProgressBar, somebody_watches, uninterrupted
+from helpers.ros import graph_environment
 from helpers.workspace.build_output import BuildResult, read_result, without_folders
 from helpers.workspace.folders import claim
 from helpers.workspace.processes import POLL_S, Process
@@ -138,7 +137,7 @@ class Workspace:
         machine lacks a tool, with the command that installs it.
         """
         with_cmake = any(self.path.glob('src/**/CMakeLists.txt'))
-        for tool in build_tools(with_cmake):
+        for tool in tools_of_a_build(with_cmake):
             if not tool.found:
                 raise RuntimeError(
                     f'Missing for this build: {tool.name}. Run `{tool.install}`, then run this '

@@ -111,7 +111,7 @@ def judge(kernel: Kernel, answers: list, key: str, cells: dict[str, list[str]]) 
 @pytest.mark.parametrize(
     ('lesson', 'task'),
     [(path.stem, task) for path in FILES for task in sorted(tasks_of(path))],
-    ids=lambda value: value if isinstance(value, str) else f'task {value}',
+    ids=lambda value: value if isinstance(value, str) else f'task_{value:02d}',
 )
 def test_check_judges_right_and_wrong_answers(lesson, task):
     [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{lesson}.ipynb')

@@ -98,7 +98,7 @@ def session(rate_hz: int) -> None:
     from rclpy.executors import SingleThreadedExecutor
 
     from helpers.recording import Recording
-    from helpers.ros.session import ros_session
+    from helpers.ros import ros_session
 
     with ros_session() as session:
         talker, listener, sent, heard = _nodes(rate_hz)

@@ -2,7 +2,7 @@
 
 from support.lab_page import WIDER
 
-from helpers.replay.free import FreePlay
+from helpers.replay import FreePlay
 
 
 def test_a_slider_draws_the_prediction_again(phone, artefacts):

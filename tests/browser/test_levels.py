@@ -2,7 +2,7 @@
 
 from support.lab_page import WIDER
 
-from helpers.replay.levels import level
+from helpers.replay import level
 
 START = 'Choose what happens next'
 

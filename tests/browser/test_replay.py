@@ -7,11 +7,11 @@ from support.lab_page import PANEL, WIDER
 from support.runs import assert_is_the_run
 
 from helpers.notebook.fresh import MARK
-from helpers.recording.queue_model import predict
+from helpers.recording import predict
 from helpers.replay import replay
 from tools.lessons.clean import NOTEBOOK_METADATA
 
-SOURCE = """from helpers.recording.queue_model import predict
+SOURCE = """from helpers.recording import predict
 from helpers.replay import replay
 replay(predict(0.05, 0.2, 10, 1, 41), 10)"""
 PUSHED_OUT = 'Message 14 arrives. Ten wait, so the oldest, 4, is pushed out.'

@@ -111,7 +111,7 @@ while True:
 # Prints who it has heard once it has heard `sys.argv[3]`, and its ports.
 LISTENER = f"""{END}
 from pathlib import Path
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String

@@ -9,7 +9,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
-from helpers.notebook.fresh import AS_SAVED, MARK
+from helpers.notebook import AS_SAVED, MARK
 
 NOTEBOOK_METADATA = {
     'kernelspec': {

@@ -21,8 +21,8 @@ from nbformat import NotebookNode
 from PIL import Image
 from sphinx.cmd.build import build_main
 
-from helpers.notebook.look import LOOK_CSS
-from helpers.replay.levels import level
+from helpers.notebook import LOOK_CSS
+from helpers.replay import level
 from tools.lessons.lesson import (
     FOLDER,
     GLOSSARY,
@@ -37,7 +37,7 @@ from tools.site import free_drive
 
 HERE = Path(__file__).parent
 WORK = ROOT / '.site'
-CLASSROOM = ('tools/classroom/README', 'tools/classroom/HOSTING')
+CLASSROOM = ('classroom/README', 'classroom/HOSTING')
 DOCUMENTS = (
     'README',
     'environment',

@@ -24,7 +24,7 @@ from helpers.checks.bench import STATUS
 from helpers.checks.planted import planted, run_tests
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import CORRIDOR, EMPTY, ROOMS, Floor, Pose, Robot
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check

@@ -12,7 +12,7 @@ from std_msgs.msg import String
 from helpers.checks.bench import Bench
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import EMPTY, Robot
-from helpers.ros.session import ros_session
+from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check

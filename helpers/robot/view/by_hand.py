@@ -7,12 +7,15 @@ A press comes as a message of a widget. The kernel reads it in a thread of its o
 from __future__ import annotations
 
 from html import escape
+from pathlib import Path
 
-from helpers.notebook.progress_bar import somebody_watches
-from helpers.replay.script import script, style
+from helpers.notebook import hear_while_a_cell_runs, somebody_watches
+from helpers.replay import script, style
 from helpers.robot.robot import Robot
-from helpers.ros.session import current_session
+from helpers.robot.view.picture import DRIVE_CSS
+from helpers.ros import current_session
 
+BY_HAND_JS = Path(__file__).with_name('by_hand.js')
 SPEED, TURN = 0.5, 1.2  # m/s, rad/s
 EVERY_S = 0.1  # a command: the robot stops 0.5 s after the last one
 BUTTONS = {'▲': 'forward', '▼': 'back', '◀': 'left', '▶': 'right', '■': 'stop', 'End': 'end'}
@@ -52,17 +55,15 @@ def drive_by_hand(robot: Robot, seconds: float = 60.0) -> None:
         button = Button(description=face, tooltip=name, layout=Layout(width='56px', height='44px'))
         button.add_class(f'hand-{name}')  # which is sent, too
         button.on_click(press)
-        # ipykernel 7.4 leads a widget's messages to the thread that spoke last: that of the cell,
-        # which is busy. Without this they go to the subshell that JupyterLab addresses.
-        vars(button.comm).pop('_reply_subshell_id', None)
+        hear_while_a_cell_runs(button)
         pad.append(button)
     box = HBox(pad)
     box.add_class('by-hand')
     shown = display(box, display_id=True)
     keys = display(
         HTML(
-            f'{style("drive.css")}<p class="by-hand-keys" tabindex="0">'
-            f'{escape(HELP)}</p><script>{script("by_hand.js")}</script>'
+            f'{style(DRIVE_CSS)}<p class="by-hand-keys" tabindex="0">'
+            f'{escape(HELP)}</p><script>{script(BY_HAND_JS)}</script>'
         ),
         display_id=True,
     )
@@ -79,6 +80,6 @@ def drive_by_hand(robot: Robot, seconds: float = 60.0) -> None:
     try:
         current_session().wait_until(go_on, 10 * seconds + 60)
     finally:
-        for one in (shown, keys):
-            one.update({'text/html': ''}, raw=True)
+        for output in (shown, keys):
+            output.update({'text/html': ''}, raw=True)
         box.close()

@@ -7,15 +7,14 @@ from html import escape
 
 from rclpy.subscription import Subscription
 
-from helpers.notebook.progress_bar import somebody_watches
-from helpers.replay import Replay
-from helpers.replay.script import style
+from helpers.notebook import somebody_watches
+from helpers.replay import Replay, style
 from helpers.robot.floor import Pose
 from helpers.robot.robot import Robot
-from helpers.robot.view.picture import described, picture
+from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
 from helpers.robot.view.replay import bumps, place, replay_drive
 from helpers.robot.view.scans import ScanRecording
-from helpers.ros.session import current_session
+from helpers.ros import current_session
 
 PERIOD_S = 1 / 12
 EVERY = 5  # steps of the robot: a point of its path
@@ -95,7 +94,7 @@ class LiveView:
         record = self._record
         poses, scans, commands = record.poses, record.scans, record.commands
         now = poses[-1]
-        svg = picture(
+        svg = floor_picture(
             record.floor,
             [row[1:3] for row in [*poses[::EVERY], now]],
             Pose(now.x, now.y, now.yaw),
@@ -104,12 +103,12 @@ class LiveView:
         )
         told = speeds(*commands[-1][1:]) if commands else 'nothing yet'
         news = record.events[-1:]
-        said = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
+        event = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
         return (
-            f'<div class="replay robot-live">{style("drive.css")}'
-            f'<div role="img" aria-label="{escape(described(record.floor))}">{svg}</div>'
+            f'<div class="replay robot-live">{style(DRIVE_CSS)}'
+            f'<div role="img" aria-label="{escape(floor_in_words(record.floor))}">{svg}</div>'
             f'{_row("time", f"{now.t_s:.1f} s")}{_row("robot", speeds(now.v, now.w))}'
-            f'{_row("told", told)}{self._queue()}<p class="replay-says">{escape(said)}</p></div>'
+            f'{_row("told", told)}{self._queue()}<p class="replay-says">{escape(event)}</p></div>'
         )
 
     def _queue(self) -> str:
@@ -127,7 +126,6 @@ class LiveView:
 
 
 def speeds(v: float, w: float) -> str:
-    """Return a speed (m/s) and a turning rate (rad/s) in words."""
     return f'{v:.2f} m/s, {w:.2f} rad/s'
 
 

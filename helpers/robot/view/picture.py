@@ -9,10 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from html import escape
+from pathlib import Path
 
 import numpy as np
 
-from helpers.notebook.look import LOOK
+from helpers.notebook import LOOK
 from helpers.robot.body import RADIUS_M
 from helpers.robot.floor import Floor, Pose
 from helpers.robot.sensors import ANGLES, RANGE_MAX
@@ -21,10 +22,11 @@ WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor
 BEAMS = 61  # of a scan, in a picture
 WALL_M = 0.15  # of an outer wall
+DRIVE_CSS = Path(__file__).with_name('drive.css')
 ROBOT, WAITING, LOST = LOOK['robot'], LOOK['waiting'], LOOK['lost']
 
 
-def picture(
+def floor_picture(
     floor: Floor,
     points: Iterable[tuple[float, float]],
     pose: Pose,
@@ -96,8 +98,8 @@ def _floor(floor: Floor, scale: float) -> str:
     def boxes(kind: str) -> str:
         return ''.join(
             f'M{x0:g} {y0:g}H{x1:g}V{y1:g}H{x0:g}z'
-            for x0, y0, x1, y1, what in floor.walls
-            if what == kind
+            for x0, y0, x1, y1, kind_of_block in floor.walls
+            if kind_of_block == kind
         )
 
     names = ''.join(
@@ -116,7 +118,6 @@ def _floor(floor: Floor, scale: float) -> str:
 
 
 def dots(poses: Sequence[Pose]) -> str:
-    """Return a path of dots."""
     return ''.join(f'M{x:.2f} {y:.2f}h0' for x, y, *_ in poses)
 
 
@@ -141,7 +142,7 @@ def fan(pose: Pose, ranges: np.ndarray | None) -> str:
     return f'M{pose.x:.2f} {pose.y:.2f}L{hits}z'
 
 
-def described(floor: Floor) -> str:
+def floor_in_words(floor: Floor) -> str:
     """Return what a picture shows, for everybody who does not see it."""
     width, height = floor.size_m
     return (

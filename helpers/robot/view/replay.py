@@ -6,6 +6,7 @@ import math
 from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from helpers.replay import Replay, replay
 from helpers.robot.floor import Pose
 from helpers.robot.record import DriveRecord, Event
 from helpers.robot.sensors import ANGLES, RANGE_MAX
-from helpers.robot.view.picture import described, picture
+from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
 from helpers.robot.view.scans import ScanRecording
 
 # What a notebook keeps of a drive, at most: so it stays below 60 kB.
@@ -34,6 +35,9 @@ class Drive:
     name: str = ''
     setup: None = None
 
+    scripts = (Path(__file__).with_name('drive.js'),)
+    styles = (DRIVE_CSS,)
+
     @property
     def span_s(self) -> tuple[float, float]:
         """From when to when it was recorded."""
@@ -53,7 +57,7 @@ class Drive:
         """Return the floor as an SVG at the end of the drive."""
         _, end = self.span_s
         scans = self.record_.scans
-        return picture(
+        return floor_picture(
             self.record_.floor,
             self.sampled()[1][:, :2].tolist(),
             place(self.record_, end),
@@ -64,8 +68,7 @@ class Drive:
 
     @property
     def words(self) -> str:
-        """What its picture shows, for everybody who does not see it."""
-        return f'{self.summary} {described(self.record_.floor)}'
+        return f'{self.summary} {floor_in_words(self.record_.floor)}'
 
     def record(self) -> dict:
         """Return what drive.js needs: m and rad, and whole ms and cm (of ranges)."""
@@ -97,11 +100,11 @@ class Drive:
         The message is that whose callback sent it. Commands arrive in the order in which they are
         sent, also if several are late.
         """
-        found, before = [], None
+        rows, before = [], None
         sent = deque([] if self.recording is None else self.recording.sent)
         for command in self.record_.commands:
             message = -1, 0
-            own = [k for k, one in enumerate(sent) if one[1:3] == command[1:3]]
+            own = [k for k, speeds in enumerate(sent) if speeds[1:3] == command[1:3]]
             if own and sent[own[0]][0] <= self.record_.started_s + command.t_s:
                 for _ in range(own[0]):  # they never arrived
                     sent.popleft()
@@ -109,11 +112,11 @@ class Drive:
                 if seq >= 0:
                     message = seq, round(1000 * (command.t_s - self.record_.scans[seq].t_s))
             told = round(command.v, 3), round(command.w, 3)
-            found.append(((told != before), [round(1000 * command.t_s), *told, *message]))
+            rows.append(((told != before), [round(1000 * command.t_s), *told, *message]))
             before = told
-        if len(found) > COMMANDS:
-            found = [one for one in found if one[0]]
-        return [row for _, row in thinned(found, COMMANDS)]
+        if len(rows) > COMMANDS:
+            rows = [row for row in rows if row[0]]
+        return [row for _, row in thinned(rows, COMMANDS)]
 
 
 def replay_drive(
@@ -148,11 +151,11 @@ def replay_drive(
     table[TIMES] += recording.started_s - record.started_s
     (run,) = replay(table, recording.depth).runs
     # How many messages there were differs from run to run.
-    said = run.summary.partition(', ')[2]
+    words = run.summary.partition(', ')[2]
     drive = Drive(record, summary, recording)
     after_s = drive.span_s[1] - run.moves[-1][0] / 1e6
-    said = called + said[0].upper() + said[1:]
-    run = replace(run, summary=said, time_label=TIME_LABEL, after_s=after_s)
+    words = called + words[0].upper() + words[1:]
+    run = replace(run, summary=words, time_label=TIME_LABEL, after_s=after_s)
     return Replay((drive, run))
 
 
@@ -163,7 +166,6 @@ def place(record: DriveRecord, t_s: float) -> Pose:
 
 
 def bumps(record: DriveRecord) -> list[Event]:
-    """Return the bumps that are shown."""
     return [event for event in record.events if event.kind == 'bump'][:EVENTS]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import threading
 import time
 
 from rclpy.node import Node
@@ -12,7 +11,7 @@ from rclpy.time import Time
 
 from helpers.recording import Recording
 from helpers.robot.robot import Robot
-from helpers.ros.session import find
+from helpers.ros import find
 
 
 class ScanRecording(Recording):
@@ -52,11 +51,8 @@ class ScanRecording(Recording):
 
         @functools.wraps(publish)
         def recorded_publish(message):
-            here = threading.get_ident()
-            runs = (run for run in reversed(self._heard) if run.running)
-            seq = next((run.seq for run in runs if run.thread == here), -1)
             speeds = message.linear.x, message.angular.z
-            self.sent.append((time.monotonic(), *speeds, seq))
+            self.sent.append((time.monotonic(), *speeds, self.runs_here()))
             publish(message)
 
         publisher.publish = recorded_publish

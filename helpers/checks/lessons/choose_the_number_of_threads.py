@@ -1,0 +1,374 @@
+"""What the tasks of the lesson "Choose the number of threads" are judged by."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import ipywidgets as widgets
+import matplotlib.pyplot as plt
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from std_msgs.msg import Int32
+
+from helpers import plots
+from helpers.checks.bench import Bench, must_define, must_have
+from helpers.checks.tasks import Tasks
+from helpers.recording import explain, predict
+from helpers.ros import ros_session
+
+tasks = Tasks()
+check = tasks.check
+
+QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
+
+
+@tasks.add(1)
+def a_gate(GatedSubscriber):
+    def holds(messages, depth, group, events):
+        must_define(GatedSubscriber, '__init__')
+        with Bench() as bench:
+            node, ended = GatedSubscriber(depth, group, events), []
+            must_have(node, 'gate', 'subscription')
+            subscription, callback = node.subscription, node.subscription.callback
+
+            def call(message):
+                callback(message)
+                ended.append(message.data)
+
+            subscription.callback = call
+            bench.spin(node, threads=4)
+            bench.say('number', *numbers(messages), at_once=True)
+            bench.quiet()
+            held = messages - len(ended)
+            node.gate.set()
+            bench.wait(lambda: len(ended) == messages)
+            found_depth, handlers = subscription.qos_profile.depth, subscription.event_handlers
+        if found_depth != depth or subscription.callback_group is not group:
+            return f'depth {depth} and its group were asked for, but not passed on'
+        if bool(handlers) == (events is QUIET):
+            return 'event_callbacks=events is not passed on'
+        if len(ended) < messages:
+            return f'of {messages} messages {len(ended)} were heard after the gate was opened'
+        return held == messages or 'a callback ended before the gate was opened'
+
+    wait = 'self.gate.wait(timeout=60) in the callback.'
+    call = 'create_subscription(type, topic, callback, depth, callback_group=, event_callbacks=)'
+    exclusive, reentrant = MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+    return [
+        ('four messages are held, then heard', lambda: holds(4, 10, reentrant(), QUIET), wait),
+        (
+            'one, with another depth, group and events',
+            lambda: holds(1, 3, exclusive(), None),
+            call,
+        ),
+    ]
+
+
+def numbers(count):
+    return [Int32(data=number) for number in range(count)]
+
+
+@tasks.add(2)
+def the_law(heard_after_burst):
+    def law_holds(threads, group, in_flight, depth, more):
+        answer = heard_after_burst(in_flight, depth, more)
+        heard = hear_burst(threads, group(), in_flight, depth, more)
+        case = f'in flight {in_flight}, depth {depth}, {more} more'
+        return answer == heard or f'{case}: {heard} were heard, and your function says {answer}'
+
+    hint = 'The queue keeps at most depth messages, and not more than come.'
+    exclusive, reentrant = MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+    return [
+        ('8 threads, reentrant, depth 10', lambda: law_holds(8, reentrant, 8, 10, 50), hint),
+        ('8 threads, reentrant, few more', lambda: law_holds(8, reentrant, 8, 10, 5), hint),
+        ('8 threads, exclusive, depth 20', lambda: law_holds(8, exclusive, 1, 20, 50), hint),
+        ('single-threaded, depth 3', lambda: law_holds(1, reentrant, 1, 3, 20), hint),
+    ]
+
+
+def hear_burst(threads, group, in_flight, depth, more):
+    """Fill the threads, publish `more` messages, open the gate. Return how many were heard."""
+    gate, heard = threading.Event(), []
+
+    def hold(message):
+        heard.append(message.data)
+        gate.wait(timeout=30)
+
+    with Bench() as bench:
+        node = Node('gated_subscriber')
+        options = {'callback_group': group, 'event_callbacks': QUIET}
+        node.create_subscription(Int32, 'number', hold, depth, **options)
+        bench.spin(node, threads=threads)
+        for number in range(in_flight):
+            bench.say('number', Int32(data=number), at_once=True)
+            bench.wait(lambda number=number: len(heard) == number + 1)
+        if more:
+            bench.say('number', *numbers(more), at_once=True)
+        gate.set()
+        bench.quiet()
+    return len(heard)
+
+
+@tasks.add(3)
+def deep_enough_for_a_burst(depth_for_burst):
+    def deep_enough(messages, threads):
+        depth = depth_for_burst(messages, threads)
+        case = f'depth_for_burst({messages}, {threads}) is {depth}'
+        if not isinstance(depth, int) or depth < 1:
+            return f'{case}, and a depth is a whole number from 1 up'
+        in_flight = min(threads, messages)
+        more = messages - in_flight
+
+        def heard(depth):
+            return hear_burst(threads, ReentrantCallbackGroup(), in_flight, depth, more)
+
+        if (count := heard(depth)) < messages:
+            return f'{case}: {count} were heard'
+        return depth == 1 or heard(depth - 1) < messages or f'{case}, but {depth - 1} would do'
+
+    hint = 'A message that a thread takes at once needs no place.'
+    return [
+        ('30 messages, 2 threads', lambda: deep_enough(30, 2), hint),
+        ('20 messages, 4 threads', lambda: deep_enough(20, 4), hint),
+        ('3 messages, 4 threads', lambda: deep_enough(3, 4), 'A depth is at least 1.'),
+    ]
+
+
+@tasks.add(4)
+def publish_numbers(NumberPublisher):
+    def numbers_come(messages, period_s):
+        must_define(NumberPublisher, '__init__')
+        with Bench() as bench:
+            heard = bench.hear('number', Int32)
+            node = bench.spin(NumberPublisher(messages, period_s))
+            must_have(node, 'publisher')
+            if node.publisher.topic_name != '/number':
+                return f'it publishes on {node.publisher.topic_name}'
+            periods = [timer.timer_period_ns / 1e9 for timer in node.timers]
+            bench.wait(lambda: len(heard) >= messages)
+            bench.wait(lambda: len(heard) > messages, 6 * period_s)
+        found = [message.data for message in heard]
+        if found[:messages] != [*range(messages)]:
+            return f'of {messages} messages these were heard: {found[:messages]}'
+        if len(found) > messages:
+            return f'more than {messages} messages were published'
+        return periods in ([], [period_s]) or f'the period is {periods[0]} s, not {period_s}'
+
+    hint = 'Count in self.count; self.timer.cancel() stops the timer.'
+    return [
+        ('five messages, every 0.01 s', lambda: numbers_come(5, 0.01), hint),
+        ('three messages, every 0.05 s', lambda: numbers_come(3, 0.05), 'Int32(data=self.count)'),
+    ]
+
+
+@tasks.add(5)
+def work_at_once(WorkingSubscriber, DEPTH):
+    def works_at_once(threads, messages):
+        must_define(WorkingSubscriber, '__init__')
+        gate, inside = threading.Event(), []
+
+        def work():
+            inside.append(1)
+            gate.wait(timeout=30)
+
+        with Bench() as bench:
+            node = WorkingSubscriber(work)
+            must_have(node, 'subscription')
+            depth = node.subscription.qos_profile.depth
+            handlers = len(node.subscription.event_handlers)
+            bench.spin(node, threads=threads)
+            bench.say('number', *numbers(messages), qos=20, at_once=True)
+            bench.quiet()
+            at_once = len(inside)
+            gate.set()
+        if depth != DEPTH or handlers:
+            return f'its depth is {depth}, and it has {handlers} event handlers'
+        wanted = min(threads, messages)
+        text = f'with {threads} threads, {at_once} worked at once, not {wanted}'
+        return at_once == wanted or text
+
+    hint = 'callback_group=ReentrantCallbackGroup(), event_callbacks=QUIET'
+    return [
+        ('4 threads: four work at once', lambda: works_at_once(4, 6), hint),
+        ('2 threads: two work at once', lambda: works_at_once(2, 6), hint),
+        ('one message: work() is called once', lambda: works_at_once(4, 1), 'self.work() with ().'),
+    ]
+
+
+@tasks.add(6)
+def threads_for_a_camera(threads_needed):
+    def keeps_up(rate_hz, callback_s, reserve):
+        threads = threads_needed(rate_hz, callback_s, reserve)
+        longest_s = callback_s * (1 + reserve)
+        case = f'threads_needed{(rate_hz, callback_s, reserve)} is {threads}'
+        if not isinstance(threads, int):
+            return f'{case}, and that is not an int'
+        if lost := losses(rate_hz, longest_s, threads):
+            return f'{case}: {lost} of 2000 are lost'
+        spare = threads > 1 and not losses(rate_hz, longest_s, threads - 1)
+        return not spare or f'{case}, but {threads - 1} would do'
+
+    hint = 'How many messages come while one callback runs? math.ceil rounds up.'
+    return [
+        ('30 Hz, 0.15 s, reserve 0.0', lambda: keeps_up(30, 0.15, 0.0), hint),
+        ('22 Hz, 0.1 s, reserve 0.0', lambda: keeps_up(22, 0.1, 0.0), hint),
+        ('10 Hz, 0.05 s, reserve 0.0', lambda: keeps_up(10, 0.05, 0.0), hint),
+        ('20 Hz, 0.2 s, reserve 0.0', lambda: keeps_up(20, 0.2, 0.0), hint),
+        ('20 Hz, 0.19 s, reserve 0.2', lambda: keeps_up(20, 0.19, 0.2), hint),
+    ]
+
+
+def losses(rate_hz, callback_s, threads):
+    """Return how many of 2000 messages the model loses, with depth 10."""
+    model = predict(1 / rate_hz, callback_s, 10, threads, messages=2000)
+    return explain(model, 10, threads).lost
+
+
+@tasks.add(7)
+def waiting_or_computing(cpu_part):
+    def part_of(work, most, beside=None):
+        """Let the function measure `work`, and perhaps another thread compute `beside` it."""
+        parts, end = [], threading.Event()
+
+        def measured():
+            cpu_s, time_s = time.thread_time(), time.monotonic()
+            work()
+            parts.append((time.thread_time() - cpu_s) / (time.monotonic() - time_s))
+
+        def go_on():
+            while beside and not end.is_set():
+                beside()
+
+        helper = threading.Thread(target=go_on)
+        helper.start()
+        try:
+            part = cpu_part(measured)
+        finally:
+            end.set()
+            helper.join()
+        if len(parts) != 1:
+            return f'work() was called {len(parts)} times'
+        least = 0.7 * parts[0]  # on a busy computer, a sum gets only a part of a CPU
+        fits = isinstance(part, float) and least <= part <= most
+        return fits or f'it returns {part!r}, and right is {least:.1f} to {most}'
+
+    def sleep():
+        time.sleep(0.3)
+
+    def compute():
+        sum(range(5_000_000))
+
+    def compute_a_little():
+        sum(range(1000))
+
+    hint = 'Subtract each clock before from the clock after, then divide.'
+    return [
+        ('a sleep: nearly 0', lambda: part_of(sleep, 0.1), hint),
+        ('a sum: much more', lambda: part_of(compute, 1.01), hint),
+        (
+            'a sleep, while another thread computes: nearly 0',
+            lambda: part_of(sleep, 0.1, compute_a_little),
+            'time.process_time() counts all threads.',
+        ),
+    ]
+
+
+@tasks.add(8)
+def spin_it_yourself(spin_until):
+    def spins_until(make_executor, messages):
+        heard, asked = [], []
+        with ros_session():
+            executor, node = make_executor(), Node('checked')
+            publisher = node.create_publisher(Int32, 'number', 100)
+
+            def callback(message):  # the next one comes when this one is heard
+                heard.append(message.data)
+                publisher.publish(Int32(data=message.data + 1))
+
+            def done():
+                asked.append(1)
+                return len(heard) >= messages or len(asked) > 50
+
+            node.create_subscription(Int32, 'number', callback, 100)
+            executor.add_node(node)
+            publisher.publish(Int32(data=0))
+            spin_until(executor, done)
+            executor.shutdown()
+        if not asked:
+            return 'done() was never called'
+        return len(heard) == messages or f'it ended when {len(heard)} of {messages} were heard'
+
+    def stops_at_once():
+        asked = []
+
+        def done():
+            asked.append(1)
+            assert len(asked) < 20, 'it spins although all is done'
+            return True
+
+        with ros_session():
+            spin_until(SingleThreadedExecutor(), done)
+        return bool(asked) or 'done() was never called'
+
+    hint = 'while not done(): ...'
+    single = SingleThreadedExecutor
+    return [
+        ('SingleThreadedExecutor, 3 messages', lambda: spins_until(single, 3), hint),
+        ('EventsExecutor, 5 messages', lambda: spins_until(EventsExecutor, 5), hint),
+        ('it ends if all is done', stops_at_once, 'Call done: done(), not done.'),
+    ]
+
+
+# --- What cells of the lesson show
+
+PROGRAM = """
+import rclpy, signal
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.experimental import EventsExecutor
+rclpy.init()
+node, executor = rclpy.create_node('ticking'), {executor}()
+node.create_timer(0.01, lambda: print('a callback ran', flush=True))
+executor.add_node(node)
+signal.alarm(3)
+executor.spin()
+"""
+# It needs no other process, and would leave its shared memory behind when the alarm kills it.
+ALONE = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF', 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
+
+
+def runs_a_callback(executor):
+    """Return whether an executor, by its name, runs a callback in three seconds of `spin()`.
+
+    It spins in a program of its own, which an alarm kills.
+    """
+    command = [sys.executable, '-c', PROGRAM.format(executor=executor)]
+    ended = subprocess.run(command, env=os.environ | ALONE, capture_output=True, timeout=60)
+    return b'a callback ran' in ended.stdout
+
+
+def model_with_sliders():
+    """Return sliders for the model of a queue, and two pictures of it."""
+
+    def draw(period_ms, callback_ms, depth, threads):
+        model = predict(period_ms / 1000, callback_ms / 1000, depth, threads, messages=100)
+        figure, panels = plt.subplots(1, 2, figsize=(11, 4.2), dpi=90, layout='constrained')
+        plots.sequence_gaps(model, depth=depth, ax=panels[0])
+        plots.queue_length(model, depth, ax=panels[1])
+        plt.show()
+
+    ranges = {
+        'period_ms': (50, 5, 200),
+        'callback_ms': (200, 5, 500),
+        'depth': (10, 1, 50),
+        'threads': (1, 1, 8),
+    }
+    sliders = {
+        name: widgets.IntSlider(*numbers, description=name, continuous_update=False)
+        for name, numbers in ranges.items()
+    }
+    return widgets.VBox([*sliders.values(), widgets.interactive_output(draw, sliders)])

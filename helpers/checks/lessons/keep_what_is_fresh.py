@@ -1,0 +1,567 @@
+"""What the tasks of the lesson "Keep what is fresh" are judged by."""
+
+import threading
+import time
+from contextlib import suppress
+
+from geometry_msgs.msg import Twist
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Empty, Int32
+
+from helpers.checks.bench import Bench, must_define
+from helpers.checks.errors import Failed, sentence
+from helpers.checks.tasks import Tasks, once
+from helpers.ros import ros_session
+
+tasks = Tasks()
+check = tasks.check
+
+
+@tasks.add(1)
+def brake_before_the_wall(Brake):
+    def brakes(distances, right, speed):
+        scans = [(metres, 0) for metres in distances]
+        found = speeds_after(Brake, scans, depth=9, speed=speed)
+        return found == right or f'at {distances} m with speed {speed} it commands {found}'
+
+    compare = 'Make a Twist, set its linear.x, publish it. Compare self.look(scan) with LIMIT_M.'
+    return [
+        (
+            'it drives where the way is free, and stops where a wall is near',
+            lambda: brakes([2.0, 0.7, 0.5, 0.2, 3.0], [0.5, 0.5, 0.0, 0.0, 0.5], 0.5),
+            compare,
+        ),
+        (
+            'the same at 0.25 m/s',
+            lambda: brakes([0.1, 5.0], [0.0, 0.25], 0.25),
+            'The speed of this brake is self.speed.',
+        ),
+    ]
+
+
+def speeds_after(make_brake, scans, **options):
+    """Let a brake hear scans one by one, and return the speeds that it commands.
+
+    A scan is what `look` says of it, in metres, and its age in seconds.
+    """
+    distances = [metres for metres, _ in scans]
+    with Bench() as bench:
+        commands = bench.hear('cmd_vel', Twist)
+        brake = make_brake(look=lambda scan: distances[number_of(scan)], **options)
+        bench.spin(brake)
+        for number, (_, age_s) in enumerate(scans):
+            say_and_wait(bench, 'scan', scan_with(bench, number, age_s), commands)
+        bench.quiet()
+    return [twist.linear.x for twist in commands]
+
+
+def say_and_wait(bench, topic, message, commands):
+    """Publish a message, and wait for a command, or until it is handled without one."""
+    before = len(commands)
+    bench.say(topic, message, at_once=True)
+    if not bench.wait(lambda: len(commands) > before, 0.3):
+        bench.quiet()
+
+
+def scan_with(bench, number, age_s=0):
+    """Return a scan with a number, as old as this."""
+    scan = LaserScan(ranges=[float(number)] * 181)
+    scan.header.stamp = (bench.tester.get_clock().now() - Duration(seconds=age_s)).to_msg()
+    return scan
+
+
+def number_of(scan):
+    return round(scan.ranges[90])
+
+
+@tasks.add(2)
+def a_thread_for_a_node(spin):
+    def spins(count):
+        heard = []
+        with Bench() as bench:
+            node = Node('listener')
+            node.create_subscription(Int32, 'number', lambda m: heard.append(m.data), 10)
+            executor = spin(bench.session, node)
+            bench.say('number', *(Int32(data=number) for number in range(count)), at_once=True)
+            bench.wait(lambda: len(heard) == count)
+            if heard != [*range(count)]:
+                return f'its node heard {len(heard)} of {count} messages'
+            if not isinstance(executor, Executor):
+                return f'it returns {executor!r}, and no executor'
+            nodes = [node.get_name() for node in executor.get_nodes()]
+        return nodes == ['listener'] or f'the executor that it returns has these nodes: {nodes}'
+
+    hint = 'Make an executor, add_node, session.spin(executor), and return it.'
+    return [
+        ('one message is heard', lambda: spins(1), hint),
+        ('three messages are heard', lambda: spins(3), hint),
+    ]
+
+
+@tasks.add(3)
+def how_old_is_a_scan(AgeBrake):
+    def notes(*ages_s):
+        brakes, noted_before_look = [], []
+
+        def make(look, **options):
+            def look_and_count(scan):
+                noted_before_look.append(len(brakes[0].ages_s))
+                return look(scan)
+
+            brakes.append(AgeBrake(look=look_and_count, **options))
+            return brakes[0]
+
+        speeds_after(make, [(2.0, age_s) for age_s in ages_s], depth=9)
+        found = brakes[0].ages_s
+        right = len(found) == len(ages_s) and all(
+            0 <= noted_s - age_s < 5 for noted_s, age_s in zip(found, ages_s, strict=True)
+        )
+        if not right:
+            ages = ', '.join(map(shortly, found)) or 'nothing'
+            return f'of scans that are {[*ages_s]} s old, it noted: {ages}'
+        if not noted_before_look:
+            return 'it noted the ages, and did not look'
+        return noted_before_look == [1, 2, 3] or 'the age was not noted before the look'
+
+    hint = 'self.get_clock().now() - Time.from_msg(scan.header.stamp): its nanoseconds / 1e9.'
+    return [
+        ('scans of 0, 10 and 3600 s', lambda: notes(0, 10, 3600), hint),
+        ('scans of 90, 20 and 0 s', lambda: notes(90, 20, 0), hint),
+    ]
+
+
+def shortly(age_s):
+    return f'{age_s:.0f}' if abs(age_s) < 1e6 else 'more than a million'
+
+
+@tasks.add(4)
+def how_late_is_too_late(allowed_s):
+    def computes(speed, limit, right):
+        found = allowed_s(speed, limit)
+        if not isinstance(found, int | float):
+            return f'{speed} m/s, {limit} m: your function returns {found}'
+        said = f'{speed} m/s, {limit} m: your function returns {found:.3g} s'
+        return abs(found - right) < 0.005 or said
+
+    hint = 'Subtract RADIUS_M and speed**2 / (2 * BRAKING) from limit.'
+    return [
+        ('0.5 m/s, 0.6 m: 0.88 s', lambda: computes(0.5, 0.6, 0.88), hint),
+        ('1.0 m/s, 0.6 m: 0.29 s', lambda: computes(1.0, 0.6, 0.29), hint),
+        ('0.5 m/s, 1.0 m: 1.68 s', lambda: computes(0.5, 1.0, 1.68), hint),
+    ]
+
+
+@tasks.add(5)
+def stop_if_you_do_not_know(CarefulBrake):
+    def is_careful(most_s, scans, right):
+        must_define(CarefulBrake, '__init__')
+        looked_at = []
+
+        def make(look, **options):
+            def look_and_note(scan):
+                looked_at.append(number_of(scan))
+                return look(scan)
+
+            return CarefulBrake(look=look_and_note, **options)
+
+        speeds = speeds_after(make, scans, depth=9, most_s=most_s)
+        ages = [age_s for _, age_s in scans]
+        if speeds != right:
+            return f'most_s={most_s}, scans of {ages} s: it commands {speeds}, not {right}'
+        fresh = [number for number, age_s in enumerate(ages) if age_s < most_s]
+        return looked_at == fresh or f'it looked at these scans: {looked_at}, not {fresh}'
+
+    hint = 'The age is that of task 3. Duration(seconds=...) can be compared with it.'
+    return [
+        (
+            'at most 5 s: the old ones stop it',
+            lambda: is_careful(5, [(2.0, 0), (2.0, 60), (2.0, 6), (0.3, 0)], [0.5, 0.0, 0.0, 0.0]),
+            hint,
+        ),
+        (
+            'at most a minute: a scan of 6 s is used',
+            lambda: is_careful(60, [(2.0, 6), (2.0, 3600), (2.0, 30)], [0.5, 0.0, 0.5]),
+            hint,
+        ),
+    ]
+
+
+@tasks.add(6)
+def the_red_button(StopBrake):
+    def after(*topics):
+        """Send scans and stops, and return the speeds that it commands."""
+        kinds = {'scan': LaserScan, 'stop': Empty}
+        with Bench() as bench:
+            commands = bench.hear('cmd_vel', Twist)
+            bench.spin(StopBrake(9, look=lambda scan: 9.0))
+            for topic in topics:
+                say_and_wait(bench, topic, kinds[topic](), commands)
+            bench.quiet()
+        return [twist.linear.x for twist in commands]
+
+    def commands(right, *topics):
+        speeds = after(*topics)
+        return speeds == right or f'after {", ".join(topics)} it commanded {speeds}'
+
+    def keeps_the_scans():
+        with ros_session():
+            topic = StopBrake(9, look=lambda scan: 9.0).subscription.topic_name
+        return topic == '/scan' or f'self.subscription is now that of {topic}'
+
+    hint = "create_subscription(Empty, 'stop', ...); self.stopped.set(), then self.command(0.0)."
+    kept = 'Brake keeps its subscription there. Keep yours under another name.'
+    return [
+        ('stop, then a scan: it stays', lambda: commands([0.0, 0.0], 'stop', 'scan'), hint),
+        (
+            'two scans, stop, a scan: it stops and stays',
+            lambda: commands([0.5, 0.5, 0.0, 0.0], 'scan', 'scan', 'stop', 'scan'),
+            hint,
+        ),
+        ('self.subscription is still that of scan', keeps_the_scans, kept),
+    ]
+
+
+@tasks.add(7)
+def a_place_for_one(Newest):
+    def takes(right, *rounds):
+        """Put some, take one, and so on, in a thread that may wait for ever."""
+        place, found = Newest(), []
+
+        def work():
+            for numbers in rounds:
+                for number in numbers:
+                    place.put(number)
+                found.append(place.take())
+
+        thread = threading.Thread(target=work, daemon=True)
+        thread.start()
+        thread.join(timeout=2)
+        return found == right or f'put in turn: {[*rounds]}. Taken: {found or "nothing"}'
+
+    def forgets():
+        place = Newest()
+        for number in (1, 2, 3):
+            place.put(number)
+        waiting = place.waiting
+        return len(waiting) == 1 or f'after 1, 2, 3 were put, these wait: {waiting}'
+
+    def wakes():
+        place, found = Newest(), []
+        thread = threading.Thread(target=lambda: found.append(place.take()), daemon=True)
+        thread.start()
+        thread.join(timeout=0.2)
+        place.put(7)
+        thread.join(timeout=2)
+        return found == [7] or 'a thread that waits in take is not woken by put'
+
+    hint = 'The list holds one scan or none: self.waiting = ...'
+    return [
+        ('1, 2, 3 are put: 3 is taken', lambda: takes([3], [1, 2, 3]), hint),
+        ('then 4, 5 are put: 5 is taken', lambda: takes([3, 5], [1, 2, 3], [4, 5]), hint),
+        ('the replaced ones are forgotten', forgets, hint),
+        ('a thread that waits is woken', wakes, 'put must notify, inside the lock.'),
+    ]
+
+
+@tasks.add(8)
+def a_worker(NewestBrake):
+    stopped_while_looking = once(lambda: stop_while_looking(make))
+    ended = threading.Thread(target=int)
+    ended.start()
+
+    def make(*arguments, **options):
+        """Return a brake whose destroy_node does not wait for a worker that never ends."""
+        brake = NewestBrake(*arguments, **options)
+        brake.worker = ended
+        return brake
+
+    def stop_is_heard():
+        stopped, _ = stopped_while_looking()
+        return stopped or 'stop waited until the look was over'
+
+    def newest_are_looked_at():
+        _, numbers = stopped_while_looking()
+        return numbers == [0, 20] or f'of 21 scans, the worker looked at {numbers}'
+
+    def commands(right, distances):
+        speeds = speeds_after(make, [(metres, 0) for metres in distances], depth=1)
+        return speeds == right or f'at {distances} m it commands {speeds}'
+
+    def worker_ends():
+        errors = []
+        threading.excepthook = lambda error: errors.append(error.exc_value)
+        with ros_session():
+            brake = NewestBrake(1)
+        if errors:
+            return f'it ended with {sentence(errors[0])}'
+        return not brake.worker.is_alive() or 'it has not ended 5 s after None'
+
+    looks = 'A Brake has a method that looks and commands: super().scan_callback(scan).'
+    return [
+        ('stop is heard while it looks', stop_is_heard, 'Slow work does not belong there.'),
+        (
+            'it looks at 0 and at the newest',
+            newest_are_looked_at,
+            'A loop: take, and look at that.',
+        ),
+        ('it brakes as before', lambda: commands([0.5, 0.0, 0.5], [2.0, 0.4, 0.9]), looks),
+        ('its worker ends', worker_ends, 'Test for None first: None ends the loop.'),
+    ]
+
+
+def stop_while_looking(make_brake):
+    """Press stop while the look at scan 0 waits, and 1 to 20 have come.
+
+    Return whether stop was heard, and the numbers of the scans that were looked at.
+    """
+    gate, stopped, looked_at = threading.Event(), False, []
+
+    def look(scan):
+        looked_at.append(number_of(scan))
+        return 9.0 if gate.wait(timeout=20) else 0.0
+
+    with suppress(TimeoutError), ros_session() as session:
+        tester, brake = Node('tester'), make_brake(1, look=look)
+        scans = tester.create_publisher(LaserScan, 'scan', 10)
+        stop = tester.create_publisher(Empty, 'stop', 10)
+        executor = SingleThreadedExecutor()
+        executor.add_node(brake)
+        session.spin(executor)
+        try:
+            for number in range(21):
+                scans.publish(LaserScan(ranges=[float(number)] * 181))
+                session.wait_until(lambda: looked_at, timeout_s=3)
+            stop.publish(Empty())
+            session.wait_until_quiet(executor)
+            stopped = brake.stopped.is_set()
+        finally:
+            gate.set()
+        session.wait_until(lambda: 20 in looked_at, timeout_s=2)
+    return stopped, looked_at
+
+
+@tasks.add(9)
+def listen_for_two_events(listen):
+    @once
+    def events():
+        """Send one scan and none after it, then take the laser away."""
+        missed, counts, tester_missed = [], [], []
+        qos = QoSProfile(depth=1, deadline=Duration(seconds=0.3))
+        with Bench() as bench:
+            laser, brake = Node('laser'), Node('brake')
+            publisher = laser.create_publisher(LaserScan, 'scan', qos)
+            listen(brake, qos, missed, counts)
+            late = SubscriptionEventCallbacks(deadline=tester_missed.append)
+            bench.tester.create_subscription(
+                LaserScan, 'scan', lambda scan: None, qos, event_callbacks=late
+            )
+            bench.spin(brake)
+            publisher.publish(LaserScan())
+            bench.wait(lambda: len(tester_missed) >= 3, 10)
+            bench.wait(lambda: missed and counts, 1)
+            while_silent = counts[-1:]
+            laser.destroy_node()
+            bench.wait(lambda: counts[-1:] == [0], 4 if counts else 0)
+        return missed, while_silent, counts[-1:]
+
+    def silent():
+        missed, counts, _ = events()
+        if not missed:
+            return 'no deadline event was kept'
+        return counted(counts, 1)
+
+    def gone():
+        return counted(events()[2], 0)
+
+    def counted(counts, right):
+        if not counts:
+            return 'no matched event was kept'
+        if not isinstance(counts[0], int):
+            return f'no number was kept, but {type(counts[0]).__name__}'
+        return counts[0] == right or f'the last count is {counts[0]}, not {right}'
+
+    hint = 'matched gets an event: lambda event: counts.append(event.current_count). missed.append?'
+    return [
+        ('a silent laser', silent, hint),
+        ('a laser that has gone', gone, hint),
+    ]
+
+
+@tasks.add(10)
+def a_watchdog(LaserWatchdog):
+    @once
+    def trial():
+        """Let it hear nothing, then one scan, then nothing. It may wait for 0.4 s."""
+        with Bench() as bench:
+            stops, begun_s = hear_stops(bench), time.monotonic()
+            bench.spin(LaserWatchdog(0.4))
+            bench.wait(lambda: stops, 0.4 + LATE_S)
+            without = [at_s - begun_s for at_s in stops]
+            again = bench.wait(lambda: len(stops) >= 3, LATE_S) if stops else False
+            scan_s = time.monotonic()
+            bench.say('scan', scan_with(bench, 0))
+            stops.clear()
+            bench.wait(lambda: stops, 0.4 + LATE_S)
+            after = [at_s - scan_s for at_s in stops]
+        return without, again, after
+
+    def stops_without_a_scan():
+        without, again, _ = trial()
+        if not without:
+            return f'with most_s=0.4, no scan ever came, and in {0.4 + LATE_S:g} s no stop came'
+        if without[0] < 0.4:
+            return f'with most_s=0.4 it stopped {without[0]:.1f} s after it was made'
+        return again or 'one stop came, and then no more'
+
+    def stops_after_a_scan():
+        _, _, after = trial()
+        return bool(after) or 'one scan came, and then no stop'
+
+    def is_quiet_after_a_scan():
+        without, _, after = trial()
+        if not without and not after:
+            return NEVER
+        if after and after[0] < 0.4:
+            return f'with most_s=0.4 it stopped {after[0]:.1f} s after a scan'
+        return True
+
+    def waits_for_most_s():
+        without, _, after = trial()
+        if not without and not after:
+            return NEVER
+        most_s = 0.4 + LATE_S
+        with Bench() as bench:
+            stops, begun_s = hear_stops(bench), time.monotonic()
+            bench.spin(LaserWatchdog(most_s))
+            bench.wait(lambda: stops, most_s + LATE_S)
+        if not stops:
+            return f'with most_s={most_s}, no stop came in {most_s + LATE_S} s'
+        waited_s = stops[0] - begun_s
+        return waited_s >= most_s or f'with most_s={most_s} it stopped after {waited_s:.1f} s'
+
+    since = 'Note time.monotonic() at the start and in each callback of a scan. How long ago is it?'
+    return [
+        ('a laser that never sends: it stops, again and again', stops_without_a_scan, since),
+        ('one scan, then silence: it stops', stops_after_a_scan, since),
+        ('it does not stop while a scan is fresh', is_quiet_after_a_scan, since),
+        ('it waits for most_s seconds, however long', waits_for_most_s, 'Compare with most_s.'),
+    ]
+
+
+LATE_S = 1.0  # that a stop may come late
+NEVER = 'it never stops at all'
+
+
+def hear_stops(bench):
+    """Return a list to which the time of each stop is appended. Raises Failed for other speeds."""
+    stops = []
+
+    def command(twist):
+        if twist != Twist():
+            raise Failed(f'it commands the speed {twist.linear.x}')
+        stops.append(time.monotonic())
+
+    bench.tester.create_subscription(Twist, 'cmd_vel', command, 9)
+    return stops
+
+
+@tasks.add(11)
+def choose_the_qos(laser_qos, map_qos):
+    @once
+    def hear_laser():
+        """Return the scans heard after a pause, and whether silence was reported."""
+        must_be_profile('laser_qos', laser_qos)
+        heard, missed, refused = [], [], []
+        offered = QoSProfile(
+            depth=10, reliability=ReliabilityPolicy.BEST_EFFORT, deadline=Duration(seconds=0.2)
+        )
+        with Bench() as bench:
+            publisher = bench.tester.create_publisher(
+                LaserScan, 'scan', offered, event_callbacks=NO_WARNING
+            )
+            events = SubscriptionEventCallbacks(
+                deadline=missed.append, incompatible_qos=refused.append
+            )
+            node = Node('your_node')
+            node.create_subscription(
+                LaserScan,
+                'scan',
+                lambda scan: heard.append(number_of(scan)),
+                laser_qos,
+                event_callbacks=events,
+            )
+            for number in range(5):
+                publisher.publish(scan_with(bench, number))
+            bench.spin(node)
+            bench.wait(lambda: refused or publisher.get_subscription_count())
+            bench.quiet()
+            if refused:
+                names = ', '.join(map(policy_of, refused))
+                raise Failed(f'the laser and your node are not connected: {names}')
+            soon = Duration() < laser_qos.deadline <= Duration(seconds=2)
+            told = soon and bench.wait(lambda: missed, 4)
+        return heard, told
+
+    def newest():
+        heard, _ = hear_laser()
+        return heard == [4] or f'of scans 0 to 4 your node heard {heard or "none"}'
+
+    def silence():
+        _, told = hear_laser()
+        return told or 'no event came in 2 s'
+
+    def the_map():
+        """Publish maps 1 to 3, join, and publish map 4."""
+        must_be_profile('map_qos', map_qos)
+        heard, refused = [], []
+        offered = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        with Bench() as bench:
+            publisher = bench.tester.create_publisher(
+                Int32, 'map', offered, event_callbacks=NO_WARNING
+            )
+            for number in (1, 2, 3):
+                publisher.publish(Int32(data=number))
+            node = Node('your_node')
+            node.create_subscription(
+                Int32,
+                'map',
+                lambda message: heard.append(message.data),
+                map_qos,
+                event_callbacks=SubscriptionEventCallbacks(incompatible_qos=refused.append),
+            )
+            bench.spin(node)
+            bench.wait(lambda: refused or publisher.get_subscription_count())
+            publisher.wait_for_all_acked()  # the old maps are there, if any are to come
+            bench.quiet()
+            publisher.publish(Int32(data=4))
+            bench.wait(lambda: refused or 4 in heard)
+        if refused:
+            names = ', '.join(map(policy_of, refused))
+            return f'the map server and your node are not connected: {names}'
+        return heard == [3, 4] or f'your node heard {heard}, not [3, 4]'
+
+    hint = 'Ask for no more than is offered. Then: how many places does the queue have?'
+    late = 'A deadline of at most 2 s, and at least what the laser promises.'
+    return [
+        ('only the newest scan', newest, hint),
+        ('silence is noticed', silence, late),
+        ('the map is heard', the_map, 'Which two things must be right on both sides?'),
+    ]
+
+
+NO_WARNING = PublisherEventCallbacks(use_default_callbacks=False)
+
+
+def must_be_profile(name, qos):
+    """Raise Failed if this is no QoSProfile."""
+    if not isinstance(qos, QoSProfile):
+        raise Failed(f'{name} is {qos!r}, and no QoSProfile')
+
+
+def policy_of(event):
+    return qos_policy_name_from_kind(event.last_policy_kind)

@@ -1,0 +1,341 @@
+"""What the tasks of the lesson "Lose messages" are judged by."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import psutil
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from helpers.checks.bench import Bench, let, must_have
+from helpers.checks.errors import Failed, sentence
+from helpers.checks.tasks import Tasks
+from helpers.recording import explain, predict
+from helpers.ros import ros_session
+
+tasks = Tasks()
+check = tasks.check
+
+
+@tasks.add(1)
+def publish_numbers(MinimalPublisher, PERIOD_S):
+    def publishes(messages):
+        with Bench() as bench:
+            heard = bench.hear('topic', String)
+            node = MinimalPublisher(messages, 10)
+            must_have(node, 'publisher', 'timer')
+            bench.spin(node)
+            bench.wait(lambda: len(heard) >= messages)
+            bench.wait(lambda: len(heard) > messages, 6 * PERIOD_S)
+        texts = [message.data for message in heard]
+        if texts[:messages] != [f'Hello World: {number}' for number in range(messages)]:
+            return f'with messages={messages}, these were heard: {texts[:messages]}'
+        return len(texts) == messages or f'more than {messages} messages were published'
+
+    def one_each_period():
+        with ros_session():
+            node, published = MinimalPublisher(3, 7), []
+            must_have(node, 'publisher', 'timer')
+            node.publisher.publish = published.append
+            node.timer_callback()
+            period_s = node.timer.timer_period_ns / 1e9
+            depth = node.publisher.qos_profile.depth
+        found = f'{len(published)} a call, period {period_s:g} s, depth {depth}'
+        right = f'1 a call, period {PERIOD_S:g} s, depth 7'
+        return found == right or f'with the depth 7: {found}'
+
+    hint = 'An f-string writes the number. Compare self.count with self.messages after you count.'
+    return [
+        ('three messages: 0, 1, 2, and no more', lambda: publishes(3), hint),
+        ('five messages: 0 to 4, and no more', lambda: publishes(5), 'Which text is next?'),
+        ('one message each period, with qos', one_each_period, 'The timer calls again: no loop.'),
+    ]
+
+
+@tasks.add(2)
+def a_slow_subscriber(SlowSubscriber):
+    def hear_once(text, callback_s=0.0):
+        """Return what the node logs of one message, and how long its callback takes."""
+        let(SlowSubscriber, CALLBACK_S=callback_s)
+        with Bench() as bench:
+            node, executor = SlowSubscriber(10), SingleThreadedExecutor()
+            must_have(node, 'subscription')
+            executor.add_node(node)
+            bench.publisher('topic', String).publish(String(data=text))
+            begun_s = time.monotonic()
+            executor.spin_once(timeout_sec=1)
+            took_s = time.monotonic() - begun_s
+            log = bench.log('slow_subscriber')
+        return log, took_s
+
+    def logs(text):
+        log, _ = hear_once(text)
+        right = [f'[INFO] [slow_subscriber]: I heard: "{text}"']
+        return log == right or f'its log is: {" / ".join(log) or "empty"}'
+
+    def sleeps():
+        if hear_once('Hello World: 1', 0.4)[1] < 0.4:
+            return 'with CALLBACK_S = 0.4 the callback took less'
+        return hear_once('Hello World: 1')[1] < 1 or 'with CALLBACK_S = 0 it took a second'
+
+    def subscription(*arguments, **options):
+        with ros_session():
+            node = SlowSubscriber(*arguments, **options)
+            must_have(node, 'subscription')
+            return node.subscription.qos_profile.depth, node.subscription.raw
+
+    def depths():
+        found = [subscription(depth)[0] for depth in (3, 10)]
+        return found == [3, 10] or f'with qos 3 and 10, the depths are {found}'
+
+    def passes_options_on():
+        raw = subscription(10, raw=True)[1]
+        return raw or 'SlowSubscriber(10, raw=True) makes a subscription without raw=True'
+
+    quotes = 'The text has quotation marks: I heard: "..."'
+    call = 'create_subscription(type, topic, callback, qos, **options)'
+    return [
+        ('it logs "Hello World: 7"', lambda: logs('Hello World: 7'), f'At INFO. {quotes}'),
+        ('it logs "Hello World: 12"', lambda: logs('Hello World: 12'), 'message.data is the text.'),
+        ('the callback takes CALLBACK_S seconds', sleeps, 'time.sleep takes seconds.'),
+        ('qos is its depth', depths, call),
+        ('it passes **options on', passes_options_on, 'The same call: ..., qos, **options).'),
+    ]
+
+
+@tasks.add(3)
+def two_executors(spin_apart):
+    def none_waits_for_another(count):
+        ticked = [threading.Event() for _ in range(count)]
+
+        def tick(number):
+            ticked[number].set()
+            ticked[(number + 1) % count].wait(timeout=3)  # until the next node has ticked
+
+        with Bench() as bench:
+            nodes = [Node(f'node_{number}') for number in range(count)]
+            for number, node in enumerate(nodes):
+                node.create_timer(0.01, lambda number=number: tick(number))
+            spin_apart(bench.session, nodes)
+            bench.wait(lambda: all(event.is_set() for event in ticked), 1)
+            idle = sum(not event.is_set() for event in ticked)
+            for event in ticked:
+                event.set()
+        return idle == 0 or f'of {count} nodes, {idle} did nothing while another one was busy'
+
+    hint = 'Three lines in a loop: make an executor, add the node, let the session spin.'
+    return [
+        ('two nodes run at the same time', lambda: none_waits_for_another(2), hint),
+        ('three nodes run at the same time', lambda: none_waits_for_another(3), hint),
+    ]
+
+
+@tasks.add(4)
+def be_the_queue(MyQueue):
+    plan = [(5, 2), (4, 3)]  # five come, two are taken; four come, three are taken
+
+    def like_the_real_one(depth, plan):
+        queue, taken, come = MyQueue(depth), [], 0
+        for coming, taking in plan:
+            for number in range(come, come + coming):
+                queue.arrive(number)
+            come += coming
+            for _ in range(taking):
+                try:
+                    taken.append(queue.take())
+                except IndexError as error:
+                    return f'0 to {come - 1} came, {taken or "none"} were taken: {sentence(error)}'
+        real = real_queue(depth, plan)
+        if taken != real:
+            return f'your queue gives {taken}, the real one {real}'
+        lost = [number for number in range(come) if number not in real]
+        return sorted(queue.lost) == lost or f'lost is {queue.lost}, but {lost} were pushed out'
+
+    first = 'Is there room? If not, which one goes?'
+    oldest = 'list.pop(0) removes the oldest.'
+    return [
+        ('depth 3', lambda: like_the_real_one(3, plan), first),
+        ('depth 10', lambda: like_the_real_one(10, [(14, 4), (9, 10)]), 'Use self.depth.'),
+        ('depth 1', lambda: like_the_real_one(1, [(3, 1), (1, 1)]), oldest),
+    ]
+
+
+def real_queue(depth, plan):
+    """Send the messages of a plan through a subscription. Return the numbers that it hears."""
+    heard, come = [], 0
+    with Bench() as bench:
+        node, executor = Node('queue'), SingleThreadedExecutor()
+        node.create_subscription(String, 'topic', lambda m: heard.append(int(m.data)), depth)
+        executor.add_node(node)
+        for coming, taking in plan:
+            texts = [String(data=str(number)) for number in range(come, come + coming)]
+            bench.say('topic', *texts, qos=depth, at_once=True)
+            come, goal = come + coming, len(heard) + taking
+            while len(heard) < goal:
+                executor.spin_once(timeout_sec=1)  # runs one callback
+    return heard
+
+
+@tasks.add(5)
+def deep_enough(smallest_depth):
+    def is_smallest(*run):
+        depth = smallest_depth(*run)
+        period_s, callback_s, messages = run
+        if lost := losses(period_s, callback_s, depth, messages):
+            return f'smallest_depth{run} is {depth}, and {lost} are lost'
+        if depth > 1 and not losses(period_s, callback_s, depth - 1, messages):
+            return f'smallest_depth{run} is {depth}, but {depth - 1} loses none, either'
+        return True
+
+    hint = 'A while loop raises the depth by one as long as something is lost.'
+    return [
+        ('six messages of the level', lambda: is_smallest(1, 3.5, 6), hint),
+        ('our 41 messages', lambda: is_smallest(0.05, 0.2, 41), hint),
+        ('a callback that is fast enough', lambda: is_smallest(0.05, 0.01, 100), 'Begin with 1.'),
+    ]
+
+
+def losses(period_s, callback_s, depth, messages):
+    """Return how many messages the model loses with one thread."""
+    run = predict(period_s, callback_s, depth, threads=1, messages=messages)
+    return explain(run, depth, threads=1).lost
+
+
+@tasks.add(6)
+def count_the_losses(LossCounter):
+    def finds(numbers, missing):
+        let(LossCounter, CALLBACK_S=0.02)
+        with Bench() as bench:
+            node, executor = LossCounter(100, callback_group=None), SingleThreadedExecutor()
+            executor.add_node(node)
+            texts = [String(data=f'Hello World: {number}') for number in numbers]
+            bench.say('topic', *texts, qos=100, at_once=True)
+            begun_s = time.monotonic()
+            for _ in numbers:
+                executor.spin_once(timeout_sec=1)
+            took_s = time.monotonic() - begun_s
+        if took_s < 0.02 * len(numbers):
+            return 'it does not do what a slow subscriber does'
+        must_have(node, 'missing')
+        found = [*node.missing]
+        return found == missing or f'of {numbers} it says that {found} are missing'
+
+    hint = 'From self.expected up to this number, without it: range(...).'
+    return [
+        ('0, 1, 3: 2 is missing', lambda: finds([0, 1, 3], [2]), hint),
+        ('0, 4, 5, 7: four are missing', lambda: finds([0, 4, 5, 7], [1, 2, 3, 6]), hint),
+        (
+            '0, 1, 2: none is missing',
+            lambda: finds([0, 1, 2], []),
+            'Which one is expected after 0?',
+        ),
+        ('2, 3: 0 and 1 are missing', lambda: finds([2, 3], [0, 1]), 'The publisher began with 0.'),
+    ]
+
+
+# It tells the stopped talker that it is there, and is stopped itself before it has got a message.
+SUBSCRIBER = """
+import os, rclpy, signal, sys, time
+from std_msgs.msg import String
+rclpy.init()
+node = rclpy.create_node('late_listener')
+while not node.count_publishers('topic'):
+    time.sleep(0.01)
+os.kill(int(sys.argv[1]), signal.SIGSTOP)
+node.create_subscription(String, 'topic', print, 100)
+time.sleep(0.2)
+os.kill(os.getpid(), signal.SIGSTOP)
+time.sleep(60)
+"""
+LONGER_THAN_PUBLISHING_S = 1.0
+WAITS_AT_MOST_S = 12.0
+
+
+@tasks.add(7)
+def a_program_of_its_own(workspace, file):
+    def start(bench, *arguments):
+        return subprocess.Popen(
+            [sys.executable, *arguments],
+            env=os.environ | bench.session.environment,
+            cwd=workspace.path,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+
+    def ended(bench, talker):
+        """Wait for the end of the talker. Raises Failed if it fails, or says nothing at its end."""
+        if not bench.wait(lambda: talker.poll() is not None, WAITS_AT_MOST_S):
+            talker.kill()
+            raise Failed('the program does not end')
+        printed = talker.stdout.read().strip().splitlines()
+        if talker.returncode:
+            raise Failed(python_error(printed) or f'the program ended with {talker.returncode}')
+
+    def last_ones(depth):
+        """Subscribe, and spin only when the program has ended."""
+        heard = []
+        with Bench() as bench:
+            node, executor = Node('late_listener'), SingleThreadedExecutor()
+            executor.add_node(node)
+            talker = start(bench, file)
+            bench.wait(lambda: is_there(node) or talker.poll() is not None, 10)
+            node.create_subscription(String, 'topic', lambda m: heard.append(m.data), depth)
+            ended(bench, talker)
+            bench.spin(node, executor=executor)
+            bench.quiet()
+        right = [f'Hello World: {number}' for number in range(50 - depth, 50)]
+        if heard == right:
+            return True
+        numbers = [text.removeprefix('Hello World: ') for text in heard]
+        return f'with depth {depth}, these were heard: {", ".join(numbers) or "none"}'
+
+    def waits_for_all():
+        """Keep a subscriber from getting anything: the program must not end."""
+        with Bench() as bench:
+            talker = start(bench, file)
+            # Two programs that begin at once in one domain may choose the same port.
+            bench.wait(lambda: is_there(bench.tester) or talker.poll() is not None, 10)
+            if talker.poll() is None:
+                listener = start(bench, '-c', SUBSCRIBER, str(talker.pid))
+                bench.wait(lambda: is_stopped(listener) or talker.poll() is not None, 10)
+            if talker.poll() is not None or not is_stopped(listener):
+                ended(bench, talker)
+                return 'it ends before a subscriber is there'
+            os.kill(talker.pid, signal.SIGCONT)
+            early = bench.wait(lambda: talker.poll() is not None, LONGER_THAN_PUBLISHING_S)
+            os.kill(listener.pid, signal.SIGCONT)
+            ended(bench, talker)
+            listener.kill()
+            listener.wait()
+        return not early or 'it ended although a slow subscriber had not got the messages'
+
+    numbers = 'Which numbers does range(50) give?'
+    last = 'Call publisher.wait_for_all_acked(Duration(seconds=10)) last.'
+    return [
+        ('depth 10 keeps the last ten', lambda: last_ones(10), numbers),
+        ('depth 3 keeps the last three', lambda: last_ones(3), 'First wait, then publish.'),
+        ('it ends when all have arrived', waits_for_all, last),
+    ]
+
+
+def is_there(node):
+    return node.count_publishers('topic') > 0
+
+
+def is_stopped(process):
+    return psutil.Process(process.pid).status() == psutil.STATUS_STOPPED
+
+
+def python_error(lines):
+    """Return the error at the end of a traceback, and the line of the program where it came."""
+    places = [re.match(r'  File ".*?(\w+\.py)", line (\d+)', line) for line in lines]
+    places = [place for place in places if place and place[1] == 'talker.py']
+    where = f'Line {places[-1][2]} of {places[-1][1]}: ' if places else ''
+    return where + lines[-1] if lines else ''

@@ -1,0 +1,43 @@
+"""What the task of the lesson "Start here" is judged by."""
+
+from helpers.checks.tasks import Tasks
+from helpers.robot import Floor, Robot
+from helpers.ros import ros_session
+
+tasks = Tasks()
+check = tasks.check
+
+HOUSE = Floor.from_text(
+    """
+####################
+#                  #
+#                  #
+#####  #############
+#                  #
+# >                #
+#                  #
+####################
+""",
+    name='house',
+)
+BEHIND_THE_WALL_M = 2.61
+
+
+@tasks.add(1)
+def through_the_door(speed):
+    def goes_through():
+        if isinstance(speed, bool) or not isinstance(speed, int | float):
+            return f'speed is {speed!r}, and that is not a number such as 0.4'
+        # In simulated time the drive takes no time, and is the same in each run.
+        with ros_session():
+            robot = Robot(HOUSE, sim_time=True)
+            robot.drive(speed, seconds=3.5)
+            robot.drive(0.0, 1.57, seconds=1)
+            robot.drive(0.5, seconds=3)
+        if robot.bumps:
+            return 'it hit a wall'
+        through = robot.pose.y > BEHIND_THE_WALL_M
+        return through or 'it does not come to the other side of the wall'
+
+    hint = 'Speed is distance divided by time: 1.75 m in 3.5 s.'
+    return [('the robot goes through the door, and hits nothing', goes_through, hint)]
