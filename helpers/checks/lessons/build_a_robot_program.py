@@ -317,9 +317,7 @@ def a_node_that_drives(workspace):
         return 0.7 < way < 0.9 or f'in 3 s it drove {way:.1f} m'
 
     def one_for_each_scan():
-        robot = drive(EMPTY, module(workspace, 'patrol').Patrol, 2)
-        scans, commands = len(robot.record.scans), len(robot.record.commands)
-        return scans - 2 <= commands <= scans or f'{commands} commands for {scans} scans'
+        return one_command_a_scan(drive(EMPTY, module(workspace, 'patrol').Patrol, 2))
 
     def has_command():
         with ros_session():
@@ -336,6 +334,12 @@ def a_node_that_drives(workspace):
         ('one command for each scan', one_for_each_scan, 'Publish in the callback of the scan.'),
         ('command(v, w)', has_command, 'twist.linear.x and twist.angular.z'),
     ]
+
+
+def one_command_a_scan(robot):
+    """Return whether as many commands came as scans, or else their numbers."""
+    scans, commands = len(robot.record.scans), len(robot.record.commands)
+    return scans - 2 <= commands <= scans or f'{commands} commands for {scans} scans'
 
 
 @tasks.add(2)
@@ -449,7 +453,7 @@ def stop_before_a_wall(workspace):
             if robot.bumps:
                 return 'it hits something'
             if fastest > 0.5001:
-                return f'it drives at {fastest:g} m/s'
+                return f'it drives at {fastest:.2g} m/s: more than 0.5'
             return 0.2 < ahead < near_m or f'it stands still {ahead:.1f} m from it'
 
         return test
@@ -824,11 +828,9 @@ def the_whole_node(workspace):
 
     def stands(tour):
         speeds = tour.speeds(0.2)
-        scans = len(tour.robot.record.scans)
         if set(speeds) != {(0.0, 0.0)}:
             return f'it commands {sorted(set(speeds))[-1:] or "nothing"}'
-        count = len(tour.robot.record.commands)
-        return scans - 2 <= count <= scans or f'{count} commands for {scans} scans'
+        return one_command_a_scan(tour.robot)
 
     def two_places(tour):
         tour.send(2)
@@ -838,10 +840,11 @@ def the_whole_node(workspace):
         if tour.robot.bumps or tour.status() != 'SUCCEEDED':
             return f'{tour.status()} at {x:.1f}, {y:.1f}, bumps: {tour.robot.bumps}'
         if fastest > 0.5001:
-            return f'it drives at {fastest:g} m/s, and the speed is 0.5 at first'
+            return f'it drives at {fastest:.2g} m/s, and the speed is 0.5 at first'
         tour.run(1)
-        near = math.dist((x, y), ROOMS.places['C']) < 0.3
-        return (near and tour.robot.stopped) or f'at {x:.1f}, {y:.1f}'
+        if math.dist((x, y), ROOMS.places['C']) > 0.3 or not tour.robot.stopped:
+            return f'at {x:.1f}, {y:.1f}'
+        return one_command_a_scan(tour.robot)
 
     def cancel(tour):
         tour.send(2)
