@@ -81,7 +81,7 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
     for file in files_of(newer):
         target, own, old = mine / file, _found(mine / file), _found(base / file)
         data, was, now = (newer / file).read_bytes(), _bytes(old), _bytes(own)
-        if data == now == was or data == was and own == target:
+        if data == was and own == target:
             continue
         if now not in (None, was, data):
             try:

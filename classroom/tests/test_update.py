@@ -136,6 +136,14 @@ def test_an_archive_brings_newer_and_renumbered_lessons(tmp_path, mine, capsys):
     assert '.yours' not in capsys.readouterr().out
 
 
+def test_a_lesson_with_another_number_and_nothing_else_stays(tmp_path, mine):
+    write(mine / 'notebooks', LESSON, OLD)
+    fill(tmp_path / 'newer', '03', OLD, 'newer')
+    assert update.main([str(tmp_path / 'newer'), '--to', str(mine)]) == 0
+    assert read(mine / 'notebooks', '03_lose.ipynb') == sources(notebook(OLD).cells)
+    assert not (mine / 'notebooks' / LESSON).exists()
+
+
 def test_a_file_that_both_changed_is_set_aside(tmp_path, mine, capsys):
     (mine / 'helper.py').write_text('my helper')
     (mine / 'notebooks' / LESSON).write_text('{ no notebook')
