@@ -7,53 +7,53 @@ lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, OUT
 	@exec $(PYTHON) -m tools.lab $(if $(filter yes,$(OUTPUTS)),--outputs) $(server) -- $(LAB_ARGS)
 
 present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02, or PLAN=90, a timetable; NEW=yes makes it anew
-	@exec $(PYTHON) -m tools.classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" $(if $(filter yes,$(NEW)),--new) \
-		$(if $(filter no,$(FRESH)),--saved-outputs) $(server) -- $(LAB_ARGS)
-
-card: set_up ## one page to print for a timetable of teaching.md: PLAN=90
-	@$(PYTHON) -m tools.classroom.card $(PLAN)
+	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" $(if $(filter yes,$(NEW)),--new) \
+		$(server) -- $(LAB_ARGS)
 
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join over the network; PORT=8765, BROWSER=no
-	@exec $(PYTHON) -m tools.classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
+	@exec $(PYTHON) -m classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
 
 test: set_up ## the course: style, tests of the helpers, every notebook compared with its saved outputs; LESSON=02 for one
 	@answers="extend-exclude=[$$($(PYTHON) -m tools.lessons.answers)]" && \
 		.venv/bin/ruff check --config "$$answers" && .venv/bin/ruff format --check --config "$$answers"
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(lesson) $(PYTEST_ARGS)
 
+test-ros2: set_up ## the `ros2` command, a package of its own in ros2/
+	@$(PYTHON) -m pytest -n 2 --dist loadscope --max-worker-restart 0 -o faulthandler_timeout=600 ros2 $(PYTEST_ARGS)
+
 test-tools: set_up ## the tools: an installation from nothing, a new lesson, two machines
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/tools $(PYTEST_ARGS)
 
-test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour; LESSON=02 for one
-	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(PYTEST_ARGS)
+test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour; LESSON=02 TASK=3
+	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(if $(TASK),-k "$(shell printf task_%02d $(TASK))") $(PYTEST_ARGS)
 
 test-browser: ## the real JupyterLab and the site in Chromium, as students use them; it takes minutes
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/browser $(PYTEST_ARGS)
 
-test-classroom: ## deck, notes and class page; then a class of 12 on a JupyterHub, and the container; it takes minutes
-	@tools/set_up.sh browser && { tools/classroom/hub/set_up.sh || echo 'LEFT OUT: the hub.'; }
+test-classroom: ## slides, notes and class page; then a class of 12 on a JupyterHub, and the container; it takes minutes
+	@tools/set_up.sh browser && { classroom/hub/set_up.sh || echo 'LEFT OUT: the hub.'; }
 	@failed=0; \
-	$(PYTHON) -m pytest -n 2 $(slow) --ignore tests/classroom/hub tests/classroom $(PYTEST_ARGS) || failed=$$?; \
-	$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 tests/classroom/hub $(PYTEST_ARGS) || failed=$$?; \
+	$(PYTHON) -m pytest -n 2 $(slow) --ignore classroom/tests/hub classroom/tests $(PYTEST_ARGS) || failed=$$?; \
+	$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 classroom/tests/hub $(PYTEST_ARGS) || failed=$$?; \
 	exit $$failed
 
 image: ## a container image of the lessons, with podman or docker: BASE=, CONTAINER=, IMAGE_ARGS=... change how
-	@tools/classroom/container/run.sh image
+	@classroom/container/run.sh image
 
 lab-container: ## the lessons in a container of that image, your notebooks in my_lessons/: PORT=8890, LESSONS=FOLDER
-	@tools/classroom/container/run.sh lab
+	@classroom/container/run.sh lab
 
-hub: ## a JupyterHub for a class on this machine; CONTAINERS=yes, HUB_ARGS=... change how. See tools/classroom/HOSTING.md
-	@tools/classroom/hub/set_up.sh
-	@exec $(PYTHON) -m tools.classroom.hub $(if $(filter yes,$(CONTAINERS)),--containers) -- $(HUB_ARGS)
+hub: ## a JupyterHub for a class on this machine; CONTAINERS=yes, HUB_ARGS=... change how. See classroom/HOSTING.md
+	@classroom/hub/set_up.sh
+	@exec $(PYTHON) -m classroom.hub $(if $(filter yes,$(CONTAINERS)),--containers) -- $(HUB_ARGS)
 
 handout: set_up ## a student's edition as one archive: SOLUTIONS=no leaves the solutions out, OFFLINE=yes (PYTHONS="3.11 3.12") adds the packages
-	@$(PYTHON) -m tools.classroom.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
+	@$(PYTHON) -m classroom.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
 		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
 
 update: set_up ## get newer lessons, keep what you have written; FROM=ros2_notebooks.tar.gz names a newer archive
-	@$(PYTHON) -m tools.classroom.update $(if $(FROM),"$(FROM)")
+	@$(PYTHON) -m classroom.update $(if $(FROM),"$(FROM)")
 
 notebooks: set_up ## run all notebooks, save their outputs, and write what follows from them; LESSON=02 for one
 	@$(PYTHON) -m tools.lessons.run $(LESSON)
@@ -96,11 +96,11 @@ set_up:
 	@mkdir -p .jupyter && tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
-test test-tools test-answers test-browser test-classroom notebooks lesson soak bench lint: groups := test
+test test-ros2 test-tools test-answers test-browser test-classroom notebooks lesson soak bench lint: groups := test
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present card class test test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
+.PHONY: help lab present class test test-ros2 test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
 	lesson site soak bench release lint lock licences clean set_up
 
 PYTHON := .venv/bin/python

@@ -1,11 +1,15 @@
 """Whatever a student's code does, a check says one sentence, the process lives, nothing is left."""
 
 import os
+import signal
+import subprocess
+import sys
 import threading
 import time
 
 import psutil
 import pytest
+from support.waits import wait_for
 
 from helpers.checks import apart
 from helpers.checks.tasks import Tasks
@@ -158,3 +162,36 @@ def test_a_thread_that_failed_gets_a_sentence_of_its_own(capsys):
 
     said = ' '.join(points_of(starts_a_thread, capsys).split())
     assert 'nothing came. A thread of yours ended with ZeroDivisionError: division by zero' in said
+
+
+def test_an_interrupt_ends_the_check_and_all_it_started(capsys):
+    threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        points_of(sleeps_for_ever, capsys)
+    assert psutil.Process().children(recursive=True) == []
+
+
+KILLED = """
+import subprocess, time
+from helpers.checks.tasks import Tasks
+
+def starts_and_waits():
+    subprocess.Popen(['sleep', '1001'])
+    time.sleep(1000)
+
+tasks = Tasks()
+tasks.add(1, limit_s=100)(lambda answer: [('it ends', answer, '')])
+tasks.check(1, starts_and_waits)
+"""
+
+
+def sleepers():
+    commands = [process.info['cmdline'] for process in psutil.process_iter(['cmdline'])]
+    return commands.count(['sleep', '1001'])
+
+
+def test_a_killed_kernel_leaves_nothing_of_its_check():
+    with subprocess.Popen([sys.executable, '-c', KILLED]) as kernel:
+        wait_for(sleepers)
+        kernel.kill()
+    wait_for(lambda: not sleepers())

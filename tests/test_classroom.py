@@ -1,25 +1,11 @@
-"""What a lesson sends to a class, and what it does without one."""
+"""What a lesson does without a class. classroom/tests has classes that students join."""
 
-import contextlib
-import csv
-import json
 import socket
 
 import pytest
-from support.classes import LATER, OTHER, QUESTION, STEP, running_class, student
-from support.processes import running
+from support.students import GUESSES, VALUES, in_kernel, student
 
-from helpers.checks import checks, classroom
-
-VALUES = [41, 0.2, True, 'the way is free', {'D', 'C'}, [0, 1, 2], ('a', 1)]
-GUESSES = """
-import time
-for value in range({}, {}):
-    guess({!r}, value)
-    time.sleep(0.01)
-"""
-BEGIN = 'import sys\nfrom helpers.checks import checks, classroom\nfrom helpers.checks import *\n'
-TOLD = [41, 0.2, True, 'the way is free', ['C', 'D'], [0, 1, 2], ['a', 1]]
+from helpers.checks import classroom
 
 
 @pytest.fixture
@@ -33,40 +19,10 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@contextlib.contextmanager
-def kernel(folder, script, begin=BEGIN, **environment):
-    """Run a script as cells of a lesson; yield what it prints. The kernel lives in the block."""
-    end = '\nprint("END", flush=True)\nsys.stdin.read()'
-    with running(begin + script + end, **student(folder) | environment) as process:
-        lines = []
-        for line in process.stdout:
-            if line == 'END\n':
-                break
-            lines.append(line)
-        else:
-            pytest.fail(process.stderr.read())
-        yield ' '.join(''.join(lines).split())
-        process.communicate()
-
-
-def in_kernel(folder, script, **environment):
-    """Run a script in a kernel that ends then as at a restart, and return what it printed."""
-    with kernel(folder, script, **environment) as said:
-        pass
-    return said
-
-
-def join(opened, name=''):
-    return f'classroom.join_class({opened.address!r}, {opened.code!r}, {name!r})\n'
-
-
-# --- Without a class -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize('value', [*VALUES, None, ..., object(), float('nan'), 'x' * 9999])
 def test_without_a_class_a_guess_returns_its_value(folder, capsys, value):
     assert classroom.guess('How many?', value) is value
-    checks.check(1, ('it is right', False, ''))
+    classroom.tell_task(1, False)
     assert list(folder.iterdir()) == []
     assert 'class' not in capsys.readouterr().out
 
@@ -100,137 +56,8 @@ def test_an_address_where_nobody_answers(folder, capsys):
 
 def test_a_file_that_is_damaged_fails_no_lesson(tmp_path):
     tmp_path.joinpath('ros2_notebooks_class.sqlite').write_text('This is no database. ' * 99)
-    said = in_kernel(tmp_path, GUESSES.format(0, 50, QUESTION) + 'leave_class()')
+    said = in_kernel(tmp_path, GUESSES.format(0, 50, 'How many?') + 'leave_class()')
     assert 'Nothing is sent to the class, because ' in said
     assert 'remove this file, then join again.' in said
     assert said.endswith(classroom.NOT_JOINED)
     assert list(tmp_path.iterdir()) == []
-
-
-# --- In a class ----------------------------------------------------------------------------------
-
-
-def test_only_values_that_a_page_shows_are_sent(opened, tmp_path):
-    others = '..., None, object(), "x" * 9999, [[1]], {"A": 1}, float("inf"), 2**99'
-    script = f"""
-for value in ({others}, *{VALUES!r}):
-    assert guess({OTHER!r}, value) is value
-guess({QUESTION!r}, 'the last one')
-"""
-    with kernel(tmp_path, join(opened) + script):
-        opened.wait_for(lambda view: view['guesses'][0]['answered'])
-    rows = list(csv.reader(opened.csv()))
-    assert [json.loads(row[-1]) for row in rows[1:-1]] == TOLD
-
-
-def test_the_page_gets_guesses_tasks_and_hands(opened, tmp_path):
-    script = f"""
-guess({QUESTION!r}, 7)
-my_secret = guess({QUESTION!r}, 9)
-checks.compare_prediction({QUESTION!r}, my_secret, 14)
-checks.check(1, ('it is so', True, ''))
-checks.check(1, ('it is so', False, ''))
-raise_hand()
-"""
-    with kernel(tmp_path, join(opened, 'Ada') + script) as said:
-        view = opened.wait_for(lambda view: view['hands'])
-    assert f'You are in the class of {opened.address} on seat' in said
-    assert 'called Ada. Sent to it: your guesses' in said
-    assert 'Your hand is up.' in said
-    assert [hand['name'] for hand in view['hands']] == ['Ada']
-    [task] = view['tasks']
-    assert (task['solved'], task['tried']) == (1, 0)
-    assert opened.bars() == {'9': 1}
-    assert opened.view()['guesses'][0]['measured'] == ['14']
-    rows = [line.split(',')[5:] for line in opened.csv()[1:]]
-    assert rows == [
-        ['guess', QUESTION, '7'],
-        ['guess', QUESTION, '9'],
-        ['outcome', QUESTION, '14'],
-        ['task', '1', 'true'],
-        ['task', '1', 'false'],
-        ['hand', '', 'true'],
-    ]
-
-
-def test_membership_lasts_until_the_student_leaves(opened, tmp_path):
-    in_kernel(tmp_path, join(opened))
-    in_kernel(tmp_path, f'guess({QUESTION!r}, 2)', JPY_SESSION_NAME='/home/ada/notes.ipynb')
-    with kernel(tmp_path, f'guess({QUESTION!r}, 1)'):
-        opened.wait_for(lambda view: view['guesses'][0]['answered'])
-    assert [line[-1] for line in opened.csv()[1:]] == ['1']
-    assert in_kernel(tmp_path, 'leave_class()').endswith('What you sent is deleted.')
-    in_kernel(tmp_path, f'guess({QUESTION!r}, 3)')
-    assert opened.csv()[1:] == []
-    assert in_kernel(tmp_path, 'leave_class()') == classroom.NOT_JOINED
-
-
-def test_the_steps_of_the_cells_that_run(opened, tmp_path):
-    script = f"""
-shell = InteractiveShell.instance()
-shell.run_cell('from helpers.checks import *', cell_id={STEP!r})
-shell.run_cell('1', cell_id='my own')
-shell.run_cell('1', cell_id={LATER!r})
-"""
-    in_kernel(tmp_path, join(opened))
-    begin = 'import sys; from IPython.core.interactiveshell import InteractiveShell\n'
-    with kernel(tmp_path, script, begin):
-        view = opened.wait_for(lambda view: any(step['here'] for step in view['steps']))
-    assert {step['title']: step['here'] for step in view['steps']}['2. Look'] == 1
-    assert len(opened.csv()) == 2
-
-
-def test_a_code_that_is_wrong(opened, tmp_path):
-    loose = opened.code.replace('-', ' ').upper()
-    script = f'join_class("{opened.address}", "blue-otter-lamp")\n'
-    said = in_kernel(tmp_path, f'{script}join_class("http://{opened.address}/", {loose!r})')
-    assert said.startswith('This is not the code of the class. Compare it with the wall. You are')
-
-
-# --- When the class does not answer --------------------------------------------------------------
-
-
-def test_events_survive_a_dead_server_exactly_once(tmp_path):
-    """The server is killed in the middle; kernels end and begin; a clock is a year behind."""
-    behind = 'import time\nreal = time.time\ntime.time = lambda: real() - 3e7\n'
-    first, second, third = (GUESSES.format(n, n + 100, QUESTION) for n in (0, 100, 200))
-    ada = tmp_path / 'ada'
-    with running_class(tmp_path / 'class') as opened:
-        assert 'does not answer' not in in_kernel(ada, join(opened) + first)
-        begin = f'{behind}{BEGIN}print("open", flush=True)\n'
-        with running(begin + second, **student(ada)) as process:
-            assert process.stdout.readline() == 'open\n'
-            opened.kill()
-            process.communicate()
-        with kernel(ada, third) as said:
-            assert 'The class does not answer. What you tell is kept for ten minutes.' in said
-            opened.start()
-            assert 'goes on' in opened.said
-            opened.go(1)
-            opened.wait_for(lambda view: opened.bars() == {'299': 1})
-        values = [int(line.rpartition(',')[2]) for line in opened.csv()[1:]]
-        assert values == list(range(300))
-
-        # The class is over. Late students read it from the next one.
-        assert opened.stop().endswith('The class is over. What it was told is deleted.\n')
-        assert not list(tmp_path.glob('class/jupyter/class/*'))
-        opened.start()
-        said = in_kernel(ada, GUESSES.format(0, 100, QUESTION))
-        assert 'The class that you joined is over. To tell a new one, join it.' in said
-        assert opened.csv()[1:] == []
-    assert in_kernel(ada, 'raise_hand()') == classroom.NOT_JOINED
-
-
-def test_a_class_that_stays_silent_is_left(tmp_path):
-    with running_class(tmp_path / 'class') as opened:
-        in_kernel(tmp_path, join(opened))
-    script = f"""
-import time
-classroom.GIVE_UP_S = 0.0
-guess({QUESTION!r}, 1)
-while classroom._known():
-    time.sleep(0.05)
-guess({QUESTION!r}, 2)
-"""
-    assert in_kernel(tmp_path, script).endswith(classroom.OVER)
-    assert in_kernel(tmp_path, 'raise_hand()') == classroom.NOT_JOINED

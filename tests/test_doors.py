@@ -12,12 +12,13 @@ import helpers
 ROOT = Path(__file__).resolve().parents[1]
 HELPERS = ROOT / 'helpers'
 ORDER = re.findall(r'^    (\w+)  ', helpers.__doc__, re.MULTILINE)
-COMMAND = 'ros2'  # a package of its own, which knows nothing of the rooms' order
 # Doors below a room.
 BELOW = {
     'helpers.checks.classroom',  # what the class page and the hub must agree on with a notebook
     'helpers.checks.progress',  # which tasks are solved: lesson 00 and the tools ask
     'helpers.checks.tasks',  # what a lesson of one's own needs, and slow to load
+    'helpers.checks.bench',
+    'helpers.checks.verdict',  # the data of a verdict, which the rules and the tests read
     'helpers.machine.doctor',  # a program, which runs where no ROS is
 }
 IMPORT = re.compile(
@@ -38,7 +39,7 @@ def imports(text):
 
 def files():
     """Yield each Python file that is no test, and each notebook, with its code."""
-    for folder in ('helpers', 'tools'):
+    for folder in ('helpers', 'tools', 'classroom'):
         for file in sorted((ROOT / folder).rglob('*.py')):
             yield file, file.read_text()
     for file in sorted((ROOT / 'notebooks').glob('*.ipynb')):
@@ -56,7 +57,7 @@ def room_of(file):
 def mistake(room, module, name):
     """Return why a file of this room must not import this, or ''."""
     other = module.split('.')[1]
-    if COMMAND in (room, other) or other == room:
+    if other == room:
         return ''
     if room and ORDER.index(other) >= ORDER.index(room):
         return f'{other} stands below {room}'
@@ -73,7 +74,7 @@ def mistake(room, module, name):
 
 def test_the_list_names_all_rooms():
     rooms = {file.parent.name for file in HELPERS.glob('*/__init__.py')}
-    assert sorted(rooms - {COMMAND}) == sorted(ORDER)
+    assert sorted(rooms) == sorted(ORDER)
 
 
 def test_imports_go_through_doors_and_upwards_in_the_list():
@@ -107,3 +108,12 @@ def test_a_door_has_what_it_names(room):
 def test_a_wrong_import_is_seen(room, line, reason):
     (found,) = imports(line)
     assert reason in mistake(room, *found)
+
+
+def test_helpers_import_only_the_door_of_the_command():
+    doors = {
+        module
+        for file in HELPERS.rglob('*.py')
+        for module in re.findall(r'(?m)^ *(?:from|import) (ros2_command\S*)', file.read_text())
+    }
+    assert doors == {'ros2_command.api'}

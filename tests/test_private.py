@@ -25,7 +25,6 @@ import helpers
 from helpers.private_names import PRIVATE_NAMES
 
 HELPERS = Path(helpers.__file__).parent
-ANNEX = 'ros2'  # a package of its own
 PRIVATE = re.compile(r'_[a-zA-Z]\w*')
 # Documented by Python and IPython; and texts that only look like names.
 NO_SECRETS = {
@@ -62,15 +61,21 @@ def modules():
     """Yield each module of helpers: its file, and what is in it."""
     for file in sorted(HELPERS.rglob('*.py')):
         path = file.relative_to(HELPERS)
-        if path.parts[0] not in (ANNEX, 'private_names.py'):
+        if path.parts[0] != 'private_names.py':
             yield path, list(ast.walk(ast.parse(file.read_text())))
 
 
 def used(things):
     """Return the private names that a module uses, also those in texts, as for getattr."""
     names = set()
+    # The end of an f-string, `f'{part}_covariance'`, is no name.
+    ends = {
+        id(part) for text in things if isinstance(text, ast.JoinedStr) for part in text.values[1:]
+    }
     for thing in things:
         match thing:
+            case ast.Constant() if id(thing) in ends:
+                continue
             case ast.Attribute(attr=name) | ast.Constant(value=str(name)):
                 names.add(name)
             case ast.ImportFrom(module=module, names=imported) if not module.startswith('helpers.'):

@@ -74,6 +74,7 @@ def test_what_the_code_did_is_said_with_its_line(capsys, number):
         ('the node exists', broken, ''),
         ('it is in a group', lambda: Group.add('a timer'), ''),
         ('it publishes', hidden, ''),
+        ('it is called', lambda: broken('an argument'), ''),
         ('it is heard', in_a_thread, ''),
         ('some', list, ''),
         ('equal', lambda: np.bool_(True), ''),
@@ -84,10 +85,24 @@ def test_what_the_code_did_is_said_with_its_line(capsys, number):
     number_of_line = broken.__code__.co_firstlineno + 1
     assert f'RuntimeError: no <object object> more. Line {number_of_line} {line}' in text
     assert "Group.add() missing 1 required positional argument: 'timer'. Did you forget ()" in text
-    assert 'Found: TypeError: a float [not yet] it is heard' in text
-    assert 'Found: nothing came A thread of yours ended with RuntimeError: no' in text
+    assert 'Found: TypeError: a float [not yet] it is called' in text
+    assert 'TypeError: broken() takes 0 positional arguments but 1 was given' in text
+    assert 'Found: nothing came. A thread of yours ended with RuntimeError: no' in text
     assert '[not yet] some [ok] equal' in text
-    assert lines[-1] == f'Task {number}: 1 of 7. {AGAIN}'
+    assert lines[-1] == f'Task {number}: 1 of 8. {AGAIN}'
+
+
+def test_an_error_is_said_once_and_its_line_takes_the_place_of_a_hint(capsys, number):
+    def broken():
+        raise RuntimeError('the wheel is stuck')
+
+    hint = 'Turn it.'
+    for _ in range(2):
+        lines = judged(capsys, number, ('one', broken, hint), ('two', broken, hint))
+    text = ' '.join(' '.join(lines).split())
+    assert 'RuntimeError: the wheel is stuck. Line' in text
+    assert text.endswith(f'[not yet] two Found: the same Task {number}: 0 of 2. {AGAIN}')
+    assert hint not in text
 
 
 def test_after_an_endless_point_the_others_wait(capsys, number):
@@ -213,24 +228,34 @@ def test_a_lesson_goes_on_with_the_code_that_passes():
         assert '[not yet]' in kernel.run('two = 3\ncheck(1, two)')
         assert kernel.run(solution) == '[ok] it is 2\nSolution of task 1: 1 of 1.\n'
         assert [verdict['of'] for verdict in kernel.verdicts] == ['solution']
-        # What the solution gave is not the student's, and stays for the later cells.
+        # What the solution gave is not the student's, and stays for the later cells. An equal value
+        # that a cell gives is.
         assert 'This is the code of the solution.' in kernel.run('check(1, two)')
         assert kernel.run('print(two)') == '2\n'
-        assert 'All done.' in kernel.run('two = 2.0\ncheck(1, two)')
+        kernel.run('two = 2')
+        assert 'All done.' in kernel.run('check(1, two)')
         assert 'goes on with your code' in kernel.run(solution)
-        assert kernel.run('print(two)') == '2.0\n'
+        assert kernel.run('print(two)') == '2\n'
 
 
 def test_a_cell_that_failed_is_not_judged_by_what_it_was_before():
     with Kernel() as kernel:
         kernel.run(LESSON)
-        assert 'All done.' in kernel.run('two = 2\ncheck(1, two)')
+        kernel.run('two = 2')
+        assert 'All done.' in kernel.run('check(1, two)')
         kernel.run('two = 1 + three')
         said = kernel.run('check(1, two)')
         assert 'The last cell that defines two ended with an error.' in said
         assert said.endswith('Task 1: not judged.\n')
         kernel.run('two = 3')
         assert 'Found: it is 3' in kernel.run('check(1, two)')
+
+
+def test_a_check_before_its_task_says_what_to_run():
+    with Kernel() as kernel:
+        kernel.run(f'%load_ext helpers.notebook.kernel\nimport helpers.ros.session{LESSON}')
+        assert 'two is not there yet: run the cell of the task above' in kernel.run('check(1, two)')
+        assert 'not there yet' not in kernel.run('print(two)')
 
 
 def test_a_check_leaves_the_kernel_as_it_was():

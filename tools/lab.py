@@ -4,6 +4,7 @@ python -m tools.lab --port 8890 --no-browser -- --LabApp.expose_app_in_browser=T
 """
 
 import argparse
+import json
 import os
 import socket
 import sys
@@ -33,28 +34,33 @@ def parser(description: str) -> argparse.ArgumentParser:
 
 
 def open_lab(
-    options: argparse.Namespace, address: str, more: tuple[str, ...] = (), deck: bool = False
+    options: argparse.Namespace,
+    address: str,
+    more: tuple[str, ...] = (),
+    name: str = 'user',
+    settings: dict[str, dict] | None = None,
 ) -> NoReturn:
     """Become the server of JupyterLab, which opens `address`.
 
-    A server of `make lab` and one of `make present` may run side by side: each has its settings.
-    `deck` says whether notebooks are shown as slides, `more` are options of JupyterLab.
+    Two servers may run side by side if each has a `name`, and settings of its own. `settings` are
+    those of JupyterLab's plugins, by names such as 'notebook-extension/tracker'; `more` are options
+    of JupyterLab.
     """
     try:
         socket.create_server(('localhost', int(options.port or 0))).close()
     except OSError:
         sys.exit(f'Port {options.port} is in use: give another one, such as PORT=8899.')
     config = Path(jupyter_config_dir())
-    settings = config / 'lab' / f'{"presenter" if deck else "user"}-settings'
-    if deck:  # a slide needs all of its cells, also those that are not on the screen
-        notebooks = settings / '@jupyterlab/notebook-extension/tracker.jupyterlab-settings'
-        notebooks.parent.mkdir(parents=True, exist_ok=True)
-        notebooks.write_text('{"windowingMode": "none", "scrollPastEnd": false}')
+    folder = config / 'lab' / f'{name}-settings'
+    for plugin, values in (settings or {}).items():
+        file = folder / '@jupyterlab' / f'{plugin}.jupyterlab-settings'
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(values))
     custom = config / 'custom' / 'custom.css'
     custom.parent.mkdir(parents=True, exist_ok=True)
     css = Path(__file__).with_name('lab.css').read_text()
     custom.write_text(css.partition(NOTES)[0] if options.outputs else css)
-    os.environ['JUPYTERLAB_SETTINGS_DIR'] = str(settings)
+    os.environ['JUPYTERLAB_SETTINGS_DIR'] = str(folder)
     # A terminal finds `ros2`, `colcon` and this Python.
     os.environ['PATH'] = f'{sys.prefix}/bin{os.pathsep}{os.environ["PATH"]}'
     command = [sys.executable, '-m', 'jupyterlab', f'--ServerApp.root_dir={options.root}']
@@ -68,6 +74,11 @@ def open_lab(
     if not options.browser:
         command.append('--no-browser')
     if os.getuid() == 0:
+        print(
+            'You are root: each cell that runs may change all of this machine. Start JupyterLab as '
+            'another user if you can.',
+            file=sys.stderr,
+        )
         command.append('--allow-root')
     print('Ctrl+C, twice, ends JupyterLab.', file=sys.stderr)
     os.execv(sys.executable, [*command, *options.more])

@@ -1,6 +1,7 @@
 #!/bin/sh
-# Make .venv and install tools/locks/requirements.lock and this project into it. If .venv is up to date,
-# this does nothing. After an interruption the next call repairs what the last one left.
+# Make .venv and install tools/locks/requirements.lock into it, this project, and its `ros2` command. If
+# .venv is up to date, this does nothing. After an interruption the next call repairs what the last
+# one left.
 # usage: tools/set_up.sh [--python 3.12] [GROUP...]
 # A group of pyproject.toml adds its lock. Later calls keep it up to date.
 set -eu
@@ -32,7 +33,7 @@ done
 wanted() {
     version=$(.venv/bin/python -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null) || return 0
     printf '%s\n' "Python $version" "$(pwd -P)" \
-        "$(cat $locks pyproject.toml tools/set_up.sh tools/jupyter/* | cksum)"
+        "$(cat $locks pyproject.toml ros2/pyproject.toml tools/set_up.sh tools/jupyter/* | cksum)"
 }
 stamp=.venv/set_up.stamp
 have=$(wanted)
@@ -85,7 +86,7 @@ echo "Installing $(sed -n 's/^\([a-z].*\)==.*/\1/p' $locks | sort -u | wc -l) pa
 "$uv" pip sync $quiet $no_index --python .venv/bin/python --require-hashes --build-constraints "$learners" \
     --only-binary :all: --no-binary empy $locks ||
     fail 'uv could not install requirements.lock: check the network, or name your package index with UV_DEFAULT_INDEX, then try again.'
-"$uv" pip install --quiet --offline --python .venv/bin/python --no-deps --editable .
+"$uv" pip install --quiet --offline --python .venv/bin/python --no-deps --editable . --editable ros2
 
 mkdir -p .venv/share/jupyter/lab/settings
 mkdir -p .venv/etc/jupyter .venv/etc/ipython

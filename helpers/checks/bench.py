@@ -30,7 +30,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
-from helpers.checks.errors import Failed, own_line, places
+from helpers.checks.errors import Failed, NeverEnds, own_line, places
 from helpers.notebook import frames
 from helpers.ros import ros_session
 
@@ -126,11 +126,30 @@ class Bench:
 
     def call(self, service: str, kind: type, request=None, limit_s: float = WAIT_S):
         """Call a service. Return its response, or None if no answer came within the limit."""
+        try:
+            future = self.ask(service, kind, request, limit_s)
+        except Failed:
+            return None
+        return future.result() if self.wait(future.done, limit_s) else None
+
+    def ask(self, service: str, kind: type, request=None, limit_s: float = WAIT_S):
+        """Call a service, and return the future of its response at once.
+
+        Raises Failed if nobody serves it.
+        """
         client = self._client(service, kind)
         if not self.wait(client.service_is_ready, limit_s):
-            return None
-        future = client.call_async(kind.Request() if request is None else request)
-        return future.result() if self.wait(future.done, limit_s) else None
+            raise Failed(f'nobody serves {service}')
+        return self.as_tester(client.call_async, kind.Request() if request is None else request)
+
+    def as_tester(self, function: Callable, *arguments: object):
+        """Let the tester's executor call a function, and return what it returns.
+
+        An answer to a request of another thread may get lost: https://github.com/ros2/rclpy/issues/1123
+        """
+        task = self._own_executor.create_task(function, *arguments)
+        self.wait(task.done)
+        return task.result()
 
     def _client(self, service: str, kind: type):
         if (service, kind) not in self._clients:
@@ -167,19 +186,33 @@ class Bench:
             return False
         return True
 
-    def quiet(self, limit_s: float = QUIET_S) -> bool:
+    def quiet(self, limit_s: float = QUIET_S, executor: Executor | None = None) -> bool:
         """Wait until all that was sent is handled, in the student's nodes and in the tester.
 
-        Return whether a thread of each executor is free: False if callbacks hold all of them.
+        Return whether a thread of each executor is free: False if callbacks hold all of them. With
+        an `executor`, wait for this one only.
         """
         free = True
-        for executor in [*self._executors, self._own_executor]:
+        executors = [*self._executors, self._own_executor] if executor is None else [executor]
+        for each in executors:
+            free &= self._wait_until_quiet(each, limit_s)
+        return free
+
+    def _wait_until_quiet(self, executor: Executor, limit_s: float) -> bool:
+        end = time.monotonic() + limit_s
+        while (left_s := end - time.monotonic()) > 0:
             try:
-                free &= self.session.wait_until_quiet(executor, limit_s)
+                return self.session.wait_until_quiet(executor, min(CALLBACK_S, left_s))
             except TimeoutError:
                 self._check_that_callbacks_end()
-                raise Failed('it is never quiet: callbacks come without end') from None
-        return free
+        raise Failed('it is never quiet: callbacks come without end')
+
+    def line_of_callback(self) -> str:
+        """Return the line at which a callback of the student is now, `Line 7: ...`, or nothing.
+
+        When it is quiet, a callback that has not ended waits for something.
+        """
+        return _place_of_callback(self.session.threads())
 
     # --- What was logged
 
@@ -194,11 +227,11 @@ class Bench:
     # --- At the end
 
     def _check_that_callbacks_end(self) -> None:
-        """Raise Failed if a callback of the student runs on, with the line that it is at."""
+        """Raise NeverEnds if a callback of the student runs on, with the line that it is at."""
         end = time.monotonic() + CALLBACK_S
-        while place := _place_of_callback(self.session.threads()):
+        while place := self.line_of_callback():
             if time.monotonic() > end:
-                raise Failed(f'a callback does not end. {place}')
+                raise NeverEnds(f'a callback does not end. {place}')
             time.sleep(POLL_S)
 
 
@@ -208,17 +241,24 @@ class Goal:
     def __init__(self, bench: Bench, client: ActionClient, goal, limit_s: float) -> None:
         self._bench, self._limit_s = bench, limit_s
         self.feedback: list = []
-        sent = client.send_goal_async(goal, lambda message: self.feedback.append(message.feedback))
+        sent = bench.as_tester(
+            client.send_goal_async, goal, lambda message: self.feedback.append(message.feedback)
+        )
         if not bench.wait(sent.done, limit_s):
             raise Failed('the goal gets no answer')
         self._handle = sent.result()
         self.accepted: bool = self._handle.accepted
-        self._result = self._handle.get_result_async() if self.accepted else None
+        self._result = bench.as_tester(self._handle.get_result_async) if self.accepted else None
 
-    def cancel(self) -> bool:
-        """Ask for cancellation. Return whether the server agreed."""
-        answer = self._handle.cancel_goal_async()
-        return self._bench.wait(answer.done, self._limit_s) and bool(
+    @property
+    def done(self) -> bool:
+        """Whether the goal has ended, or was not accepted."""
+        return self._result is None or self._result.done()
+
+    def cancel(self, limit_s: float | None = None) -> bool:
+        """Ask for cancellation. Return whether the server agreed in time."""
+        answer = self._bench.as_tester(self._handle.cancel_goal_async)
+        return self._bench.wait(answer.done, limit_s or self._limit_s) and bool(
             answer.result().goals_canceling
         )
 

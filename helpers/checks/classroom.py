@@ -10,6 +10,22 @@ lost while the class does not answer, or when the kernel is restarted. An event 
 own, by which the class counts it once, and the file keeps the order: no clock does.
 
 On a JupyterHub the hub names the class, and its token says whose server this is.
+
+A class page is whatever serves three requests below its address, in JSON. The header
+`Authorization: token ...` holds the token that `join` has given, empty before.
+
+    POST join    {"code": "blue-otter-lamp", "name": ""}  ->  {"seat": 3, "token": "..."}
+    POST events  {"events": [...]}                        ->  {"refused": ""}, or a sentence
+    POST leave   {}                                       ->  {}
+
+Another status than 200 comes with {"error": "one sentence"}, which the student reads. After 429,
+500 or more the same events are sent again later. An event has an `id` of 16 hexadecimal digits, the
+name of its `lesson`, a `kind`, and what belongs to it:
+
+    guess, outcome   "question", "value": what was guessed, and what was measured
+    task             "task": 2, "solved": true
+    cell             "cell": the id of the cell that runs
+    hand             "up": true
 """
 
 from __future__ import annotations

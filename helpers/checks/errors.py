@@ -16,11 +16,21 @@ HELPERS = str(Path(__file__).resolve().parents[1]) + os.sep
 INSTALLED = tuple(
     os.path.realpath(sysconfig.get_path(name)) + os.sep for name in ('stdlib', 'purelib', 'platlib')
 )
+# What rclpy's TypeErrors without a text mean, by the function that raises them.
+WITHOUT_TEXT = {
+    'send_response': 'the callback of a service has returned no response of its type',
+    'call': 'a service is called with something that is no request of its type',
+    'call_async': 'a service is called with something that is no request of its type',
+}
 CELL = re.compile(r'[/\\]ipykernel_\d+[/\\]|^<(?:ipython-input|cell)')
 
 
 class Failed(Exception):  # noqa: N818 - a verdict, and no error
     """What a check has found: raised by the bench, shown as it is."""
+
+
+class NeverEnds(Failed):
+    """What a check has found, if each later point of the task would wait as long for the same."""
 
 
 def is_students(filename: str) -> bool:
@@ -51,17 +61,26 @@ def places(frame: FrameType | None) -> Iterator[tuple[str, int]]:
         frame = frame.f_back
 
 
+def place_of(error: BaseException) -> str:
+    """Return the line of the student in which an error came up, or nothing."""
+    frames = traceback.extract_tb(error.__traceback__)
+    return own_line((frame.filename, frame.lineno or 0) for frame in reversed(frames))
+
+
 def sentence(error: BaseException) -> str:
     """Say in one sentence or two what an error says, and in which line of the student."""
     if isinstance(error, Failed):
         return str(error)
     if isinstance(error, SystemError) and error.__cause__:  # pybind11 hides a wrong field in one
         error = error.__cause__
-    frames = traceback.extract_tb(error.__traceback__)
-    place = own_line((frame.filename, frame.lineno or 0) for frame in reversed(frames))
+    place = place_of(error)
     text = ' '.join(str(error).split('\n\n')[0].split())
     text = re.sub(r' at 0x[0-9a-fA-F]+', '', text)
+    text = re.sub(r'(?:\w+\.<locals>\.)+', '', text)  # of a function in a function: its name only
     name = type(error).__name__
+    if isinstance(error, TypeError) and not text:
+        frames = traceback.extract_tb(error.__traceback__)
+        text = WITHOUT_TEXT.get(frames[-1].name, '') if frames else ''
     if isinstance(error, SyntaxError):
         place = f'Line {error.lineno}: {(error.text or "").strip()}' if error.lineno else place
     elif isinstance(error, RecursionError):

@@ -3,7 +3,7 @@
 A good test passes for each right version, and fails for each in which a bug was planted.
 
     runs = run_tests(workspace, 'src/brake_pkg', 'test/test_speed.py', 'brake_pkg.speed',
-                     {'right': RIGHT, 'wrong': RIGHT.replace('<=', '<')})
+                     {'right': RIGHT, 'wrong': planted(RIGHT, '<=', '<')})
     runs['right'].passes, runs['wrong'].says
 """
 
@@ -22,9 +22,13 @@ LONGEST = 160  # characters of a message
 
 @dataclass
 class Failure:
-    """A test that failed: its name, the line of the student, and what pytest says."""
+    """A test that failed: its name, the line of the student, and what pytest says.
+
+    One that never `ran` failed before: in a fixture, or because an argument is no fixture.
+    """
 
     test: str
+    ran: bool
     file: str
     line: int
     message: str
@@ -32,7 +36,7 @@ class Failure:
     def __str__(self) -> str:
         source = linecache.getline(self.file, self.line).strip()
         name = os.path.basename(self.file)
-        place = f', line {self.line} of {name}: {source}' if source else ''
+        place = f', line {self.line} of {name}: {source.rstrip(":")}' if source else ''
         message = ' '.join(self.message.splitlines()[0].split()) if self.message else ''
         # pytest repeats the line of an assert, with its values.
         return f'{self.test} fails{place}. {message[:LONGEST]}'.rstrip('. ')
@@ -54,7 +58,7 @@ class TestRun:
     @property
     def fails(self) -> bool:
         """Whether a test ran and failed. Tests that cannot run do not find a bug."""
-        return bool(self.failed)
+        return any(failure.ran for failure in self.failed)
 
     @property
     def says(self) -> str:
@@ -62,6 +66,12 @@ class TestRun:
         if self.problem:
             return self.problem
         return str(self.failed[0]) if self.failed else 'all tests pass'
+
+
+def planted(source: str, old: str, new: str) -> str:
+    """Return the source with a bug in it: new text in place of the old, which is there once."""
+    assert source.count(old) == 1, old
+    return source.replace(old, new)
 
 
 def run_tests(
@@ -101,19 +111,20 @@ def run_tests(
 
 
 def _test_run(result: dict, folder: Path) -> TestRun:
-    if result['code'] == -1:
-        return TestRun(problem='a test does not end')
-    if result['code'] == -2:
-        return TestRun(problem='a test ends Python itself')
+    if result['code'] < 0:
+        test = result['test'] or 'the file of the tests'
+        ending = 'does not end' if result['code'] == -1 else 'ends Python itself'
+        return TestRun(problem=f'{test} {ending}')
     failed = [
-        Failure(entry['test'], str(folder / entry['file']), entry['line'], entry['message'])
-        for entry in result['failed']
+        Failure(**entry | {'file': str(folder / entry['file'])}) for entry in result['failed']
     ]
     run = TestRun(result['passed'], failed)
     if result['problems']:
         run.problem = f'a file cannot be read: {_reason(result["problems"][0])}'
     elif result['code'] == 5:
         run.problem = 'there are no tests'
+    elif not run.passed and not run.failed:
+        run.problem = 'no test has run'
     return run
 
 
@@ -121,6 +132,8 @@ def _reason(problem: str) -> str:
     """Return the error in what pytest prints of a file that it cannot import."""
     errors = re.findall(r'^(?:E +)?([A-Z]\w*(?:Error|Exception).*|E +.*)$', problem, re.MULTILINE)
     place = re.search(r'^(\S+\.py):(\d+): in <module>', problem, re.MULTILINE)
+    place = place or re.search(r'^E +File "(.+?)", line (\d+)', problem, re.MULTILINE)
     where = f' (line {place[2]} of {os.path.basename(place[1])})' if place else ''
     lines = errors[-1:] or problem.strip().splitlines()[-1:]
-    return lines[-1].removeprefix('E').strip()[:LONGEST] + where
+    error = re.sub(r'\S+::', '', lines[-1].removeprefix('E').strip())
+    return error[:LONGEST] + where

@@ -28,24 +28,29 @@ import rclpy  # noqa: E402, F401
 
 
 class Reports:
-    """A plugin of pytest that keeps what passed and what failed."""
+    """A plugin of pytest that keeps what passed and what failed, and says which test begins."""
 
-    def __init__(self):
+    def __init__(self, answer):
+        self.answer = answer
         self.passed, self.failed, self.problems = 0, [], []
+
+    def pytest_runtest_logstart(self, nodeid):
+        """Say which test begins: it may not come back."""
+        self.answer.send(_name(nodeid))
 
     def pytest_runtest_logreport(self, report):
         """Count a test that passed, and keep where one failed: in itself or in a fixture."""
         if report.when == 'call' and report.passed:
             self.passed += 1
         if report.failed:
-            crash = getattr(report.longrepr, 'reprcrash', None)
-            entry = _entry_of_the_test(report) or crash
+            file, line, message = _place_and_message(report)
             self.failed.append(
                 {
-                    'test': report.nodeid.partition('::')[2] or report.nodeid,
-                    'file': str(getattr(entry, 'path', '')),
-                    'line': getattr(entry, 'lineno', 0),
-                    'message': crash.message if crash else str(report.longrepr),
+                    'test': _name(report.nodeid),
+                    'ran': report.when == 'call',
+                    'file': file,
+                    'line': line,
+                    'message': message,
                 }
             )
 
@@ -53,6 +58,21 @@ class Reports:
         """Keep why a file cannot be read."""
         if report.failed:
             self.problems.append(str(report.longrepr))
+
+
+def _name(nodeid):
+    return nodeid.partition('::')[2] or nodeid
+
+
+def _place_and_message(report):
+    """Return the file and the line where a test failed, and why."""
+    problem = report.longrepr
+    if hasattr(problem, 'argname'):  # an argument of the test is no fixture
+        return str(problem.filename), problem.firstlineno + 1, problem.errorstring.strip()
+    crash = getattr(problem, 'reprcrash', None)
+    place = _entry_of_the_test(report) or crash
+    message = crash.message if crash else str(problem)
+    return str(getattr(place, 'path', '')), getattr(place, 'lineno', 0), message
 
 
 def _entry_of_the_test(report):
@@ -73,7 +93,7 @@ def run(version, module, arguments, path, answer):
         sys.modules[module] = types.ModuleType(module)
         exec(version['source'], sys.modules[module].__dict__)
     keyword = ['-k', version['keyword']] if version['keyword'] else []
-    reports = Reports()
+    reports = Reports(answer)
     with redirect_stdout(io.StringIO()):
         code = pytest.main(
             ['-q', '-p', 'no:cacheprovider', *keyword, *arguments], plugins=[reports]
@@ -86,6 +106,20 @@ def run(version, module, arguments, path, answer):
             'problems': reports.problems,
         }
     )
+
+
+def result_of(answer, end):
+    """Return the result of a process, or which test had begun when there was none."""
+    test = ''
+    try:
+        while answer.poll(max(0, end - time.monotonic())):
+            message = answer.recv()
+            if isinstance(message, dict):
+                return message
+            test = message
+    except EOFError:
+        return {'code': -2, 'test': test}
+    return {'code': -1, 'test': test}
 
 
 def main():
@@ -106,11 +140,7 @@ def main():
         running.append((name, process, here))
     results = {}
     for name, process, answer in running:
-        try:
-            in_time = answer.poll(max(0, end - time.monotonic()))
-            results[name] = answer.recv() if in_time else {'code': -1}
-        except EOFError:  # the test has ended the whole process
-            results[name] = {'code': -2}
+        results[name] = result_of(answer, end)
         process.kill()
         process.join()
     print(json.dumps(results))

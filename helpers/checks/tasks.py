@@ -44,7 +44,7 @@ from IPython.display import display
 
 from helpers.checks import classroom, progress
 from helpers.checks.apart import Apart, Ending
-from helpers.checks.errors import own_line, places, sentence
+from helpers.checks.errors import Failed, NeverEnds, own_line, place_of, places, sentence
 from helpers.checks.verdict import Point, Verdict, bundle
 from helpers.notebook import frames, somebody_watches
 
@@ -184,8 +184,9 @@ def _judge(
             verdict.points = [Point(what) for what, _ in content]
             hints = [hint for _, hint in content]
         else:
-            ok, found = content
-            verdict.points[tried].ok, verdict.points[tried].found = ok, found
+            verdict.points[tried].ok, verdict.points[tried].found, names_line = content
+            if names_line:
+                hints[tried] = ''  # the line says more, and a hint for another mistake misleads
             tried += 1
         running.update(time.monotonic() - started)
     verdict.seconds = time.monotonic() - started
@@ -213,11 +214,14 @@ def _worker(points: Callable[[], Sequence[Test]], send: Callable) -> None:
     send(('points', [(what, hint) for what, _, hint in tests]))
     for number, (_, test, _) in enumerate(tests):
         failures.clear()
+        never_ends = names_line = False
         try:
             result = test()
             ok, found = (False, result) if isinstance(result, str) else (bool(result), '')
         except BaseException as error:  # whatever a student's code raises is an answer, not right
             ok, found = False, sentence(error)
+            never_ends = isinstance(error, NeverEnds)
+            names_line = bool(place_of(error)) and not isinstance(error, Failed)
         if failures and not ok:
             found = found if found[-1:] in ('', '.', '!', '?') else f'{found}.'
             found = f'{found} {failures[0]}'.strip()
@@ -229,7 +233,9 @@ def _worker(points: Callable[[], Sequence[Test]], send: Callable) -> None:
             ]
             if left and ok:
                 ok, found = False, _still_runs(left[0])
-        send(('point', (ok, found)))
+        send(('point', (ok, found, names_line)))
+        if never_ends:
+            break
 
 
 def _still_runs(thread: threading.Thread) -> str:
@@ -289,7 +295,12 @@ _failed_names: set[str] = set()  # that a cell should have defined, which ended 
 
 
 def _after_cell(result: object) -> None:
-    names = _defined_in(result.info.raw_cell or '')
+    source = result.info.raw_cell or ''
+    names = _defined_in(source)
+    if not source.startswith('%%solution'):
+        for given in _given.values():
+            for name in names & given.keys():
+                del given[name]  # now it is the student's
     if result.success or isinstance(result.error_in_exec, KeyboardInterrupt):
         _failed_names.difference_update(names)
     else:

@@ -18,6 +18,7 @@ from dataclasses import asdict, dataclass, field
 from helpers.notebook import wrap
 
 KEY = 'ros2_notebooks'
+SAME, LONG = 'the same', 40
 AGAIN = 'Try again, or go on with the solution below.'
 CARD = 'border-left:4px solid {};padding:.1em .8em;margin:.2em 0;line-height:1.45'
 INDENTED = 'margin-left:1.5em'
@@ -68,15 +69,23 @@ class Verdict:
     def text(self) -> str:
         """Return the verdict as lines of text."""
         lines = []
-        for point in self.points:
+        for point, found in zip(self.points, self._found(), strict=True):
             lines += wrap(f'[{"ok" if point.ok else "not yet"}] {point.what}', rest=' ' * 10)
-            if point.found:
-                lines += wrap(f'    Found: {point.found}', rest=' ' * 10)
+            if found:
+                lines += wrap(f'    Found: {found}', rest=' ' * 10)
             if point.hint:
                 lines += wrap(f'    Hint: {point.hint}', rest=' ' * 10)
         if self.note:
             lines += wrap(self.note)
         return '\n'.join([*lines, self.title()])
+
+    def _found(self) -> list[str]:
+        """Return what was found for each point, a long text only once in a row."""
+        texts = [point.found for point in self.points]
+        return [
+            SAME if len(text) > LONG and text == before else text
+            for text, before in zip(texts, ['', *texts], strict=False)
+        ]
 
     def card(self) -> str:
         """Return the verdict as HTML: solved is seen at a glance, and what is missing is indented.
@@ -84,12 +93,12 @@ class Verdict:
         Its colours are those of the page, so that it fits a dark one, too.
         """
         rows = []
-        for point in self.points:
+        for point, found in zip(self.points, self._found(), strict=True):
             mark, colour = ('✔', GREEN) if point.ok else ('○', AMBER)
             rows.append(
                 f'<div><span style="color:{colour}">{mark}</span> {html.escape(point.what)}</div>'
             )
-            for name, text in (('Found', point.found), ('Hint', point.hint)):
+            for name, text in (('Found', found), ('Hint', point.hint)):
                 if text:
                     rows.append(f'<div style="{INDENTED}"><b>{name}</b> {html.escape(text)}</div>')
         if self.note:

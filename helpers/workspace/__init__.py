@@ -15,6 +15,7 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
     sourcing      what `source install/setup.bash` gives, for a kernel that already runs
 """
 
+from helpers.workspace.build_output import BuildResult, lines_that_matter, without_folders
 from helpers.workspace.processes import Process
 from helpers.workspace.tf2_msgs import provide_tf2_msgs
 from helpers.workspace.wheels import fix_wheels
@@ -23,8 +24,11 @@ from helpers.workspace.workspace import COLLEAGUE, SMALL_RCLCPP, Workspace
 __all__ = [
     'COLLEAGUE',
     'SMALL_RCLCPP',
+    'BuildResult',
     'Process',
     'Workspace',
     'fix_wheels',
+    'lines_that_matter',
     'provide_tf2_msgs',
+    'without_folders',
 ]

@@ -89,6 +89,11 @@ class Process:
             _of_this_cell.add(self)
 
     @property
+    def pid(self) -> int:
+        """The id of the process; what it has started has others."""
+        return self._process.pid
+
+    @property
     def lines(self) -> list[str]:
         """What it has printed so far, stdout and stderr together, one string a line."""
         running, file = self.running, self._output.fileno()

@@ -15,8 +15,6 @@ for condition in ${1:-idle busy twice interrupt kill}; do
     # The shell stays the first process: it waits for those whose parents have ended.
     unshare --mount --pid --fork --kill-child --mount-proc sh -c '
         mount -t tmpfs tmpfs /dev/shm
-        mkdir -p /tmp/ros2_notebooks_0
-        mount -t tmpfs tmpfs /tmp/ros2_notebooks_0
         .venv/bin/python -m pytest tests/soak notebooks --soak "$1" --lesson "$2" -p no:cacheprovider \
             -o faulthandler_timeout=1800
         exit $?

@@ -39,14 +39,6 @@ def student_server(tmp_path_factory) -> Iterator[Server]:
 
 
 @pytest.fixture(scope='session')
-def instructor_server(tmp_path_factory) -> Iterator[Server]:
-    """Yield what `make present LESSON=02 FRESH=no` starts."""
-    folder = tmp_path_factory.mktemp('present')
-    with server(folder, 'present', 'LESSON=02', 'FRESH=no') as running:
-        yield running
-
-
-@pytest.fixture(scope='session')
 def artefacts() -> Path:
     """Return the folder of the screenshots."""
     ARTEFACTS.mkdir(parents=True, exist_ok=True)
@@ -91,11 +83,11 @@ def lab_page(tabs) -> Callable:
     """Return a context manager that opens a tab of a server. No request may leave this machine."""
 
     @contextmanager
-    def opened(running: Server, name: str) -> Iterator[LabPage]:
+    def opened(running: Server, name: str, kind: type = LabPage) -> Iterator[LabPage]:
         tab = tabs.new_page()
         outside = []
         tab.on('request', lambda r: r.url.startswith(LOCAL) or outside.append(r.url))
-        lab = LabPage(tab, running, ARTEFACTS)
+        lab = kind(tab, running, ARTEFACTS)
         try:
             yield lab
         finally:
@@ -112,18 +104,6 @@ def lab(lab_page, student_server, request) -> Iterator[LabPage]:
     """Yield a student's page."""
     with lab_page(student_server, request.node.name) as opened:
         yield opened
-
-
-@pytest.fixture
-def deck(lab_page, instructor_server, request) -> Iterator[LabPage]:
-    """Yield an instructor's page. No change of a copy and no place reaches the next test."""
-    folder = instructor_server.folder / 'presentation'
-    copies = {path: path.read_bytes() for path in folder.glob('*.ipynb')}
-    (instructor_server.folder / 'JUPYTER_CONFIG_DIR' / 'deck.json').unlink(missing_ok=True)
-    with lab_page(instructor_server, request.node.name) as opened:
-        yield opened
-    for path, before in copies.items():
-        path.write_bytes(before)
 
 
 @pytest.fixture

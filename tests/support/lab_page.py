@@ -34,43 +34,10 @@ HAS_FOCUS = f"""() => {{
     const notebook = {PANEL}.content, cell = notebook.activeCell.node;
     return (cell.checkVisibility() ? cell : notebook.node).contains(document.activeElement);
 }}"""
-SLIDE_DRAWN = f"""index => {{
-    const widgets = {PANEL}.content.widgets;
-    const slide = widgets.filter(cell => cell.node.classList.contains('deck-on'));
-    const drawn = cell => cell.model.type === 'code'
-        ? cell.inputHidden || cell.node.querySelectorAll('.cm-line').length
-            >= cell.model.sharedModel.getSource().split('\\n').length
-        : cell.rendered && cell.node.querySelector('.jp-RenderedMarkdown').childElementCount;
-    return slide.includes(widgets[index])
-        && widgets[index].node.contains(document.activeElement)
-        && slide.every(drawn)
-        && slide.every(cell => [...cell.node.querySelectorAll('img')].every(img => img.complete));
-}}"""
-SLIDES_SHOWN = "() => document.querySelector('.jp-Deck .deck-on')?.isConnected"
-# What of a slide is cut off, or needs a scroll bar.
-CUT_OFF = f"""() => {PANEL}.content.widgets.flatMap((cell, index) => {{
-    if (!cell.node.classList.contains('deck-on')) return [];
-    const found = [];
-    const box = cell.node.getBoundingClientRect();
-    if (box.top < 0 || box.bottom > innerHeight || box.left < 0 || box.right > innerWidth)
-        found.push(`cell ${{index}} ends at ${{box.right.toFixed()}}, ${{box.bottom.toFixed()}}`);
-    for (const part of cell.node.querySelectorAll(
-        '.cm-scroller, .jp-RenderedMarkdown, .jp-OutputArea-output, pre, table, img')) {{
-        const inner = part.getBoundingClientRect();
-        if (part.scrollWidth > part.clientWidth + 1 || inner.right > innerWidth
-            || (part.clientHeight && part.scrollHeight > part.clientHeight + 1))
-            found.push(`cell ${{index}}: ${{part.tagName}}.${{part.className}} is cut off`);
-        if (part.tagName === 'IMG' && !part.naturalWidth)
-            found.push(`cell ${{index}}: a picture is missing`);
-        if (part.tagName === 'IMG' && !part.alt)
-            found.push(`cell ${{index}}: a picture has no alternative text`);
-    }}
-    return found;
-}})"""
 
 
 class LabPage:
-    """One tab of the browser, on a server that `make lab` or `make present` started."""
+    """One tab of the browser, on a server that `make lab` started."""
 
     def __init__(self, page: Page, server: Server, artefacts: Path) -> None:
         self.page = page
@@ -85,14 +52,6 @@ class LabPage:
         """Open a notebook, and wait for its kernel."""
         self.goto(f'lab/tree/notebooks/{name}')
         self.wait_for_notebook(f'notebooks/{name}')
-
-    def present(self, name: str) -> None:
-        """Open the copy of a notebook as slides, from the first, and wait for its kernel."""
-        self.goto(f'lab/workspaces/present/tree/presentation/{name}')
-        self.wait_for_notebook(f'presentation/{name}')
-        self.page.wait_for_function(SLIDES_SHOWN)
-        self.page.keyboard.press('Home')
-        self.wait_for_slide(0)
 
     def wait_for_notebook(self, path: str) -> None:
         """Wait until a notebook is open and its kernel idle."""
@@ -177,27 +136,6 @@ class LabPage:
         )
         return self.active()
 
-    # Slides
-
-    def press(self, key: str) -> int:
-        """Press a key that leads to another cell, and return its index once it is shown."""
-        active = self.leave_with(key)
-        self.wait_for_slide(active)
-        return active
-
-    def wait_for_slide(self, index: int) -> None:
-        """Wait until a cell is revealed and has the focus, and all of its slide is drawn."""
-        self.page.wait_for_function(SLIDE_DRAWN, arg=index)
-
-    def walk_to(self, index: int) -> None:
-        """Press Space until a cell is shown, and choose it."""
-        shown = f"index => {PANEL}.content.widgets[index].node.classList.contains('deck-on')"
-        while not self.page.evaluate(shown, index):
-            self.page.keyboard.press('Space')
-        while self.active() < index:
-            self.page.keyboard.press('ArrowDown')
-        self.wait_for_slide(index)
-
     # What a test keeps
 
     def screenshot(self, *path: str) -> None:
@@ -208,10 +146,12 @@ class LabPage:
 
 
 def printed(cell: dict[str, Any]) -> str:
-    """Return what a cell printed."""
-    return ''.join(
-        ''.join(output['text']) for output in cell['outputs'] if output['output_type'] == 'stream'
-    )
+    """Return what a cell printed or showed as text."""
+    texts = [
+        output.get('text') or output.get('data', {}).get('text/plain', '')
+        for output in cell['outputs']
+    ]
+    return ''.join(map(''.join, texts))
 
 
 def complaints(cell: dict[str, Any]) -> list[str]:

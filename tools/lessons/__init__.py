@@ -1,1 +1,1 @@
-"""The tools for the lessons: run and save them, keep their rules, add one, show them as slides."""
+"""The tools for the lessons: run and save them, keep their rules, add one."""

@@ -40,7 +40,9 @@ def template(stem: str = '90_write_a_lesson', part: str = 'nodes') -> NotebookNo
     text = TEMPLATE.read_text(encoding='utf-8').replace('Part: nodes', f'Part: {part}')
     title = f'# {stem[:2]} {stem[3:].replace("_", " ").capitalize()}'
     cells = []
-    for cell in re.split('^%% ', text.replace('# 90 Write a lesson', title), flags=re.M)[1:]:
+    text = text.replace('# 90 Write a lesson', title)
+    text = text.replace('lessons.write_a_lesson import', f'lessons.{stem[3:]} import')
+    for cell in re.split('^%% ', text, flags=re.M)[1:]:
         head, _, source = cell.partition('\n')
         kind, *tags = head.split()
         metadata = {'tags': tags}

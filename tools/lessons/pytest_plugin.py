@@ -36,7 +36,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let kernels talk over socket files.
+    """Keep the sessions of other processes away, and let kernels talk over socket files.
+
+    A terminal, which a lesson or a test opens, looks for sessions in all records of this user.
 
     jupyter_client chooses free TCP ports, closes them, and the kernel opens them again later. When
     several workers start kernels at once, two may choose the same port, and one kernel never
@@ -45,6 +47,9 @@ def pytest_configure(config: pytest.Config) -> None:
     """
     folder = tempfile.TemporaryDirectory(prefix='kernels-')
     config.add_cleanup(folder.cleanup)
+    sessions = tempfile.TemporaryDirectory(prefix='sessions-')
+    config.add_cleanup(sessions.cleanup)
+    os.environ['ROS2_SESSIONS'] = sessions.name
     number = count()
 
     def kernel_manager(**options: object) -> KernelManager:

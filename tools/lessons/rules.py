@@ -12,15 +12,16 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
+from helpers.checks.verdict import KEY
 from tools.lessons.code import guess_of, names_of
 from tools.lessons.comparison import comment_markers, metadata_tags
 from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, called, tags
-from tools.lessons.slides import LARGEST, PICTURE, height
 
-MAX_CODE_LINES = 24  # what a slide has room for
+MAX_CODE_LINES = 24  # what a screen has room for
+PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 MIN_WORDS = 6  # of an alternative text
 TASK = ('exercise', 'check', 'solution')
-FOLDED = {'solution': '%%solution ', 'check': '# ✔ Check of task ', 'harness': '# ', 'notes': NOTE}
+FOLDED = {'solution': '%%solution ', 'harness': '# ', 'notes': NOTE}
 TAGS = {'predict', 'nbval-ignore-output', 'deck-break', *TASK, *FOLDED}
 REASON = '# Not compared: '
 THIS_MACHINE = {str(Path(__file__).resolve().parents[2]), str(Path.home()), sys.prefix} - {'/'}
@@ -30,7 +31,7 @@ PATH = re.compile(
     r'|\b[A-Z]:\\\S+|(?<!\S)(?!python3/)\S*(?:site|dist)-packages\S*|'
     + '|'.join(rf'{re.escape(folder)}\b' for folder in sorted(THIS_MACHINE))
 )
-BEHIND_A_DOOR = re.compile(r'^\s*(?:from|import) (helpers\.(\w+)\.\w+)', re.MULTILINE)
+BEHIND_A_DOOR = re.compile(r'^\s*(?:from|import) (helpers\.(\w+)\.(?!lessons\.)\w+)', re.MULTILINE)
 Rule = Callable[[Lesson], Iterator[str]]
 
 
@@ -58,9 +59,10 @@ def texts(cell: NotebookNode) -> Iterator[str]:
                 yield PICTURE.sub('', str(data))
 
 
-def printed(cells: list[NotebookNode], start: str) -> int:
-    lines = [line for cell in cells for text in texts(cell) for line in text.splitlines()]
-    return sum(line.startswith(start) for line in lines)
+def verdicts(cell: NotebookNode) -> list[dict]:
+    """Return what the checks of a cell found, as data."""
+    data = [output.get('metadata', {}).get(KEY) for output in cell.outputs]
+    return [verdict for verdict in data if verdict]
 
 
 def alternative_texts(cell: NotebookNode) -> Iterator[str]:
@@ -195,7 +197,7 @@ def solutions_import_what_they_use(lesson: Lesson) -> Iterator[str]:
 
 
 def steps_begin_cells(lesson: Lesson) -> Iterator[str]:
-    """The title of a step is the first line of its cell: there its slide begins."""
+    """The title of a step is the first line of its cell: there a slide begins."""
     for cell in lesson.notebook.cells:
         if cell.cell_type == 'markdown' and (title := re.search(r'\n## (.*)', cell.source)):
             yield f'The step "{title[1]}" is inside a cell: let a cell of its own begin with it.'
@@ -221,7 +223,7 @@ def tagged(lesson: Lesson) -> Iterator[str]:
             )
 
 
-def fits_a_slide(lesson: Lesson) -> Iterator[str]:
+def fits_a_screen(lesson: Lesson) -> Iterator[str]:
     for cell in lesson.notebook.cells:
         lines = len(cell.source.splitlines())
         hidden = tags(cell) & FOLDED.keys()
@@ -231,8 +233,6 @@ def fits_a_slide(lesson: Lesson) -> Iterator[str]:
                 'make two cells of it. A file can stand in two: `%%write PATH part 1`, then '
                 '`part 2`.'
             )
-        if (percent := height(cell)) > LARGEST:
-            yield f'The cell {called(cell)} with its outputs takes {percent:.0f} % of the height.'
 
 
 # The lesson
@@ -294,20 +294,19 @@ def tasks_are_checked(lesson: Lesson) -> Iterator[str]:
         own = [cell for cell in cells if tags(cell) & set(TASK)]
         inside += len(own)
         kinds = ''.join(tag[0] for cell in own for tag in TASK if tag in tags(cell))
-        if not re.fullmatch('e+c+s', kinds):
+        if not re.fullmatch('e+cs', kinds):
             yield f'{name!r} needs cells with the tags {", ".join(TASK)}, in this order.'
             continue
         *_, check, solution = own
-        if not re.search(rf'^check\(\s*{count},', check.source, re.MULTILINE):
-            yield f'{name!r}: its check must call `check({count}, ...)`.'
+        if not re.fullmatch(rf'check\({count}(, [^\n]+)?\)', check.source):
+            yield f'{name!r}: its check must be one line, `check({count}, ...)`.'
         if not solution.source.startswith(f'%%solution {count}\n'):
             yield f'{name!r}: its solution must begin with `%%solution {count}`.'
-        missing = printed([check], '[not yet]')
-        points = missing + printed([check], '[ok]')
-        if not missing:
+        starters, solutions = verdicts(check), verdicts(solution)
+        if [verdict['solved'] for verdict in starters] != [False]:
             yield f'{name!r}: its check finds nothing missing in the starter.'
-        if printed([solution], '[ok]') != points or printed([solution], '[not yet]'):
-            yield f'{name!r}: its solution does not pass all {points} points of the check.'
+        if [verdict['solved'] for verdict in solutions] != [True]:
+            yield f'{name!r}: its solution does not pass its check.'
     if sum(bool(tags(cell) & set(TASK)) for cell in lesson.notebook.cells) != inside:
         yield 'A cell has the tag of a task, but is under no "### ✎ Task".'
 
@@ -328,7 +327,7 @@ RULES: list[Rule] = [
     solutions_import_what_they_use,
     steps_begin_cells,
     tagged,
-    fits_a_slide,
+    fits_a_screen,
     named,
     links_lead_somewhere,
     guesses_are_compared,

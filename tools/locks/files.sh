@@ -1,7 +1,7 @@
 # Sourced by tools/set_up.sh and tools/lock.sh: which locks there are, beside tools/locks/requirements.lock,
 # which has what a learner needs. Each belongs to a group of pyproject.toml.
 groups='test browser site hub licences'
-hub_lock=requirements-hub.lock
+hub_lock=classroom/requirements-hub.lock
 
 lock_of() { # GROUP
     case $1 in

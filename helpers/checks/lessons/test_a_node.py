@@ -10,7 +10,8 @@ from lifecycle_msgs.srv import GetState
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from helpers.checks.bench import Bench
-from helpers.checks.planted import run_tests
+from helpers.checks.builds import build
+from helpers.checks.planted import planted, run_tests
 from helpers.checks.tasks import Tasks, once
 
 tasks = Tasks()
@@ -19,16 +20,15 @@ check = tasks.check
 PACKAGE = 'src/brake_pkg'
 
 
-def planted(source, old, new):
-    """Return the source with a bug in it."""
-    assert source.count(old) == 1, old
-    return source.replace(old, new)
+def is_caught(runs, name, right=()):
+    """Return the test of a point: the student's tests must fail for this version.
 
-
-def is_caught(runs, name):
-    """Return the test of a point: the student's tests must fail for this version."""
+    They must pass for the right versions: tests that fail for each version find no bug.
+    """
 
     def test():
+        if not all(runs()[version].passes for version in right):
+            return 'not judged: your tests must first pass for the right ones'
         run = runs()[name]
         return run.fails or f'pytest: {run.says}'
 
@@ -62,6 +62,13 @@ WRONG_SPEEDS = {
     'stops if nothing is in sight': planted(SPEED, 'isnan(distance_m)', 'isfinite(distance_m) - 1'),
     'still moves at 0.5 m': planted(SPEED, 'max(0.0', '(distance_m >= 0.5) * max(0.1'),
 }
+ROWS = {
+    'drives on near a wall': 'A row with a distance below 0.5 m.',
+    'has no slow zone': 'A row with a distance between 0.5 and 1.0 m.',
+    'treats nan as free': 'A row with math.nan.',
+    'stops if nothing is in sight': 'A row with math.inf.',
+    'still moves at 0.5 m': 'A row with 0.5 m.',
+}
 
 
 @tasks.add(1, limit_s=60)
@@ -72,7 +79,7 @@ def test_the_function(workspace, tests):
     return [
         ('it passes for two right functions', all_pass(runs, right), 'Is each row what it says?'),
         *(
-            (f'it fails for one that {name}', is_caught(runs, name), 'A row for this case.')
+            (f'it fails for one that {name}', is_caught(runs, name, right), ROWS[name])
             for name in WRONG_SPEEDS
         ),
     ]
@@ -292,10 +299,7 @@ def without_run(text):
 @tasks.add(6, limit_s=90)
 def run_them(workspace):
     def is_run():
-        workspace.terminal('rm -rf build install')
-        result = workspace.build()
-        if not result.ok:
-            return str(result.errors[-1])
+        build(workspace, 'brake_pkg', anew=True)
         file = f'{PACKAGE}/test/test_planted.py'
         workspace.write(file, 'def test_planted():\n    assert 1 == 2\n')
         summary = workspace.terminal(
@@ -639,16 +643,11 @@ def find_six_bugs(workspace, tests):
 
     right = {'right': 'the right node', 'other': 'another right node'}
 
-    def finds(bug):
-        def test():
-            if not all(runs()[name].passes for name in right):
-                return 'not judged: your tests must first pass for the right nodes'
-            return is_caught(runs, bug)()
-
-        return test
-
     own = 'Use no name of your own node. Hear the 0.0 of deactivate first.'
     return [
         ('they pass for two right nodes', all_pass(runs, right), own),
-        *((f'they fail for one that {bug}', finds(bug), HINTS[bug]) for bug in BUGS),
+        *(
+            (f'they fail for one that {bug}', is_caught(runs, bug, right), HINTS[bug])
+            for bug in BUGS
+        ),
     ]

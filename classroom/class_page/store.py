@@ -1,0 +1,261 @@
+"""What a class was told, kept in SQLite, and what its page says of it.
+
+A seat is a student's computer, known by a random token of which only the hash is kept. An event
+counts once: its id and its seat are its key. Of guesses, the last one of a seat counts, in the
+order in which the events came: no clock of a student's computer is asked.
+"""
+
+import hashlib
+import json
+import secrets
+import sqlite3
+from collections import Counter
+from pathlib import Path
+
+from classroom.class_page import events
+from classroom.class_page.lessons import Guess, Known
+
+WORDS = Path(__file__).with_name('words.txt').read_text().split()
+CODE_WORDS = 3  # of 256: 24 bits
+SEATS = 500
+BARS = 8
+TABLES = """
+PRAGMA journal_mode = WAL;
+CREATE TABLE IF NOT EXISTS class (code TEXT, secret TEXT);
+CREATE TABLE IF NOT EXISTS seats (seat INTEGER PRIMARY KEY, token TEXT UNIQUE, name TEXT);
+CREATE TABLE IF NOT EXISTS events (
+    n INTEGER PRIMARY KEY, seat INTEGER, id TEXT, lesson TEXT, kind TEXT, what TEXT, value TEXT,
+    UNIQUE (seat, id)
+);
+CREATE INDEX IF NOT EXISTS by_kind ON events (kind, lesson, what);
+"""
+INSERT = """
+INSERT OR IGNORE INTO events (seat, id, lesson, kind, what, value)
+VALUES (?, ?, ?, ?, ?, ?)
+"""
+# The last event of a kind of each seat, in their order: of all lessons, or of one question.
+LATEST = """
+SELECT seat, lesson, value, max(n) AS n FROM events
+WHERE kind = ? AND lesson = coalesce(?, lesson) AND what = coalesce(?, what)
+GROUP BY seat ORDER BY n
+"""
+# What is solved stays so, whatever a student tries later: 'false' comes before 'true'.
+SOLVED = """
+SELECT max(value) FROM events WHERE kind = 'task' AND lesson = ? AND what = ? GROUP BY seat
+"""
+
+
+class ClassStore:
+    """The events of one class. If the file has some already, the class goes on."""
+
+    def __init__(self, file: Path, lessons: list[Known]) -> None:
+        self.file = file
+        self.lessons = {known.lesson.name: known for known in lessons}
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self._db = sqlite3.connect(file)
+        self._db.executescript(TABLES)
+        if not self._db.execute('SELECT 1 FROM class').fetchone():
+            code = '-'.join(secrets.choice(WORDS) for _ in range(CODE_WORDS))
+            with self._db:
+                self._db.execute('INSERT INTO class VALUES (?, ?)', (code, secrets.token_hex(8)))
+        self.code, self.secret = self._db.execute('SELECT code, secret FROM class').fetchone()
+        self.went_on = self._db.execute('SELECT 1 FROM events').fetchone() is not None
+        self.shown: set[tuple[str, str]] = set()  # lesson and question
+
+    # Seats
+
+    def join(self, token: str, name: str) -> int:
+        """Return the seat of a token, a new one for a new token. Raises ValueError if full."""
+        if self.seat(token) is None:
+            [[taken]] = self._db.execute('SELECT count(*) FROM seats')
+            if taken >= SEATS:
+                raise ValueError('The class is full.')
+        with self._db:
+            self._db.execute(
+                'INSERT INTO seats (token, name) VALUES (?, ?) '
+                'ON CONFLICT (token) DO UPDATE SET name = excluded.name',
+                (_hash(token), name),
+            )
+        return self.seat(token)
+
+    def seat(self, token: str) -> int | None:
+        """Return the number of the seat with this token."""
+        row = self._db.execute('SELECT seat FROM seats WHERE token = ?', [_hash(token)]).fetchone()
+        return row and row[0]
+
+    def leave(self, seat: int) -> None:
+        """Delete a seat, and what it has told."""
+        with self._db:
+            self._db.execute('DELETE FROM seats WHERE seat = ?', [seat])
+            self._db.execute('DELETE FROM events WHERE seat = ?', [seat])
+
+    # Events
+
+    def take(self, seat: int, messages: list) -> str:
+        """Keep the events of a seat. Return why some were refused, in one sentence, or nothing."""
+        refused = ''
+        rows = []
+        for event in messages:
+            problem = self._problem(event)
+            refused = refused or problem
+            if not problem:
+                rows.append((seat, event['id'], event['lesson'], *_content(event)))
+        with self._db:
+            self._db.executemany(INSERT, rows)
+        return refused
+
+    def lower(self, seat: int) -> None:
+        """Take the hand of a seat down. Raises ValueError if it has raised none."""
+        [lesson] = [lesson for one, lesson, _ in self._latest('hand') if one == seat]
+        hand = {'id': secrets.token_hex(8), 'kind': 'hand', 'lesson': lesson, 'up': False}
+        self.take(seat, [hand])
+
+    def _problem(self, event: object) -> str:
+        if not events.is_event(event):
+            return 'An event has another form.'
+        known = self.lessons.get(event['lesson'])
+        if known is None:
+            return 'There is no such lesson.'
+        has = {'question': known.guesses, 'task': known.tasks, 'cell': known.step_of}
+        for field in has.keys() & event:
+            if event[field] not in has[field]:
+                return f'The lesson has no such {field}.'
+        return ''
+
+    def _latest(
+        self, kind: str, lesson: str | None = None, what: str | None = None
+    ) -> list[tuple[int, str, object]]:
+        """Return seat, lesson and value of the last event of a kind of each seat."""
+        rows = self._db.execute(LATEST, (kind, lesson, what))
+        return [(seat, lesson, json.loads(value)) for seat, lesson, value, _ in rows]
+
+    def _places(self) -> Counter:
+        """Return how many students are at each step: by lesson and step.
+
+        The lessons may have changed since a class was broken off.
+        """
+        steps = {name: known.step_of for name, known in self.lessons.items()}
+        return Counter(
+            (name, steps[name][cell])
+            for _, name, cell in self._latest('cell')
+            if cell in steps.get(name, ())
+        )
+
+    # What the page says
+
+    def view(self, lesson: str, step: int) -> dict:
+        """Return what the page shows of a step of a lesson."""
+        known = self.lessons[lesson]
+        at = self._places()
+        names = dict(self._db.execute('SELECT seat, name FROM seats'))
+        here = Counter(name for name, _ in at.elements())
+        hands = [seat for seat, _, up in self._latest('hand') if up]
+        return {
+            'seats': len(names),
+            'lessons': [
+                {'name': name, 'title': one.title, 'here': here[name], 'now': name == lesson}
+                for name, one in self.lessons.items()
+            ],
+            'steps': [
+                {'title': notes['step'], 'here': at[lesson, number], 'now': number == step}
+                for number, notes in enumerate(known.notes)
+            ],
+            'guesses': [
+                self._guesses(lesson, question, guess)
+                for question, guess in known.guesses.items()
+                if known.step_of[guess.asked] <= step <= known.step_of[guess.compared]
+            ],
+            'tasks': [self._task(lesson, number, len(names)) for number in known.tasks],
+            'hands': [{'seat': seat, 'name': names.get(seat, '')} for seat in hands],
+        }
+
+    def _guesses(self, lesson: str, question: str, guess: Guess) -> dict:
+        answers = [value for *_, value in self._latest('guess', lesson, question)]
+        cells = [guess.asked, guess.compared]
+        found = {'question': question, 'cells': cells, 'answered': len(answers)}
+        if (lesson, question) not in self.shown:  # what is hidden does not leave the server
+            return found | {'shown': False}
+        measured = [value for *_, value in self._latest('outcome', lesson, question)]
+        return found | {
+            'shown': True,
+            'bars': bars(answers),
+            'measured': [label(value) for value, _ in _counted(measured)][:3],
+            'by': len(measured),
+        }
+
+    def _task(self, lesson: str, number: int, seats: int) -> dict:
+        tries = self._db.execute(SOLVED, (lesson, str(number))).fetchall()
+        solved = tries.count(('true',))
+        tried = len(tries) - solved
+        return {'number': number, 'solved': solved, 'tried': tried, 'open': seats - len(tries)}
+
+    def busiest(self) -> tuple[str, int] | None:
+        """Return the lesson and the step at which most students are, None if nobody is."""
+        return next((place for place, _ in self._places().most_common(1)), None)
+
+    # Its end
+
+    def forget(self) -> None:
+        """Delete all events and names. The seats stay, so that nobody must join again."""
+        with self._db:
+            self._db.execute('DELETE FROM events')
+            self._db.execute("UPDATE seats SET name = ''")
+        self._db.execute('VACUUM')  # what is deleted is in no page of the file,
+        self._db.execute('PRAGMA wal_checkpoint(TRUNCATE)')  # nor in its log
+        self.shown.clear()
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._db.close()
+
+    def end(self) -> None:
+        """Delete everything: the class is over."""
+        self.close()
+        for suffix in ('', '-wal', '-shm'):
+            Path(f'{self.file}{suffix}').unlink(missing_ok=True)
+
+
+def bars(answers: list) -> list[dict]:
+    """Return what a picture shows of answers: numbers in order, others by how many gave them."""
+    numbers = [a for a in answers if isinstance(a, int | float) and not isinstance(a, bool)]
+    if answers and len(numbers) == len(answers) and len(set(numbers)) > BARS:
+        low, high = min(numbers), max(numbers)
+        width = (high - low) / BARS
+        counts = Counter(min(int((one - low) / width), BARS - 1) for one in numbers)
+        return [
+            {'label': f'{low + i * width:.4g} to {low + (i + 1) * width:.4g}', 'count': counts[i]}
+            for i in range(BARS)
+        ]
+    counted = _counted(answers)
+    if len(numbers) == len(answers):
+        return [{'label': label(value), 'count': count} for value, count in sorted(counted)]
+    found = [{'label': label(value), 'count': count} for value, count in counted[:BARS]]
+    others = sum(count for _, count in counted[BARS:])
+    return found + ([{'label': 'other', 'count': others}] if others else [])
+
+
+def label(value: object) -> str:
+    """Return a value as a reader writes it."""
+    if isinstance(value, list):
+        return ', '.join(map(label, value)) or 'none'
+    return f'{value:.6g}' if isinstance(value, float) else str(value)
+
+
+def _counted(answers) -> list[tuple]:
+    """Return the different answers and how often each came, the most frequent first."""
+    first: dict[str, object] = {}
+    for answer in answers:
+        first.setdefault(label(answer).strip().casefold(), answer)
+    counts = Counter(label(answer).strip().casefold() for answer in answers)
+    return [(first[text], count) for text, count in counts.most_common()]
+
+
+def _content(event: dict) -> tuple[str, str, str]:
+    """Return kind, what and value, as the table holds them."""
+    fields = events.KINDS[event['kind']].schema['properties']
+    *what, value = [event[field] for field in fields if field not in events.EVENT]
+    return event['kind'], str(what[0]) if what else '', json.dumps(value)
+
+
+def _hash(token: str) -> str:
+    return hashlib.sha256(token.encode()).hexdigest()

@@ -1,0 +1,67 @@
+"""What the server of `make present` does for the deck in the browser.
+
+POST deck/fresh     {"path": "presentation/02_lose_messages.ipynb"}: makes a copy anew
+GET deck/class      the address of the page of the class that is open here, or nothing
+GET deck/look.css   colours and fonts of the lessons
+"""
+
+from pathlib import Path
+
+from jupyter_server.base.handlers import JupyterHandler
+from jupyter_server.serverapp import ServerApp
+from jupyter_server.utils import url_path_join
+from tornado import web
+
+from classroom.class_page import page_file
+from classroom.deck.copies import Copies
+from helpers.notebook import LOOK_CSS
+
+
+class Fresh(JupyterHandler):
+    """Make a copy anew."""
+
+    def initialize(self, copies: Copies) -> None:
+        """Take over the copies."""
+        self.copies = copies
+
+    @web.authenticated
+    def post(self) -> None:
+        """Throw away what was typed and run in a copy."""
+        file = Path(self.get_json_body()['path']).name
+        self.copies.make([self.copies.root / 'notebooks' / file], new=True)
+        self.finish({})
+
+
+class PageOfClass(JupyterHandler):
+    """Give the deck the address of the class page; nothing if no class is open."""
+
+    @web.authenticated
+    def get(self) -> None:
+        """Answer with the address."""
+        self.set_header('Content-Type', 'text/plain')
+        self.set_header('Cache-Control', 'no-store')
+        self.finish(page_file().read_text() if page_file().is_file() else '')
+
+
+class Look(JupyterHandler):
+    """Give the deck and the notes window their colours and fonts."""
+
+    @web.authenticated
+    def get(self) -> None:
+        """Answer with a style sheet."""
+        self.set_header('Content-Type', 'text/css; charset=UTF-8')
+        self.finish(LOOK_CSS)
+
+
+def _load_jupyter_server_extension(server: ServerApp) -> None:
+    """Let the server of `make present` answer the deck."""
+    base = server.web_app.settings['base_url']
+    copies = Copies(Path(server.root_dir), server.config.Deck.get('plan', ''))
+    server.web_app.add_handlers(
+        '.*',
+        [
+            (url_path_join(base, 'deck/fresh'), Fresh, {'copies': copies}),
+            (url_path_join(base, 'deck/class'), PageOfClass),
+            (url_path_join(base, 'deck/look.css'), Look),
+        ],
+    )

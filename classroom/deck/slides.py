@@ -1,0 +1,79 @@
+"""Which cell of a lesson starts a slide: a rule, so that nobody keeps it up by hand.
+
+A title and a step (`#`, `##`) start a slide. A text starts one below it if code follows, and so
+does a task or a question (`### ✎`, `### Question`); a text without code joins what it is about.
+Code joins its text, as long as the slide shows not too much of it. A cell with the tag `deck-break`
+always starts a slide (JupyterLab, Property Inspector). A raw cell is a note for the instructor, and
+left out.
+
+The rule knows no heights: the deck makes a slide that is too full a little smaller, and scrolls it.
+"""
+
+import ast
+import re
+
+from nbformat import NotebookNode
+
+from tools.lessons.lesson import tags
+
+LINES = 18  # of code that is not folded: more of it is on the next slide
+
+
+def slide_types(notebook: NotebookNode) -> list[str]:
+    """Return the slide type of each cell: slide, subslide, skip, or nothing if it goes on."""
+    types, slide = [], []
+    for index, cell in enumerate(notebook.cells):
+        if cell.cell_type == 'raw':
+            types.append('skip')
+            continue
+        kind = ''
+        if not slide or heading(cell, '##? '):
+            kind = 'slide'
+        elif _starts(cell, slide, _code_after(notebook, index)):
+            kind = 'subslide'
+        slide = [cell] if kind else [*slide, cell]
+        types.append(kind)
+    return types
+
+
+def _starts(cell: NotebookNode, slide: list[NotebookNode], code_follows: bool) -> bool:
+    """Return whether a cell starts a slide below the one that holds these cells."""
+    if 'deck-break' in tags(cell):
+        return True
+    if cell.cell_type == 'code':
+        lines = sum(_lines(other) for other in [*slide, cell])
+        return _lines(cell) > 0 and lines > LINES and slide[-1].cell_type == 'code'
+    if heading(cell, '### Question '):
+        return any(other.cell_type == 'code' or heading(other, '### ') for other in slide)
+    has_code = any(other.cell_type == 'code' for other in slide)
+    return has_code and (code_follows or heading(cell, '### '))
+
+
+def _code_after(notebook: NotebookNode, index: int) -> bool:
+    """Return whether the next cell that is shown after the one with an index is code."""
+    later = (cell for cell in notebook.cells[index + 1 :] if cell.cell_type != 'raw')
+    return next((cell.cell_type == 'code' for cell in later), False)
+
+
+def _lines(cell: NotebookNode) -> int:
+    """Return how many lines of code of a cell a slide shows."""
+    is_shown = cell.cell_type == 'code' and not folded(cell)
+    return len(cell.source.splitlines()) if is_shown else 0
+
+
+def heading(cell: NotebookNode, form: str) -> bool:
+    """Return whether a cell of text begins with a heading of this form, a regular expression."""
+    return cell.cell_type == 'markdown' and bool(re.match(form, cell.source))
+
+
+def folded(cell: NotebookNode) -> bool:
+    """Return whether a slide shows of a cell only the first line and the outputs."""
+    if cell.cell_type != 'code':
+        return False
+    if cell.metadata.get('jupyter', {}).get('source_hidden'):
+        return True
+    try:
+        statements = ast.parse(cell.source).body
+    except SyntaxError:  # a magic command
+        return False
+    return bool(statements) and all(isinstance(s, ast.Import | ast.ImportFrom) for s in statements)

@@ -1,0 +1,84 @@
+"""A class on one machine: a real JupyterHub, and students who run lessons at the same time.
+
+Everything goes through the hub, as in a browser.
+"""
+
+import asyncio
+import os
+import socket
+import tempfile
+from pathlib import Path
+
+from support.processes import segments
+from support.waits import wait_for
+
+from classroom.tests.support.hubs import (
+    END_S,
+    LESSONS,
+    START_S,
+    STUDENTS,
+    Hub,
+    listen,
+    log_in,
+    needs_hub,
+    run_lessons,
+    talk,
+)
+
+pytestmark = needs_hub
+# The accounts are folders, and all run as the user of this test.
+CONFIG = """
+c.JupyterHub.spawner_class = 'simple'
+c.SimpleLocalProcessSpawner.home_dir_template = str(folder / 'home' / '{username}')
+c.Spawner.args.append('--allow-root')
+c.Spawner.environment['TMPDIR'] = str(folder)
+"""
+DOMAIN = 'import helpers.ros.domain; print(helpers.ros.domain.reserve_domain_id())'
+
+
+async def teach(hub: Hub) -> None:
+    students = await log_in(hub)
+    guesses = await run_lessons(students)
+
+    # All are in the class at once. Only administrators see it.
+    assert hub.guesses() == guesses
+    for token in (students[0].token, 'no token'):
+        for path in ('', 'live', 'class.js'):
+            answer = await hub.answer(f'/services/class/{path}', token)
+            assert answer.code in (302, 403), path
+
+    # Nobody hears anybody else, not even a second kernel of the same student.
+    others = ((s, path) for s in students for path in LESSONS if path.name not in s.kernels)
+    await asyncio.gather(*(student.open(path) for student, path in others))
+    kernels = {
+        f'{student.name}_{name[:2]}': kernel
+        for student in students
+        for name, kernel in student.kernels.items()
+    }
+    assert len(kernels) == 2 * len(STUDENTS)
+    domains = [int(await kernel.text(DOMAIN)) for kernel in kernels.values()]
+    assert len(set(domains)) == len(kernels)
+    await talk(kernels)
+    used = set().union(*(segments(one.pid) for one in hub.processes()))
+    assert used, 'no kernel used shared memory: this would not notice what is left'
+    await listen(kernels)
+
+    # Nothing is left.
+    await asyncio.gather(*(student.log_out() for student in students))
+    await asyncio.to_thread(wait_for, hub.processes, lambda left: not left, END_S)
+    assert [path for path in used if os.path.exists(path)] == []
+
+
+def test_a_class_of_twelve():
+    # A short name: the path of a socket file is limited to 107 bytes.
+    short = tempfile.TemporaryDirectory(prefix='hub-', dir='/tmp', ignore_cleanup_errors=True)
+    with short as folder, Hub(Path(folder), CONFIG) as hub:
+        asyncio.run(teach(hub))
+
+
+def test_a_port_in_use(tmp_path):
+    with socket.create_server(('127.0.0.1', 0)) as taken:
+        hub = Hub(tmp_path, CONFIG, port=taken.getsockname()[1])
+        assert hub.process.wait(START_S) == 1
+    *_, said = hub.log.read_text().splitlines()
+    assert f'The port of {hub.url} cannot be used (Address already in use' in said

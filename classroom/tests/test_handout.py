@@ -1,0 +1,116 @@
+"""`make handout`: what students get, and what they get with it for a room without a network."""
+
+import re
+import shutil
+import tarfile
+
+import nbformat
+import pytest
+from nbformat.v4 import new_code_cell, new_notebook, new_raw_cell
+from support.checkouts import git
+
+from classroom import handout, update
+from tools.lessons.lesson import ROOT
+
+FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb'}
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """Return a clone with a lesson, and with files that no student needs."""
+    root = tmp_path / 'check out'
+    (root / 'notebooks').mkdir(parents=True)
+    cells = [
+        new_code_cell('start = 1', id='start', metadata={'tags': ['exercise']}),
+        new_raw_cell('For the instructor', id='note', metadata={'tags': ['notes']}),
+        new_code_cell('solved = 2', id='solution', metadata={'tags': ['solution']}),
+    ]
+    nbformat.write(new_notebook(cells=cells), root / 'notebooks/01_publish.ipynb')
+    for name in ('README.md', 'Makefile', 'tests/test_a.py', 'classroom/hub/set_up.sh'):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(name)
+    git(root, 'init')
+    git(root, 'add', '.')
+    git(root, 'commit', '-m', 'all')
+    (root / 'my draft').write_text('not in git')
+    return root
+
+
+def unpack(root, folder, *options):
+    assert handout.main(['--root', str(root), *options]) == 0
+    with tarfile.open(root / 'handout/ros2_notebooks.tar.gz') as archive:
+        archive.extractall(folder)
+    return folder / 'ros2_notebooks'
+
+
+def cells_of(course):
+    return [c.source for c in nbformat.read(course / 'notebooks/01_publish.ipynb', 4).cells]
+
+
+def test_a_handout_has_no_notes(checkout, tmp_path, capsys):
+    course = unpack(checkout, tmp_path / 'home')
+    printed = capsys.readouterr().out
+    assert re.search(r'ros2_notebooks\.tar\.gz: 0\.0 MB, no packages\.', printed)
+    files = {str(p.relative_to(course)) for p in course.rglob('*') if p.is_file()}
+    assert files == FILES | {f'{update.BASE}/{name}' for name in FILES}
+    assert cells_of(course) == ['start = 1', 'solved = 2']
+
+
+def test_its_readme_links_to_what_it_has():
+    readme = handout.for_students((ROOT / 'README.md').read_text(encoding='utf-8'))
+    links = re.findall(r'\]\((?!https?:)([^)#]+)', readme)
+    assert 'notebooks/00_start_here.ipynb' in links
+    assert not [link for link in links if link.startswith(handout.LEFT_OUT)]
+    assert not {*links} - {*git(ROOT, 'ls-files').splitlines()}
+    assert 'make test' not in readme
+
+
+def test_what_is_not_committed_is_named_and_left_out(checkout, tmp_path, capsys):
+    (checkout / 'Makefile').write_text('half done')
+    course = unpack(checkout, tmp_path / 'home')
+    assert (course / 'Makefile').read_text() == 'Makefile'
+    said = capsys.readouterr().out
+    assert re.search(r'^Not committed, so not in it: Makefile, .*my draft', said, re.M)
+
+
+def test_solutions_may_come_later(checkout, tmp_path):
+    course = unpack(checkout, tmp_path / 'home', '--no-solutions')
+    assert cells_of(course) == ['start = 1']
+    lesson = course / 'notebooks/01_publish.ipynb'
+    lesson.write_text(lesson.read_text().replace('start = 1', 'start = 99'))
+    unpack(checkout, tmp_path / 'later')
+    archive = checkout / 'handout/ros2_notebooks.tar.gz'
+    assert update.main([str(archive), '--to', str(course)]) == 0
+    assert cells_of(course) == ['start = 99', 'solved = 2']
+
+
+def test_packages_are_those_of_the_wanted_pythons(tmp_path):
+    head, *blocks = re.split(r'\n(?=[a-z])', (ROOT / 'tools/locks/requirements.lock').read_text())
+    names = ('cycler', 'markupsafe', 'empy')
+    # One that only some Pythons need, by their last number, too: 3.11.2 of Debian 12 is one.
+    some = [block for block in blocks if "python_full_version < '3.11.5'" in block.splitlines()[0]]
+    chosen = [block for block in blocks if block.startswith(names)] + some
+    lock = tmp_path / 'requirements.lock'
+    lock.write_text('\n'.join([head, *chosen]))
+    shutil.copy(ROOT / 'tools/locks/requirements-uv.lock', tmp_path)
+    handout.download(lock, tmp_path / 'wheels', ('3.11', '3.12'))
+    found = sorted(path.name for path in (tmp_path / 'wheels').iterdir())
+    assert [sum('cp311-' in n for n in found), sum('cp312-' in n for n in found)] == [1, 1]
+    assert sum(name.startswith('cycler') for name in found) == 1
+    assert sum(name.startswith('empy') for name in found) == 1
+    assert (tmp_path / 'wheels/pythons').read_text() == '3.12 3.11'  # newest first
+    assert len(found) == len(chosen) + 3  # one for each Python, uv, and the list
+
+
+def test_bad_input_gives_one_sentence(checkout, tmp_path, capsys):
+    assert handout.main(['--root', str(tmp_path)]) == 1
+    assert 'clone' in capsys.readouterr().err
+    locks = checkout / 'tools/locks'
+    locks.mkdir(parents=True, exist_ok=True)
+    (locks / 'requirements.lock').write_text('# Every wheel exists for Python 3.12 3.11\na==1\n')
+    (locks / 'requirements-uv.lock').write_text('\nuv==1\n')
+    git(checkout, 'add', '.')
+    git(checkout, 'commit', '-m', 'locks')
+    assert handout.main(['--root', str(checkout), '--wheels', '3.9']) == 1
+    assert capsys.readouterr().err.count('\n') == 1
+    assert not (checkout / 'handout').exists()

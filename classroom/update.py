@@ -1,0 +1,332 @@
+"""Bring newer lessons in, and keep what a student has written, cell by cell.
+
+    python -m classroom.update                     from where this checkout was cloned
+    python -m classroom.update new.tar.gz          from a newer archive of `make handout`
+    python -m classroom.update FOLDER --to MINE    from a folder, as on a JupyterHub
+
+Three versions are compared: what was handed out, what the student has made of it, what is newer.
+JupyterLab keeps the id of a cell, and so do the lessons: a cell is found again by its id, and a
+lesson by its name without its number. A cell, or another file, that only one side has changed is
+taken from that side. Where both have changed it, both are there.
+
+In version 0.2 the code of a check stood in the lesson, in folded cells, and `helpers` had other
+rooms. A cell of that version that a student has changed may no longer run: it is kept as text. In a
+folder of version 0.2 `make update` runs the program of version 0.2, which leaves such a cell as
+code: the next `make update` makes it text.
+
+Why no kept tool: of 200 histories drawn as in classroom/tests/test_update.py, nbdime 4.0.4 left
+conflict markers inside cells in 39 (strategy inline), or lost words in 5 (union). nbgitpuller keeps
+one side of a conflict only (`git merge -Xours`), and needs git.
+"""
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import zlib
+from pathlib import Path, PurePosixPath
+from uuid import uuid4
+
+import nbformat
+from nbformat import NotebookNode
+from nbformat.v4 import new_markdown_cell, new_notebook
+
+from helpers.notebook import MARK
+
+ROOT = Path(__file__).resolve().parents[1]
+BASE = '.handed_out'  # beside the lessons: what was handed out
+APART = (BASE, '.git', 'wheels')
+LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # wherever they are
+# What nbformat and this program raise for a file that is no notebook, or has no ids.
+UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, nbformat.ValidationError)
+YOURS = '*Your version of the cell above, from before the update:*'
+NO_LONGER_RUNS = 'Your version, from before the update. It no longer runs: copy what you need.'
+# What was in version 0.2 only: the first line of each check, and the imports of each lesson.
+CHECK_OF_0_2 = '✔ Check of task'
+IMPORT_OF_0_2 = re.compile(r'^from helpers\.(classroom|session) import ', re.MULTILINE)
+
+
+def merge(base: NotebookNode, mine: NotebookNode, newer: NotebookNode) -> NotebookNode:
+    """Return the newer notebook with what was written in `mine` since `base`.
+
+    The order is that of the newer one. A cell that was added in `mine` follows the one that it
+    followed there. Outputs are those of `mine` if the source of a cell is the same. Once a student
+    has saved the lesson, none are those of the repository.
+    """
+    old = {cell.id: cell.source for cell in base.cells}
+    present = {cell.id for cell in mine.cells}
+    merged = nbformat.from_dict(newer)
+    if MARK not in mine.metadata:
+        _remove_outputs(merged)
+    merged.cells = [c for c in merged.cells if c.id in present or old.get(c.id) != c.source]
+    at = 0  # where a cell goes that only `mine` has
+    for cell in mine.cells:
+        theirs = next((one for one in merged.cells if one.id == cell.id), None)
+        if theirs:
+            here = merged.cells.index(theirs)
+            at = here + 1
+            if cell.source == theirs.source:
+                merged.cells[here] = _changed(cell, metadata=theirs.metadata)
+            elif theirs.source == old.get(cell.id):
+                merged.cells[here] = cell
+            elif cell.source != old.get(cell.id):
+                yours = _changed(cell, id=uuid4().hex[:8])
+                merged.cells[at:at] = [new_markdown_cell(YOURS), yours]
+                at += 2
+        elif cell.source != old.get(cell.id):
+            merged.cells.insert(at, cell)
+            at += 1
+    return merged
+
+
+def _remove_outputs(notebook: NotebookNode) -> None:
+    notebook.metadata.pop(MARK, None)
+    for cell in notebook.cells:
+        if cell.cell_type == 'code':
+            cell.outputs, cell.execution_count = [], None
+
+
+def _changed(cell: NotebookNode, **changes: object) -> NotebookNode:
+    return nbformat.from_dict({**cell, **changes})
+
+
+def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
+    """Change the files of `mine` as `newer` wants it; return a sentence for each one set aside.
+
+    A file that only `mine` has stays. One that is no longer there in `newer` goes, if it was not
+    changed.
+    """
+    said = []
+    for file in files_of(newer):
+        target, own, old = mine / file, _found(mine / file), _found(base / file)
+        data, was, now = (newer / file).read_bytes(), _bytes(old), _bytes(own)
+        if data == was and own == target:
+            continue
+        if now not in (None, was, data):
+            try:
+                data = _merged(old, own, newer / file)
+            except ValueError:
+                aside = own.with_name(f'{own.name}.yours')
+                if aside.exists():  # what an earlier update has set aside stays
+                    aside = own.with_name(f'{own.name}.{uuid4().hex[:8]}.yours')
+                own.rename(aside)
+                said.append(f'Both have changed {file}: yours is now {aside.name}.')
+        _write(target, data, (newer / file).stat().st_mode)
+        if own not in (target, None):
+            own.unlink(missing_ok=True)
+    for file in files_of(base):
+        if not (newer / file).exists() and _bytes(mine / file) == _bytes(base / file):
+            (mine / file).unlink(missing_ok=True)
+    return said
+
+
+def keep_old_cells_as_text(mine: Path, newer: Path) -> list[str]:
+    """Turn cells of version 0.2 that no longer run into text; return a sentence for each lesson."""
+    said = []
+    for file in files_of(newer):
+        if file.suffix != '.ipynb' or _bytes(mine / file) in (None, _bytes(newer / file)):
+            continue
+        try:
+            own, lesson = (nbformat.read(folder / file, as_version=4) for folder in (mine, newer))
+            old = ids_of_0_2(own, lesson)
+        except UNREADABLE:
+            continue
+        if old:
+            _make_text(own, old)
+            data = (nbformat.writes(own) + '\n').encode()
+            _write(mine / file, data, (mine / file).stat().st_mode)
+            said.append(f'{file}: cells of yours that no longer run, now kept as text: {len(old)}.')
+    return said
+
+
+def ids_of_0_2(mine: NotebookNode, newer: NotebookNode) -> set[str]:
+    """Return the ids of cells of version 0.2 that a student has changed and that no longer run.
+
+    What supports a check (the tag `harness`) would even take the place of a function of the same
+    name that the lesson imports now.
+    """
+    ids, sources = ({cell[key] for cell in newer.cells} for key in ('id', 'source'))
+    found, above = set(), ''
+    for cell in mine.cells:
+        tags = cell.metadata.get('tags', [])
+        is_old = (
+            'harness' in tags
+            or ('check' in tags and CHECK_OF_0_2 in cell.source)
+            or (above == YOURS and IMPORT_OF_0_2.search(cell.source))
+        )
+        is_known = cell.id in ids or cell.source in sources
+        if cell.cell_type == 'code' and is_old and not is_known:
+            found.add(cell.id)
+        above = cell.source
+    return found
+
+
+def _make_text(notebook: NotebookNode, ids: set[str]) -> None:
+    """Turn cells of code into text that unfolds."""
+    cells = []
+    for cell in notebook.cells:
+        if cell.id in ids:
+            if cells and cells[-1].source == YOURS:
+                cells.pop()
+            longest = max(map(len, re.findall('`+', cell.source)), default=0)
+            fence = '`' * max(3, longest + 1)
+            code = f'{fence}python\n{cell.source}\n{fence}'
+            summary = f'<summary><em>{NO_LONGER_RUNS}</em></summary>'
+            cell = new_markdown_cell(f'<details>{summary}\n\n{code}\n\n</details>')
+        cells.append(cell)
+    notebook.cells = cells
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Return the paths of the files of a course, relative to its folder."""
+    files = (
+        path.relative_to(folder)
+        for path in folder.rglob('*')
+        if path.is_file() and os.access(path, os.R_OK)  # a teacher's own file is no lesson
+    )
+    return sorted(p for p in files if p.parts[0] not in APART and not LEFT_OUT & {*p.parts})
+
+
+def _found(path: Path) -> Path:
+    """Return the path itself, or that of the lesson of the same name with another number."""
+    if path.is_file() or not re.match(r'\d\d_.*\.ipynb', path.name):
+        return path
+    return next(iter(sorted(path.parent.glob(f'[0-9][0-9]{path.name[2:]}'))), path)
+
+
+def _bytes(path: Path) -> bytes | None:
+    return path.read_bytes() if path.is_file() else None
+
+
+def _merged(base: Path, mine: Path, newer: Path) -> bytes:
+    """Return the text of a merged notebook. Raises ValueError for what is none, or has no ids."""
+    if newer.suffix != '.ipynb':
+        raise ValueError
+    try:
+        old = nbformat.read(base, as_version=4) if base.is_file() else new_notebook()
+        notebooks = (nbformat.read(path, as_version=4) for path in (mine, newer))
+        return (nbformat.writes(merge(old, *notebooks)) + '\n').encode()
+    except UNREADABLE as problem:
+        raise ValueError from problem
+
+
+def _write(path: Path, data: bytes, mode: int) -> None:
+    """Write a file at once: after an interruption there is the old one or the new one."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    new = path.with_name(f'{path.name}.new')
+    new.write_bytes(data)
+    new.chmod(mode)
+    new.replace(path)
+
+
+def update_from_folder(newer: Path, mine: Path) -> list[str]:
+    """Merge a folder into `mine`, and keep it there as what was handed out last.
+
+    After an interruption the next update goes on: to merge once more changes nothing.
+    """
+    said = merge_folders(mine / BASE, mine, newer)
+    said += keep_old_cells_as_text(mine, newer)
+    merge_folders(mine / BASE, mine / BASE, newer)
+    return said
+
+
+def update_from_archive(archive: Path, mine: Path) -> list[str]:
+    """Merge an archive of `make handout` into `mine`. Raises ValueError with one sentence."""
+    with tempfile.TemporaryDirectory(dir=mine) as folder:
+        try:
+            _unpack(archive, Path(folder))
+        except (tarfile.TarError, OSError, EOFError, zlib.error):
+            raise ValueError(f'{archive} cannot be read as an archive: get it again.') from None
+        newer = next((path.parent for path in Path(folder).glob(f'*/{BASE}')), None)
+        if newer is None:
+            raise ValueError(f'{archive} is no archive of `make handout`.')
+        lock = _bytes(mine / 'tools/locks/requirements.lock')
+        said = update_from_folder(newer, mine)
+        brought = (newer / 'wheels').is_dir()
+        if brought or _bytes(mine / 'tools/locks/requirements.lock') != lock:
+            shutil.rmtree(mine / 'wheels', ignore_errors=True)  # they are those of the old lock
+        if brought:
+            (newer / 'wheels').rename(mine / 'wheels')
+    return said
+
+
+def _unpack(archive: Path, folder: Path) -> None:
+    """Unpack files and folders of an archive that may come from anywhere, and nothing else.
+
+    Raises ValueError for a file that would be written elsewhere.
+    """
+    with tarfile.open(archive) as files:
+        members = [member for member in files if member.isfile() or member.isdir()]
+        for member in members:
+            path = PurePosixPath(member.name)
+            if path.is_absolute() or '..' in path.parts:
+                raise ValueError(f'{archive} is no archive of `make handout`: {path} is in it.')
+        # Python 3.11.2 of Debian 12 knows no filter.
+        filters = {'filter': 'data'} if hasattr(tarfile, 'data_filter') else {}
+        files.extractall(folder, members, **filters)
+
+
+def update_from_git(mine: Path) -> list[str]:
+    """Merge what the branch follows into a clone. Raises ValueError with one sentence."""
+    if not (mine / '.git').exists():
+        raise ValueError('Name the newer archive: make update FROM=/path/to/ros2_notebooks.tar.gz')
+    _git(mine, 'There is no network, or no place to fetch from', 'fetch')
+    _git(
+        mine,
+        'This branch has commits of its own, which only you can merge: use git',
+        *('merge-base', '--is-ancestor', 'HEAD', '@{upstream}'),
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        base, newer = (
+            committed(mine, name, Path(folder, name[-4:])) for name in ('HEAD', '@{upstream}')
+        )
+        said = merge_folders(base, mine, newer)
+        said += keep_old_cells_as_text(mine, newer)
+    _git(mine, 'The lessons are new, but git could not note it', 'reset', '@{upstream}')
+    return said
+
+
+def _git(folder: Path, trouble: str, *command: str) -> None:
+    done = subprocess.run(['git', *command], cwd=folder, capture_output=True, text=True)
+    if done.returncode:
+        raise ValueError(' '.join(f'{trouble}. {done.stderr}'.split()))
+
+
+def committed(folder: Path, name: str, output: Path) -> Path:
+    """Write the files of a commit into a folder, and return it."""
+    output.mkdir()
+    archive = output.with_suffix('.tar')
+    _git(folder, f'{name} cannot be read', 'archive', f'--output={archive}', name)
+    subprocess.run(['tar', '--extract', '--file', archive, '--directory', output], check=True)
+    return output
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the tool; return its exit status."""
+    parser = argparse.ArgumentParser(description='Bring newer lessons in, keep what was written.')
+    parser.add_argument('source', nargs='?', type=Path, help='a newer archive, or a folder')
+    parser.add_argument('--to', type=Path, default=ROOT, help='the folder to update')
+    options = parser.parse_args(arguments)
+    source, mine = options.source, options.to
+    try:
+        if source is None:
+            said = update_from_git(mine)
+        elif source.is_dir():
+            said = update_from_folder(source, mine)
+        elif source.is_file():
+            said = update_from_archive(source.resolve(), mine)
+        else:
+            raise ValueError(f'There is no file {source}.')
+    except (ValueError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    print(*said, 'The lessons are up to date. What you have written is where it was.', sep='\n')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

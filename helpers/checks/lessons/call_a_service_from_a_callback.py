@@ -1,0 +1,403 @@
+"""What the tasks of the lesson "Call a service from a callback" are judged by, and its runs."""
+
+import threading
+import time
+import traceback
+from contextlib import suppress
+from types import SimpleNamespace
+
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Empty, Int32
+from std_srvs.srv import Trigger
+
+from helpers.checks.bench import Bench
+from helpers.checks.errors import Failed
+from helpers.checks.tasks import Tasks, once
+from helpers.notebook import frames
+from helpers.recording import CallbackRecording
+from helpers.replay import replay_calls
+from helpers.ros import ros_session
+
+tasks = Tasks()
+check = tasks.check
+
+
+@tasks.add(1, limit_s=15)
+def ask_from_a_cell(ask):
+    def asks(sees):
+        with Bench() as bench:
+            camera = Camera(sees)
+            asking_node = bench.spin(Node('asking_node'), camera)
+            response = ask(asking_node)
+        if camera.looks != 1:
+            return f'the camera was asked {camera.looks} times'
+        if not isinstance(response, Trigger.Response):
+            return f'ask returns {response!r}, which is no response'
+        found = response.message
+        return found == sees or f'ask returns {found!r}, and the camera says {sees!r}'
+
+    hint = 'Three lines: create the client, wait for the service, return what call returns.'
+    return [
+        ('a camera that sees a wall', lambda: asks('a wall'), hint),
+        ('a camera that sees dust', lambda: asks('only dust'), hint),
+    ]
+
+
+@tasks.add(2)
+def ask_from_a_terminal(camera):
+    hint = '!ros2 service call /look, and after it what ros2 service type /look prints.'
+    was_asked = camera.looks == 1 or f'the camera was asked {camera.looks} times'
+    return [('the camera was asked once, from a terminal', lambda: was_asked, hint)]
+
+
+@tasks.add(3)
+def stop_for_a_wall(Brake):
+    def is_called(sees, distance, right, takes_s=0.1):
+        """Let the callback run in a thread that nobody needs, whatever its groups are."""
+        with Bench() as bench:
+            stops = bench.hear('stop', Empty)
+            brake, camera, other = Brake(), Camera(sees, takes_s), SingleThreadedExecutor()
+            bench.spin(brake, camera)
+            bench.spin(Node('other'), executor=other)
+            if not bench.wait(brake.client.service_is_ready):
+                raise Failed(f'self.client asks for {brake.client.srv_name}, which nobody serves')
+            called = other.create_task(brake.scan_callback, scan(distance))
+            if not bench.wait(called.done, takes_s + 5):
+                raise Failed(f'scan_callback does not end. {bench.line_of_callback()}')
+            looks = camera.looks  # a callback that does not wait has none yet
+            bench.quiet()
+        found = f'at {distance} m it asked and waited {looks} times, and stopped {len(stops)} times'
+        return (len(stops), looks) == right or found
+
+    def has_its_groups():
+        with ros_session():
+            scan_group, client_group = two_groups()
+            brake = Brake(scan_group, client_group)
+            if brake.subscription.topic_name != '/scan':
+                return f'self.subscription is to {brake.subscription.topic_name}'
+            if brake.subscription.callback_group is not scan_group:
+                return 'self.subscription is not in scan_group'
+            return brake.client.callback_group is client_group or (
+                'self.client is not in client_group'
+            )
+
+    call = 'response = self.client.call(Trigger.Request()), then response.success.'
+    groups = 'callback_group=scan_group, callback_group=client_group'
+    return [
+        ('a wall at 0.5 m: it asks and stops', lambda: is_called('a wall', 0.5, (1, 1)), call),
+        ('dust at 0.9 m: it asks and does not stop', lambda: is_called('dust', 0.9, (0, 1)), call),
+        (
+            'nothing near: it does not ask',
+            lambda: is_called('a wall', 2.0, (0, 0)),
+            'Compare with LIMIT_M.',
+        ),
+        (
+            'a late answer: it waits',
+            lambda: is_called('a wall', 0.5, (1, 1), takes_s=1.5),
+            'No timeout_sec.',
+        ),
+        ('the groups', has_its_groups, groups),
+    ]
+
+
+@tasks.add(4)
+def free_thread_and_group(make_brake, make_executor):
+    def stops_twice():
+        """Show two scans: the second answer comes, too, if nothing is held for ever."""
+        with Bench() as bench:
+            stops = bench.hear('stop', Empty)
+            bench.spin(make_brake(), Camera(), executor=made(make_executor))
+            for _ in range(2):
+                bench.say('scan', scan(0.5))
+            if len(stops) != 2:
+                waits = bench.line_of_callback()
+                raise Failed(f'of two scans of a wall, {len(stops)} stopped it. {waits}'.strip())
+        return True
+
+    free = 'Which thread takes the answer, and in which group is the client? Neither may be held.'
+    return [
+        ('a wall: it stops', lambda: stops_for(make_brake, make_executor, 'a wall', 0.5), free),
+        ('dust: it does not', lambda: stops_for(make_brake, make_executor, 'dust', 0.5), free),
+        ('two scans, two stops', stops_twice, free),
+    ]
+
+
+@tasks.add(5)
+def await_the_answer(AwaitBrake):
+    awaits = 'response = await self.client.call_async(Trigger.Request())'
+    groups = 'The group of the callback is held while it awaits. So the client needs another one.'
+    return with_one_thread(AwaitBrake, groups, awaits, awaits, awaits)
+
+
+@tasks.add(6)
+def be_told(DoneBrake):
+    def in_one_group():
+        group = MutuallyExclusiveCallbackGroup()
+        return DoneBrake(group, group)
+
+    later = 'call_async(Trigger.Request()) returns a future: give it a method of yours, without ().'
+    near = 'if scan.ranges[90] < LIMIT_M:'
+    return with_one_thread(in_one_group, later, 'future.result().success', near, later)
+
+
+def with_one_thread(make_brake, *hints):
+    def stops(sees, distance):
+        return stops_for(make_brake, SingleThreadedExecutor, sees, distance)
+
+    def thread_stays_free():
+        """Look at the thread while the camera, which has another executor, keeps its answer."""
+        gate = threading.Event()
+        with Bench() as bench:
+            brake, camera, executor = make_brake(), Camera(gate=gate), SingleThreadedExecutor()
+            bench.spin(brake, executor=executor)
+            bench.spin(camera)
+            try:
+                bench.publisher('scan', LaserScan).publish(scan(0.5))
+                bench.wait(lambda: camera.asked)
+                free = bench.quiet(executor=executor)
+                waits = bench.line_of_callback()
+            finally:
+                gate.set()
+            if not free:
+                raise Failed(f'while it waits, it holds the thread. {waits}'.strip())
+        return camera.asked == 1 or f'of a near wall, the camera was asked {camera.asked} times'
+
+    return [
+        ('a wall: it stops', lambda: stops('a wall', 0.5), hints[0]),
+        ('dust: it does not', lambda: stops('dust', 0.5), hints[1]),
+        ('nothing near: it does not', lambda: stops('a wall', 2.0), hints[2]),
+        ('the thread is free while it waits', thread_stays_free, hints[3]),
+    ]
+
+
+@tasks.add(7)
+def the_rule(rule, stops):
+    def explains(threads):
+        measured = min(threads, 2)  # a third thread frees nothing that a second one does not
+        cases = [(groups, style) for number, groups, style in stops if number == measured]
+        for groups, style in cases:
+            if bool(rule(threads, groups, style)) != stops[measured, groups, style]:
+                case = (threads, groups, style)
+                return f'of {len(cases)} combinations your rule is wrong about {case}'
+        return True
+
+    holds = (
+        'call holds a thread and the group of the scans. What do await and a done callback hold?'
+    )
+    return [
+        ('one thread', lambda: explains(1), holds),
+        ('two threads', lambda: explains(2), holds),
+        ('three threads', lambda: explains(3), 'A rule, not a table: what do more threads change?'),
+    ]
+
+
+@tasks.add(8)
+def if_you_do_not_know_stop(SafeBrake):
+    def make_brake():
+        return SafeBrake(*two_groups())
+
+    def stops_without_an_answer(camera_is_there):
+        gate = threading.Event()
+        with Bench() as bench:
+            stops = bench.hear('stop', Empty)
+            bench.spin(make_brake(), threads=2)
+            if camera_is_there:
+                bench.spin(Camera(gate=gate))
+            try:
+                bench.publisher('scan', LaserScan).publish(scan(0.5))
+                stopped = bench.wait(lambda: stops)
+                waits = bench.line_of_callback()
+            finally:
+                gate.set()
+            if not stopped:
+                why = 'the camera never answers' if camera_is_there else 'there is no camera'
+                raise Failed(f'{why}, and it does not stop within 2 s. {waits}'.strip())
+        return True
+
+    def stops(sees, distance):
+        return stops_for(make_brake, two_threads, sees, distance)
+
+    none = 'response is None if no answer came: test it before response.success.'
+    late = 'Does each call have timeout_sec=0.5? A server that is there may still be silent.'
+    return [
+        ('no camera: it stops', lambda: stops_without_an_answer(False), none),
+        ('a camera that never answers: it stops', lambda: stops_without_an_answer(True), late),
+        ('a wall: it stops', lambda: stops('a wall', 0.5), none),
+        ('dust: it does not', lambda: stops('dust', 0.5), none),
+        ('nothing near: it does not', lambda: stops('a wall', 2.0), none),
+    ]
+
+
+@tasks.add(9)
+def three_callbacks_four_threads(Explorer):
+    @once
+    def during_scan_0():
+        """Return the number of timers, and the callbacks that begin while scan 0 is drawn."""
+        gate, calls = threading.Event(), []
+
+        class Watched(Explorer):
+            def scan_callback(self, message):
+                calls.append(f'scan {message.data}')
+                gate.wait(timeout=20)
+
+            def motor_callback(self):
+                calls.append('motor')
+
+            def save_callback(self, request, response):
+                calls.append('save')
+                return response
+
+        with Bench() as bench:
+            explorer, executor = Watched(), MultiThreadedExecutor(num_threads=4)
+            timers = list(explorer.timers)
+            bench.spin(explorer, executor=executor)
+            client = bench.tester.create_client(Trigger, 'save')
+            bench.say('scan', Int32(data=0), Int32(data=1), at_once=True)
+            try:
+                if not bench.wait(lambda: 'scan 0' in calls):
+                    raise Failed('it does not hear scan')
+                if not bench.wait(client.service_is_ready):
+                    raise Failed('nobody serves save')
+                motors = calls.count('motor')
+                client.call_async(Trigger.Request())
+                bench.wait(
+                    lambda: calls.count('motor') > motors or any(t.is_ready() for t in timers)
+                )
+                bench.quiet(executor=executor)
+                during = calls[calls.index('scan 0') :]
+            finally:
+                gate.set()
+            if not bench.wait(lambda: 'save' in calls):
+                raise Failed('save_callback is never called')
+        return len(timers), during
+
+    def motors():
+        timers, during = during_scan_0()
+        if timers != 1:
+            return f'it has {timers} timers, and one drives the motors'
+        return 'motor' in during or 'while scan 0 was drawn, the motors waited'
+
+    def never(call):
+        return call not in during_scan_0()[1] or f'{call} began while scan 0 was drawn'
+
+    return [
+        ('the motors never wait', motors, 'What must not wait needs a group of its own.'),
+        ('scans come one by one', lambda: never('scan 1'), 'Which group lets one callback run?'),
+        ('no save during a scan', lambda: never('save'), 'Which callbacks use the map?'),
+    ]
+
+
+# --- What the tasks share -------------------------------------------------------------------------
+
+
+class Camera(Node):
+    """The camera of the lesson. With a gate, it answers when the gate is open."""
+
+    def __init__(self, sees='a wall', takes_s=0.1, gate=None):
+        super().__init__('camera')
+        self.sees, self.takes_s, self.gate = sees, takes_s, gate
+        self.asked = self.looks = 0
+        self.service = self.create_service(Trigger, 'look', self.look_callback)
+
+    def look_callback(self, request, response):
+        self.asked += 1
+        if self.gate:
+            self.gate.wait(timeout=20)
+        else:
+            time.sleep(self.takes_s)
+        self.looks += 1
+        response.success, response.message = self.sees == 'a wall', self.sees
+        return response
+
+
+def scan(distance):
+    return LaserScan(ranges=[distance] * 181)
+
+
+def two_groups():
+    return MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
+
+
+def two_threads():
+    return MultiThreadedExecutor(num_threads=2)
+
+
+def made(make_executor):
+    executor = make_executor()
+    if executor is None:
+        raise Failed('make_executor returns None')
+    return executor
+
+
+def stops_for(make_brake, make_executor, sees, distance):
+    """Show a scan to a brake that is with the camera: it stops for a near wall, and only then."""
+    right = sees == 'a wall' and distance < 1.0
+    with Bench() as bench:
+        stops = bench.hear('stop', Empty)
+        camera = Camera(sees)
+        bench.spin(make_brake(), camera, executor=made(make_executor))
+        bench.say('scan', scan(distance))
+        waits = bench.line_of_callback()
+        if bool(stops) != right or waits:
+            does = 'stops' if stops else 'does not stop'
+            found = f'{sees} at {distance} m: the camera looked {camera.looks} times, and the brake'
+            if waits:
+                waits = f'. Its callback still waits. {waits}'
+            raise Failed(f'{found} {does}{waits}')
+    return True
+
+
+# --- The runs of the lesson -----------------------------------------------------------------------
+
+
+def run(make_brake, make_executor):
+    """Show one scan of a wall to a brake, wait until nothing happens any more, and look at it."""
+    stops = []
+    with ros_session() as session:
+        brake, camera, tester = make_brake(), Camera(), Node('tester')
+        tester.create_subscription(Empty, 'stop', stops.append, 10)
+        scans = tester.create_publisher(LaserScan, 'scan', 10)
+        recording = CallbackRecording(
+            scan_callback=brake.subscription, look_callback=camera.service, client=brake.client
+        )
+        executor, other = make_executor(), SingleThreadedExecutor()
+        for node in (brake, camera):
+            executor.add_node(node)
+        other.add_node(tester)
+        session.spin(executor)
+        session.spin(other)
+        scans.publish(scan(0.5))
+        session.wait_until(lambda: recording.runs['scan_callback'])
+        thread_free = session.wait_until_quiet(executor)
+        session.wait_until_quiet(other)
+        return SimpleNamespace(
+            stopped=bool(stops),
+            looks=camera.looks,
+            thread_free=thread_free,
+            group_free=brake.client.callback_group.can_execute(brake.client),
+            stacks=stacks_in('scan_callback'),
+            replay=replay_of(recording, make_executor),
+        )
+
+
+def stacks_in(function):
+    """Return the calls, from this function on, of each thread that is inside it."""
+    hidden = {'recorded_call', 'recorded'}  # of the recording
+    stacks = []
+    for _, frame in frames(threading.enumerate()):
+        names = [entry.name for entry in traceback.extract_stack(frame)]
+        if function in names:
+            calls = names[names.index(function) :]
+            stacks.append(' > '.join(name for name in calls if name not in hidden))
+    return stacks
+
+
+def replay_of(recording, make_executor):
+    """Return the replay of a recording, with as many threads as its executor has."""
+    used = {thread for table in recording.tables().values() for thread in table['thread']}
+    threads = 1 if make_executor is SingleThreadedExecutor else max(2, len(used))
+    with suppress(ValueError):  # a callback that awaits has none
+        return replay_calls(recording, threads)

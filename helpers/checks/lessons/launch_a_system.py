@@ -1,0 +1,343 @@
+"""What the tasks of the lesson "Launch a system" are judged by."""
+
+import os
+import re
+import signal
+import time
+
+from helpers.checks.builds import builds
+from helpers.checks.programs import (
+    end_launch,
+    error_in,
+    error_of_launch,
+    launch,
+    started,
+    wait_until,
+)
+from helpers.checks.tasks import Tasks, once
+
+tasks = Tasks()
+check = tasks.check
+
+ROBOT_AND_DRIVER = 'drives on the floor corridor', '[driver]: I drive at 0.4 m/s'
+OWN_SPEEDS = '[one.driver]: I drive at 0.3 m/s', '[two.driver]: I drive at 0.6 m/s'
+
+
+@tasks.add(1, limit_s=60)
+def one_file(workspace, file):
+    text = once(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
+    hint = '<node pkg=... exec="driver">, in it <param name=... value=.../>, and then </node>.'
+    return [
+        ('the driver drives the robot at 0.4 m/s', lambda: says(text(), *ROBOT_AND_DRIVER), hint),
+        ('two programs are started', lambda: starts(text(), 'driver', 'robot'), 'Each once.'),
+    ]
+
+
+@tasks.add(2, limit_s=60)
+def the_same_in_yaml(workspace, file):
+    text = once(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
+    hint = 'Below "param:" write "- name: speed", and below "name" write "value: 0.4".'
+    return [
+        ('the driver drives the robot at 0.4 m/s', lambda: says(text(), *ROBOT_AND_DRIVER), hint),
+        (
+            'two programs are started',
+            lambda: starts(text(), 'driver', 'robot'),
+            '- node: for each.',
+        ),
+    ]
+
+
+@tasks.add(3, limit_s=60)
+def a_file_for_all_floors(workspace, file):
+    def declares():
+        said = workspace.terminal(f'ros2 launch -s {file}')
+        pairs = dict(re.findall(r"'(\w+)':\*?\n.*\n *\(default: '(.*)'\)", said))
+        if pairs == {'floor': 'corridor', 'speed': '0.4', 'driver': 'true'}:
+            return True
+        if 'Arguments (' not in said:
+            return said.splitlines()[-1]
+        return f'the arguments with a default are {pairs or "none"}'
+
+    declared = once(declares)
+
+    def starts_without():
+        if declared() is not True:
+            return 'they are not declared as the task says'
+        return says(run(workspace, file, *ROBOT_AND_DRIVER, programs=2), *ROBOT_AND_DRIVER)
+
+    def passes_on():
+        if declared() is not True:
+            return 'they are not declared as the task says'
+        lines = 'on the floor empty', 'I drive at 0.2 m/s'
+        return says(run(workspace, f'{file} floor:=empty speed:=0.2', *lines, programs=2), *lines)
+
+    def drives_by_hand():
+        if declared() is not True:
+            return 'they are not declared as the task says'
+        line = 'on the floor rooms'
+        text = run(workspace, f'{file} driver:=false floor:=rooms', line, programs=1)
+        said = says(text, line)
+        return starts(text, 'robot') if said is True else said
+
+    by_hand = 'with driver:=false only the robot starts'
+    return [
+        ('it declares three arguments', declared, '<arg name=... default=.../>, three times.'),
+        ('without arguments it starts as before', starts_without, 'All three have a default.'),
+        ('floor and speed reach the programs', passes_on, '$(var floor) in place of the word.'),
+        (by_hand, drives_by_hand, 'if="..." belongs to the node.'),
+    ]
+
+
+@tasks.add(4, limit_s=60)
+def one_robot_with_a_name(workspace, file):
+    def launch_two():
+        """Launch it in another folder, with other parameters, as two robots."""
+        include = (
+            '<include file="$(dirname)/one.launch.xml"><arg name="name" value="{}"/></include>'
+        )
+        both = f'<launch>{include.format("ada")}{include.format("bo")}</launch>'
+        workspace.write('.tried/launch/one.launch.xml', workspace.file(file).read_text())
+        workspace.write('.tried/launch/two.launch.xml', both)
+        workspace.write('.tried/config/driver.yaml', '/**: {ros__parameters: {speed: 0.25}}')
+        return run(workspace, '.tried/launch/two.launch.xml', *lines, programs=4)
+
+    lines = ['floor corridor', *(f'[{name}.driver]: I drive at 0.25 m/s' for name in ('ada', 'bo'))]
+    text = once(launch_two)
+    hint = '<group>, push_ros_namespace with $(var name), and only then the two nodes; in the '
+    hint += 'driver <param from="$(dirname)/../config/driver.yaml"/>.'
+    both = ['driver', 'robot'] * 2
+    return [
+        ('each driver has a robot, and the parameters', lambda: says(text(), *lines), hint),
+        ('a robot and a driver, each once', lambda: starts(text(), *both), hint),
+    ]
+
+
+@tasks.add(5, limit_s=60)
+def two_robots(workspace, file):
+    lines = [f'[{name}.driver]: I drive' for name in ('one', 'two')]
+    text = once(lambda: run(workspace, file, *lines, programs=4))
+    hint = '<include file="$(dirname)/...">, <arg name="name" value="one"/>, </include>; twice.'
+    both = ['driver', 'robot'] * 2
+    return [
+        ('each of two robots has its driver', lambda: says(text(), *lines), hint),
+        ('nothing else is started', lambda: starts(text(), *both), 'Two includes.'),
+    ]
+
+
+@tasks.add(6, limit_s=60)
+def a_speed_for_each(workspace, file):
+    def own_speeds():
+        return says(run(workspace, file, *OWN_SPEEDS, programs=4), *OWN_SPEEDS)
+
+    hint = 'The key is the full name, such as /one/driver.'
+    return [('each robot has its speed', own_speeds, hint)]
+
+
+@tasks.add(7, limit_s=60)
+def start_it_again(workspace, file):
+    def comes_back():
+        log, text = guarded(workspace, f'{file} speed:=0.4', kill=True)
+        starts_s, died_s = times(log, 'process started'), times(log, 'has died')
+        if not starts_s:
+            return error_of_launch(text)
+        if len(starts_s) != 2:
+            return 'it was killed, and is not started again'
+        return starts_s[1] - died_s[0] > 0.45 or 'it is started again at once'
+
+    def gives_up():
+        log, text = guarded(workspace, f'{file} speed:=fast')
+        starts_s = times(log, 'process started')
+        if not starts_s:
+            return error_of_launch(text)
+        often = {1: 'once', 2: 'twice'}.get(len(starts_s), 'again and again')
+        return len(starts_s) == 3 or f'with speed:=fast it is started {often}'
+
+    hint = 'respawn_max_retries counts the starts after the first one.'
+    return [
+        ('a driver that is killed comes back after 0.5 s', comes_back, 'respawn and respawn_delay'),
+        ('launch gives up after two more tries', gives_up, hint),
+    ]
+
+
+@tasks.add(8, limit_s=120)
+def a_camera_that_waits(workspace):
+    def waits_and_turns():
+        """Start it before the robot, and a second time after it."""
+        ros2_run = 'source install/setup.bash\nros2 run fleet_pkg'
+        space = '--ros-args -r __ns:=/tried'
+        with workspace.start(f'{ros2_run} camera {space}', 'the camera') as camera:
+
+            def has_waited():
+                return sum('I wait for' in line for line in camera.lines) >= 3
+
+            wait_until(lambda: has_waited() or not camera.running, 12)
+            if not camera.running:
+                return f'before there is a robot it ends: {error_in(camera.lines)}'
+            if not has_waited():
+                return 'before there is a robot it does not say again and again that it waits'
+            begun_s = time.monotonic()
+            with workspace.start(f'{ros2_run} robot {space}', 'the robot') as robot:
+                wait_until(lambda: any('drives on' in line for line in robot.lines), 25)
+                # A slow machine gets more time.
+                limit_s = max(4.0, 3 * (time.monotonic() - begun_s))
+                turned = turns(camera, limit_s)
+                if turned is not True:
+                    return turned
+                with workspace.start(f'{ros2_run} camera {space}', 'a late camera') as late:
+                    return turns(late, limit_s)
+
+    hint = 'while not self.client.wait_for_service(timeout_sec=1.0): log. Then call_async, and '
+    hint += 'rclpy.spin_until_future_complete(self, future).'
+    return [('it turns the camera, whichever starts first', waits_and_turns, hint)]
+
+
+@tasks.add(9, limit_s=90)
+def install_the_files(workspace):
+    def build():
+        workspace.terminal('rm -rf build install')
+        return builds(workspace, 'fleet_pkg')
+
+    built = once(build)
+
+    def is_installed():
+        if built() is not True:
+            return 'it is not built'
+        share = workspace.file('install/fleet_pkg/share/fleet_pkg')
+        wanted = ['launch/robot.launch.xml', 'launch/robot.launch.yaml', 'config/driver.yaml']
+        absent = [file for file in wanted if not (share / file).is_file()]
+        return not absent or f'share/fleet_pkg has no {", no ".join(absent)}'
+
+    def is_launched():
+        if built() is not True:
+            return 'it is not built'
+        words = 'fleet_pkg two_robots.launch.xml'
+        return says(run(workspace, words, *OWN_SPEEDS, programs=4), *OWN_SPEEDS)
+
+    hint = "('share/' + package_name + '/launch', glob('launch/*'))"
+    both = f'{hint}, and the same for config'
+    return [
+        ('it builds', built, hint),
+        ('launch files and parameters are installed', is_installed, both),
+        ('ros2 launch fleet_pkg two_robots.launch.xml', is_launched, 'Is it installed?'),
+    ]
+
+
+# --- What a launch prints
+
+
+class Patience:
+    """Says when nothing more comes: after 4 s of silence, on a slow machine after more.
+
+    How slow it is, the first program has shown: what its start took, others may take twice.
+    """
+
+    def __init__(self):
+        self._begun_s = self._since_s = time.monotonic()
+        self._start_s = None
+        self._text = ''
+
+    def is_over(self, has_started, text):
+        """Return whether the text has been the same for too long since the first start."""
+        now_s = time.monotonic()
+        if has_started and self._start_s is None:
+            self._start_s = now_s - self._begun_s
+        if text != self._text:
+            self._text, self._since_s = text, now_s
+        return has_started and now_s - self._since_s > max(4.0, 2 * self._start_s)
+
+
+def run(workspace, words, *lines, programs):
+    """Launch until these lines have come, or cannot come. Return what was printed."""
+    drives = max(1, sum('I drive' in line for line in lines))
+    patience = Patience()
+
+    def is_done(text):
+        silent = patience.is_over('drives on' in text, text)
+        # Before launch prints what a program says, it has started all of them.
+        speaks = re.search(r'^\[\S+-\d+\] ', text, re.MULTILINE)
+        all_said = all(line in text for line in lines) or text.count('I drive') >= drives
+        return all_said or silent or (speaks and len(started(text)) < programs)
+
+    text = launch(workspace, words, is_done)
+    if len(started(text)) >= programs or error_of_launch(text):
+        return text
+    # If one is missing, what the others had said by then differs from run to run.
+    return re.sub(r'(?m)^\[\S+-\d+\] .*', '', text)
+
+
+def says(text, *lines):
+    """Return whether a launch has printed the lines, or what it did instead, and its error."""
+    if all(line in text for line in lines):
+        return True
+    parts = [f'started: {", ".join(started(text)) or "nothing"}']
+    parts += sorted(set(re.findall(r'\[[\w.]+\]: I drive.*', text)))
+    parts += [error] if (error := error_of_launch(text)) else []
+    return '; '.join(parts)
+
+
+def starts(text, *names):
+    programs = started(text)
+    return programs == sorted(names) or f'started: {", ".join(programs) or "nothing"}'
+
+
+def show(terminal, pattern):
+    """Print lines of a launch, sorted by program, without what differs from run to run."""
+    text = re.sub(r", cmd '.*'", '', '\n'.join(terminal.lines))
+    text = re.sub(r'(?<=\[pid )\d+', '...', text)
+    lines = re.findall(rf'^.*?\[(\w+-\d+)\](.*(?:{pattern}).*)', text, re.MULTILINE)
+    for program, said in sorted(lines, key=lambda line: line[0]):
+        print(f'[{program}]{said}')
+
+
+# --- A program that is started again
+
+
+def guarded(workspace, words, kill=False):
+    """Launch a file, perhaps kill its program, and wait until nothing more happens.
+
+    Return the log of the launch, whose lines begin with their times, and what it printed.
+    """
+    most = 1 if kill else 3
+    command = f'source install/setup.bash\nros2 launch {words}'
+    with workspace.start(command, 'the launch') as process:
+        count, since_s, killed = 0, time.monotonic(), not kill
+        while process.running and time.monotonic() - since_s < 12:
+            lines = process.lines
+            if len(lines) > count:
+                count, since_s = len(lines), time.monotonic()
+            ids = re.findall(r'started with pid \[(\d+)', '\n'.join(lines))
+            if not killed and ids:
+                os.kill(int(ids[0]), signal.SIGKILL)
+                killed = True
+            if len(ids) > most:
+                break
+            time.sleep(0.05)
+        end_launch(process)
+    log = workspace.file('log/ros/latest/launch.log')
+    text = '\n'.join(process.lines).replace(f'{workspace.path}/', '')
+    return (log.read_text() if started(text) else ''), text
+
+
+def times(log, event):
+    """Return the times of the lines of a log that tell of an event."""
+    return [float(line.split()[0]) for line in log.splitlines() if event in line]
+
+
+# --- The camera
+
+
+def turns(camera, limit_s):
+    """Wait until a camera has logged that it turned, and has ended without an error."""
+
+    def has_turned():
+        return any('Turned: True' in line for line in camera.lines)
+
+    wait_until(lambda: has_turned() or not camera.running, limit_s)
+    if not camera.running and not has_turned():
+        return f'beside a robot it ends: {error_in(camera.lines)}'
+    if not has_turned():
+        said = ' / '.join(camera.lines[-3:]) or 'nothing'
+        return f'the robot is there, and it does not log "Turned: True". Its last lines: {said}'
+    if not wait_until(lambda: not camera.running, limit_s):
+        return 'it has turned the camera, and does not end'
+    return camera.wait() == 0 or f'it ends with an error: {error_in(camera.lines)}'

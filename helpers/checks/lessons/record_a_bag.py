@@ -1,0 +1,454 @@
+"""What the tasks of the lesson "Record a bag" are judged by, and its picture of a bag."""
+
+import shutil
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import matplotlib.pyplot as plt
+from geometry_msgs.msg import Twist
+from mcap import records
+from mcap.stream_reader import StreamReader
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
+from rclpy.time import Time
+from rosbags import interfaces
+from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan, Range
+from std_msgs.msg import Bool
+
+from helpers.checks.bench import Bench
+from helpers.checks.errors import Failed, sentence
+from helpers.checks.tasks import Tasks
+from helpers.plots import describe, show
+
+tasks = Tasks()
+check = tasks.check
+
+TOPICS = {'/scan': LaserScan, '/wall': Range, '/cmd_vel': Twist, '/bumper': Bool}
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+@tasks.add(1, limit_s=60)
+def write_the_command_that_records(RECORD, workspace):
+    def recorded_topics():
+        tried = workspace.path / 'tried'
+        shutil.rmtree(tried, ignore_errors=True)
+        tried.mkdir()
+        with Bench() as bench:
+            wanted = [bench.publisher(topic, kind) for topic, kind in TOPICS.items()]
+            publishers = [*wanted, bench.publisher('/battery', Bool)]
+            with workspace.start(f'cd tried; {RECORD}') as recorder:
+                bench.wait(lambda: any(map(is_heard, publishers)) or not recorder.running, 30)
+                bench.wait(lambda: all(map(is_heard, wanted)) or not recorder.running)
+        if not (tried / 'crash').exists():
+            said = what_it_printed(recorder)
+            raise Failed(f'there is no bag in the folder crash. The command printed: {said}')
+        with AnyReader([tried / 'crash']) as bag:
+            return sorted(connection.topic for connection in bag.connections)
+
+    def records_all():
+        topics = recorded_topics()
+        return topics == sorted(TOPICS) or f'the bag has these topics: {", ".join(topics)}'
+
+    hint = 'After -o comes the folder, then the topics, with spaces between them.'
+    return [('it records the four topics into crash', records_all, hint)]
+
+
+def is_heard(publisher):
+    return publisher.get_subscription_count() > 0
+
+
+def what_it_printed(process):
+    """Return the line that says what was wrong, else the last one."""
+    lines = [line.strip() for line in process.lines if line.strip()]
+    errors = [line for line in lines if 'error' in line.lower()]
+    return [*(errors or lines[-1:]), 'nothing'][0]
+
+
+@tasks.add(2)
+def read_one_topic(read):
+    def reads(topic, kind, right):
+        rows = [
+            (5, '/a', Bool(data=True)),
+            (6, '/b', stamped(Range, 1, range=2.0)),
+            (6, '/a_b', Bool()),
+            (7, '/a', Bool()),
+            (9, '/a', Bool(data=True)),
+        ]
+        with bag_of(rows) as path:
+            found = read(path, topic, kind)
+        for _, message in found:
+            if not isinstance(message, kind):
+                return f'of {topic} it returned a message of the class {type(message).__name__}'
+        times = [recorded_ns for recorded_ns, _ in found]
+        return times == right or f'{topic} was recorded at {right}; it returned {times}'
+
+    hint = 'if connection.topic == topic: then deserialize_message(data, kind).'
+    return [
+        ('three messages of /a', lambda: reads('/a', Bool, [5, 7, 9]), hint),
+        ('one of /b', lambda: reads('/b', Range, [6]), hint),
+        ('none of /c', lambda: reads('/c', Bool, []), hint),
+    ]
+
+
+@tasks.add(3)
+def age_of_a_result(age_s):
+    def computes(stamp_s, recorded_s, right):
+        found = age_s(round(recorded_s * 1e9), stamped(Range, stamp_s).header)
+        return abs(found - right) < 1e-3 or (
+            f'{stamp_s} s, recorded at {recorded_s} s: {found:g} s'
+        )
+
+    hint = 'Time.from_msg(header.stamp).nanoseconds is the stamp in nanoseconds.'
+    return [
+        ('stamp 10.5 s, recorded at 12 s', lambda: computes(10.5, 12, 1.5), hint),
+        ('stamp 1.75 s, recorded at 2 s', lambda: computes(1.75, 2, 0.25), hint),
+    ]
+
+
+@tasks.add(4)
+def what_it_believed(at_bump):
+    def finds(first_bump):
+        rows = [(10 * n, '/scan', ahead(5.0 - n)) for n in range(5)]
+        rows += [(10 * n + 4, '/wall', stamped(Range, 1, range=7.0 - n)) for n in range(5)]
+        rows += [(10 * n + 7, '/bumper', Bool(data=n >= first_bump)) for n in range(5)]
+        with bag_of(sorted(rows, key=lambda row: row[0])) as path:
+            found = at_bump(path)
+        right = (7.0 - first_bump, 5.0 - first_bump)
+        if isinstance(found, tuple | list) and tuple(found) == right:
+            return True
+        return (
+            f'in a bag of five scans, the last /wall before the first bump says {right[0]} m and '
+            f'the last /scan {right[1]} m; it returned {found}'
+        )
+
+    hint = (
+        'next(ns for ns, bump in ... if bump.data); then a list of what came until then, and its '
+        '[-1].'
+    )
+    return [
+        ('a bump in the middle of a bag', lambda: finds(2), hint),
+        ('a bump at its end', lambda: finds(4), hint),
+        ('a bump at its beginning', lambda: finds(0), hint),
+    ]
+
+
+@tasks.add(5)
+def save_what_is_whole(salvage, half):
+    def saves_small(missing):
+        rows = [(n, f'/{"ab"[n % 2]}', Bool(data=n > 3)) for n in range(6)]
+        with bag_of(rows) as path:
+            file = next(path.glob('*.mcap'))
+            right = whole_messages(file)
+            whole = file.read_bytes()
+            file.write_bytes(whole[: len(whole) - missing])
+            return are_same(salvage(file), right)
+
+    def are_same(found, right):
+        if not isinstance(found, list | tuple):
+            return f'it returned {found!r}'
+        if not found:
+            return 'of the whole messages it returned none'
+        for number, (saved, message) in enumerate(zip(found, right, strict=False)):
+            if tuple(saved) != message:
+                parts = zip(('topic', 'log_time', 'data'), saved, message, strict=False)
+                other = [name for name, part, wanted in parts if part != wanted]
+                if not other:
+                    return f'message {number} of its list has {len(saved)} parts, not three'
+                return f'message {number} of its list has another {" and ".join(other)}'
+        return len(found) == len(right) or (
+            f'the file has {len(right)} whole messages; it returned {len(found)}'
+        )
+
+    hint = 'A try around the for loop; except Exception: pass. isinstance(record, records.Message).'
+    return [
+        ('a file that is whole', lambda: saves_small(0), hint),
+        ('a file without its last byte', lambda: saves_small(1), hint),
+        ('the half file', lambda: are_same(salvage(half), whole_messages(half)), hint),
+    ]
+
+
+def whole_messages(file):
+    """Return (topic, log_time, data) of each message that is whole."""
+    topics, found = {}, []
+    with file.open('rb') as stream, suppress(Exception):  # the rest of the file is not whole
+        for record in StreamReader(stream).records:
+            if isinstance(record, records.Channel):
+                topics[record.id] = record.topic
+            elif isinstance(record, records.Message):
+                found.append((topics[record.channel_id], record.log_time, record.data))
+    return found
+
+
+@tasks.add(6)
+def fix_the_brake(FreshBrake):
+    def commands_well(scans, now_s, right):
+        """Let a brake in simulated time hear scans (stamp, distance)."""
+        with Bench() as bench:
+            commands = bench.hear('cmd_vel', Twist)
+            bench.spin(FreshBrake(parameter_overrides=[Parameter('use_sim_time', value=True)]))
+            bench.say('/clock', Clock(clock=stamp(now_s)))
+            bench.say('scan', *(ahead(distance, stamp_s) for stamp_s, distance in scans))
+        found = [twist.linear.x for twist in commands]
+        return found == right or (
+            f'at {now_s} s, scans (stamp, distance) {scans}: it commands {found}'
+        )
+
+    def has_depth_1():
+        speeds = []
+        with Bench() as bench:
+            brake = FreshBrake()
+            brake.command = speeds.append
+            now_s = bench.tester.get_clock().now().nanoseconds / 1e9
+            bench.say('scan', *(ahead(metres, now_s) for metres in (3.0, 2.0, 0.1)), at_once=True)
+            bench.spin(brake)
+            bench.quiet()
+        return speeds == [0.0] or f'of three scans that waited, it acted on {len(speeds)}'
+
+    hint = 'self.get_clock().now() - Time.from_msg(scan.header.stamp) > Duration(seconds=0.5)'
+    fresh, old = [(99.9, 2), (100, 0.3)], [(59, 2), (59.8, 2)]
+    return [
+        ('at 100 s, fresh scans', lambda: commands_well(fresh, 100, [0.5, 0.0]), hint),
+        ('at 60 s, an old one', lambda: commands_well(old, 60, [0.0, 0.5]), hint),
+        (
+            'of three scans that wait, it hears the newest',
+            has_depth_1,
+            'super().__init__(depth=1, ...)',
+        ),
+    ]
+
+
+@tasks.add(7, limit_s=60)
+def write_the_command_that_plays(PLAY, workspace):
+    def plays():
+        if not (workspace.path / 'crash').exists():
+            return 'there is no bag crash yet: run the cell that records it'
+        with Bench() as bench:
+            heard = {topic: bench.hear(topic, kind) for topic, kind in TOPICS.items()}
+            heard['/clock'] = bench.hear('/clock', Clock)
+            said = play(bench, workspace, f'{PLAY} -r 10')
+        played = sorted(topic for topic, messages in heard.items() if messages)
+        if not played:
+            return f'it plays nothing. The command printed: {said}'
+        return played == ['/clock', '/scan'] or f'it plays {", ".join(played)}'
+
+    return [
+        ('it plays /scan and /clock, and nothing else', plays, '--clock, and --topics /scan'),
+    ]
+
+
+def play(bench, workspace, command):
+    """Let a command play a bag to its end. Return what it printed."""
+    with workspace.start(command) as player:
+        if not bench.wait(lambda: not player.running, 40):
+            raise Failed(f'the player does not end. It printed: {what_it_printed(player)}')
+        if player.wait() != 0:
+            raise Failed(f'the command failed. It printed: {what_it_printed(player)}')
+    bench.quiet()
+    return what_it_printed(player)
+
+
+@tasks.add(8)
+def write_the_judge(Judge):
+    def notes(messages, right):
+        """Publish distances ('scan', m) and speeds ('cmd_vel', m/s)."""
+        with Bench() as bench:
+            judge = bench.spin(Judge())
+            for topic, value in messages:
+                bench.say(topic, ahead(value) if topic == 'scan' else forwards(value))
+        found = judge.commands
+        return found == right or f'after {messages} it has noted {found}'
+
+    early = [('cmd_vel', 0.5), ('scan', 2.0), ('cmd_vel', 0.25), ('cmd_vel', 0.0)]
+    newest = [('scan', 3.0), ('scan', 0.5), ('cmd_vel', 0.0)]
+    hint = 'Two subscriptions. One callback keeps the distance, the other one appends.'
+    return [
+        ('a command before any scan', lambda: notes(early[:1], [(None, 0.5)]), hint),
+        ('two at 2 m', lambda: notes(early, [(None, 0.5), (2.0, 0.25), (2.0, 0.0)]), hint),
+        ('the newest scan counts', lambda: notes(newest, [(0.5, 0.0)]), hint),
+    ]
+
+
+GOOD = [(None, 0.5), (2.0, 0.5), (1.2, 0.5), (0.4, 0.0), (0.2, 0.0), (0.12, 0.0)]
+ANOTHER_GOOD = [(1.5, 0.0), (1.1, 0.3), (0.25, 0.5), (0.1, 0.0)]
+BAD = {
+    'it never drives': [(2.0, 0.0), (1.2, 0.0), (0.2, 0.0)],
+    'it says nothing': [],
+    'it drives slowly, and only near the wall': [(2.0, 0.0), (0.6, 0.1), (0.2, 0.0)],
+    'it drives at once, and knows no scan': [(None, 0.5), (0.2, 0.0)],
+    'it stops at 0.2 m only': [(2.0, 0.5), (0.24, 0.5), (0.2, 0.0)],
+    'it stops, then goes on': [*GOOD, (0.11, 0.5)],
+    'it goes back at the wall': [*GOOD, (0.11, -0.5)],
+    'it falls silent before the wall': [(2.0, 0.5), (0.6, 0.5)],
+}
+
+
+@tasks.add(9)
+def write_the_assertions(check_commands):
+    def accepts(commands):
+        try:
+            check_commands(commands)
+        except AssertionError as error:
+            return f'your test refuses {commands}. {sentence(error)}'
+        return True
+
+    def refuses(commands):
+        return accepts(commands) is not True or f'your test accepts {commands}'
+
+    hint = 'any(...) for what must happen, and all(...) for what must hold each time.'
+    return [
+        ('a good brake passes', lambda: accepts(GOOD), hint),
+        (
+            'another good brake passes',
+            lambda: accepts(ANOTHER_GOOD),
+            'Exactly 0.25 m is not nearer.',
+        ),
+        *(
+            (f'it fails: {name}', lambda commands=commands: refuses(commands), hint)
+            for name, commands in BAD.items()
+        ),
+    ]
+
+
+@tasks.add(10)
+def match_by_stamps(Synchroniser):
+    def matches(size, slop_s, arrivals, right):
+        """Add messages by (name, stamp), and compare the stamps of the pairs."""
+        synchroniser = Synchroniser(size, slop_s)
+        for name, stamp_s in arrivals:
+            synchroniser.add(name, stamped(LaserScan if name == 'scan' else Range, stamp_s))
+        for scan, wall in synchroniser.pairs:
+            if not isinstance(scan, LaserScan) or not isinstance(wall, Range):
+                return 'a pair is not (scan, wall)'
+        found = [(seconds_of(scan), seconds_of(wall)) for scan, wall in synchroniser.pairs]
+        return found == right or f'size {size}, slop {slop_s} s, {arrivals}: pairs {found}'
+
+    def scans_then(size, walls, right):
+        arrivals = [('scan', n) for n in range(1, 6)] + [('wall', n) for n in walls]
+        return matches(size, 0.3, arrivals, right)
+
+    hint = 'del own[: -self.size]; min(other, key=lambda m: abs(stamp_s(m) - stamp_s(message))).'
+    near = [('wall', 1.0), ('scan', 1.5), ('scan', 1.1), ('wall', 1.4)]
+    two_near = [('scan', 1.8), ('scan', 2.1), ('wall', 2.0)]
+    return [
+        ('the nearest scan', lambda: scans_then(9, [2.1, 4.9], [(2, 2.1), (5, 4.9)]), hint),
+        ('of two that fit, the nearest', lambda: matches(9, 0.3, two_near, [(2.1, 2.0)]), hint),
+        ('none that is too far away', lambda: scans_then(9, [2.5, 9.0], []), hint),
+        ('none is used twice', lambda: scans_then(9, [3, 3.1, 3.2], [(3, 3)]), 'remove(...) both.'),
+        ('old messages are removed', lambda: scans_then(2, [1, 3, 4], [(4, 4)]), hint),
+        ('whichever comes first', lambda: matches(5, 0.3, near, [(1.1, 1.0), (1.5, 1.4)]), hint),
+    ]
+
+
+@tasks.add(11, limit_s=60)
+def hear_the_laser(LASER_QOS, workspace, scans):
+    def hears():
+        path = workspace.path / 'laser'
+        shutil.rmtree(path, ignore_errors=True)
+        write_bag(path, [(ns, '/scan', scan) for ns, scan in scans], [best_effort()])
+        heard = []
+        with Bench() as bench:
+            listener = Node('listener')
+            listener.create_subscription(LaserScan, 'scan', heard.append, LASER_QOS)
+            bench.spin(listener)
+            play(bench, workspace, 'ros2 bag play laser -r 10')
+        return bool(heard) or 'it hears no scan'
+
+    def is_deep():
+        return LASER_QOS.depth == 100 or f'its depth is {LASER_QOS.depth}'
+
+    hint = 'reliability=ReliabilityPolicy.NAME, as that of the laser.'
+    return [('it hears scans', hears, hint), ('its depth is 100', is_deep, 'depth=100')]
+
+
+def best_effort():
+    """Return the QoS of a laser, as a bag keeps it."""
+    never = interfaces.QosTime(9223372036, 854775807)
+    return interfaces.Qos(
+        history=interfaces.QosHistory(1),
+        depth=10,
+        reliability=interfaces.QosReliability(2),
+        durability=interfaces.QosDurability(2),
+        deadline=never,
+        lifespan=never,
+        liveliness=interfaces.QosLiveliness(1),
+        liveliness_lease_duration=never,
+        avoid_ros_namespace_conventions=False,
+    )
+
+
+# --- What the tasks share -------------------------------------------------------------------------
+
+
+def stamp(seconds):
+    return Time(nanoseconds=round(seconds * 1e9)).to_msg()
+
+
+def stamped(kind, seconds, **fields):
+    message = kind(**fields)
+    message.header.stamp = stamp(seconds)
+    return message
+
+
+def seconds_of(message):
+    return round(Time.from_msg(message.header.stamp).nanoseconds / 1e9, 3)
+
+
+def ahead(metres, stamp_s=1.0):
+    """Return a scan with something at this distance ahead."""
+    return stamped(LaserScan, stamp_s, ranges=[0.2] * 90 + [float(metres)] + [9.0] * 90)
+
+
+def forwards(speed):
+    twist = Twist()
+    twist.linear.x = speed
+    return twist
+
+
+@contextmanager
+def bag_of(rows):
+    """Give the path of a bag of rows (recorded_ns, topic, message), for a while."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / 'small'
+        write_bag(path, rows)
+        yield path
+
+
+def write_bag(path, rows, qos=()):
+    writer, connections = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP), {}
+    with writer:
+        for recorded_ns, topic, message in rows:
+            if topic not in connections:
+                package = type(message).__module__.partition('.')[0]
+                connections[topic] = writer.add_connection(
+                    topic,
+                    f'{package}/msg/{type(message).__name__}',
+                    typestore=STORE,
+                    offered_qos_profiles=qos,
+                )
+            writer.write(connections[topic], recorded_ns, serialize_message(message))
+
+
+# --- The picture of the lesson --------------------------------------------------------------------
+
+
+def draw_bag(scans, walls, age_s):
+    """Draw when messages came, and how old the scans were on which the brake acted."""
+    figure, (rows, ages) = plt.subplots(2, 1, figsize=(7, 3.6), sharex=True, layout='constrained')
+    scan_s, wall_s = (
+        [(recorded_ns - scans[0][0]) / 1e9 for recorded_ns, _ in messages]
+        for messages in (scans, walls)
+    )
+    rows.eventplot([wall_s, scan_s], lineoffsets=[0, 1], linelengths=0.7)
+    rows.set_yticks([0, 1], ['wall', 'scan'])
+    ages.plot(wall_s, [age_s(recorded_ns, wall.header) for recorded_ns, wall in walls], 'o')
+    ages.set(xlabel='time in the bag (s)', ylabel='age (s)', ylim=(0, 2))
+    describe(rows, 'A line for each message: twice as many scans as results.', 'Messages')
+    describe(ages, 'Each result comes from a scan that is about 1 s old.', 'Ages')
+    plt.close(figure)
+    show(figure)

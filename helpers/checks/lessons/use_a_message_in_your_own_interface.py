@@ -1,0 +1,245 @@
+"""What the tasks of the lesson "Use a message in your own interface" are judged by."""
+
+import json
+
+import numpy as np
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rosidl_adapter.parser import parse_service_file
+from sensor_msgs.msg import Image
+
+from helpers.checks.bench import Bench
+from helpers.checks.builds import builds
+from helpers.checks.programs import manifest, needed, sourced
+from helpers.checks.tasks import Tasks, once
+from helpers.robot import ROOMS, Robot
+from helpers.ros import ros_session
+
+tasks = Tasks()
+check = tasks.check
+
+GENERATORS, RUNTIME = 'rosidl_default_generators', 'rosidl_default_runtime'
+BOTH = '<depend>NAME</depend> counts for the build and for the run.'
+
+
+@tasks.add(1)
+def the_service_file(workspace, file):
+    def has(part, right):
+        service = parse_service_file('custom_interfaces', str(workspace.file(file)))
+        fields = [f'{field.type} {field.name}' for field in getattr(service, part).fields]
+        return fields == [right] or f'the {part} is {", ".join(fields) or "empty"}'
+
+    of_package = 'A type without a package is one of your own package. Otherwise package/Type, '
+    of_package += 'without msg.'
+    return [
+        (
+            'the request is right',
+            lambda: has('request', 'float32 deg_turn'),
+            'The type, a space, the name.',
+        ),
+        (
+            'the response is right',
+            lambda: has('response', 'sensor_msgs/Image camera_image'),
+            of_package,
+        ),
+    ]
+
+
+@tasks.add(2)
+def what_it_depends_on(workspace):
+    package = 'custom_interfaces'
+
+    def is_member():
+        groups = [group.name for group in manifest(workspace, f'src/{package}').member_of_groups]
+        said = f'its groups are {" ".join(groups)}' if groups else 'it is in no group'
+        return 'rosidl_interface_packages' in groups or said
+
+    def names(moment, name):
+        return lambda: is_named(workspace, package, moment, name)
+
+    line = 'One line <TAG>NAME</TAG>. The tag is in the text above the task.'
+    return [
+        ('the generators are named', names('build', GENERATORS), line),
+        ('the runtime is named', names('run', RUNTIME), line),
+        ('it is in the group of interface packages', is_member, line),
+        ('sensor_msgs is named to build it', names('build', 'sensor_msgs'), BOTH),
+        ('sensor_msgs is named to run it', names('run', 'sensor_msgs'), BOTH),
+    ]
+
+
+@tasks.add(3, limit_s=90)
+def fix_the_build(workspace):
+    hint = 'Unknown command: which package has it? KeyError: what was not told about the package?'
+    return [('it builds', lambda: builds(workspace, 'custom_interfaces', anew=False), hint)]
+
+
+@tasks.add(4)
+def the_server(CameraServer):
+    def turns(degrees):
+        with Bench() as bench:
+            robot = Robot(ROOMS)
+            bench.spin(CameraServer(robot))
+            request = service_type().Request(deg_turn=degrees)
+            response = bench.call('turn_camera', service_type(), request)
+            if response is None:
+                return no_answer(bench)
+            return is_picture(response.camera_image, robot, degrees)
+
+    hint = 'create_service(type, name, callback). The callback gets request and response.'
+    return [
+        ('it turns by 30 degrees, and shows it', lambda: turns(30.0), hint),
+        ('it turns by 90 degrees, and shows it', lambda: turns(90.0), 'Return the response.'),
+    ]
+
+
+@tasks.add(5, limit_s=45)  # a call that nobody answers waits for 30 s
+def the_client(ask, pixels):
+    def asks(degrees):
+        with Bench() as bench:
+            robot = Robot(ROOMS)
+            serve(bench, robot)
+            image = ask(bench.session, bench.spin(Node('client')), degrees)
+            if not isinstance(image, Image):
+                return f'it returns {type(image).__name__}, not an Image'
+            return is_picture(image, robot, degrees)
+
+    first = once(lambda: asks(30.0))
+
+    def asks_again():
+        first()  # what it raises is raised again, without another call
+        return asks(120.0)
+
+    def has_pixels(height, width):
+        wanted = np.arange(height * width * 3, dtype=np.uint8).reshape(height, width, 3)
+        image = Image(height=height, width=width, step=3 * width, data=wanted.tobytes())
+        array = pixels(image)
+        wrong = f'{height} by {width} gives the wrong array: {np.shape(array)}'
+        return np.array_equal(array, wanted) or wrong
+
+    ask_hint = 'node.create_client, client.call_async(TurnCamera.Request(...)), future.done.'
+    shape_hint = '.reshape(image.height, image.width, 3)'
+    return [
+        ('ask(session, node, 30.0) returns the picture', first, ask_hint),
+        ('ask(session, node, 120.0) returns the picture', asks_again, ask_hint),
+        ('pixels of 4 by 6', lambda: has_pixels(4, 6), shape_hint),
+        ('pixels of 6 by 4', lambda: has_pixels(6, 4), shape_hint),
+    ]
+
+
+@tasks.add(6)
+def call_from_a_terminal(workspace, commands):
+    def turns_60():
+        with Bench() as bench:
+            robot = Robot(ROOMS)
+            serve(bench, robot)
+            printed = workspace.terminal(commands).splitlines()
+        turns = turns_of(robot)
+        if turns == ['The camera looks 60 degrees to the left.']:
+            return True
+        return ' '.join(turns or printed[-1:]) or 'the camera was not turned'
+
+    hint = 'The field of the request, in braces: YAML.'
+    return [('the camera turns by 60 degrees', turns_60, hint)]
+
+
+@tasks.add(7, limit_s=90)
+def a_message_of_two_packages(workspace):
+    package = 'sighting_interfaces'
+
+    def has_fields():
+        kind = manifest(workspace, f'src/{package}').get_build_type()
+        if kind != 'ament_cmake':
+            return f'its build_type is {kind}'
+        built = builds(workspace, package)
+        if built is not True:
+            return built
+        code = f'import json; from {package}.msg import Sighting; '
+        code += 'print(json.dumps(Sighting.get_fields_and_field_types()))'
+        said = sourced(workspace, f"python -c '{code}'").splitlines()[-1]
+        if not said.startswith('{'):
+            return said
+        fields = [f'{kind} {name}' for name, kind in json.loads(said).items()]
+        right = ['nav_msgs/Path way', 'sequence<sensor_msgs/Image> pictures']
+        return fields == right or f'its fields are, in this order: {", ".join(fields)}'
+
+    def names(moment, *wanted):
+        return lambda: is_named(workspace, package, moment, *wanted)
+
+    whole = 'Which line of the error says what was not found? Steps 1 and 2.'
+    line = 'The lines of step 1, one by one.'
+    return [
+        ('it builds, and has the two fields', has_fields, whole),
+        ('both packages are named to build it', names('build', 'nav_msgs', 'sensor_msgs'), BOTH),
+        ('both packages are named to run it', names('run', 'nav_msgs', 'sensor_msgs'), BOTH),
+        ('the runtime of interfaces is named', names('run', RUNTIME), line),
+    ]
+
+
+# --- package.xml
+
+
+def is_named(workspace, package, moment, *wanted):
+    """Return whether package.xml names these for 'build' or 'run', or what it does not name."""
+    names = needed(manifest(workspace, f'src/{package}'), moment)
+    missing = [name for name in wanted if name not in names]
+    return not missing or f'to {moment} it, it does not name {" and ".join(missing)}'
+
+
+# --- The camera
+
+
+def service_type():
+    """Return the learner's service. It is there when task 3 has built it."""
+    from custom_interfaces.srv import TurnCamera
+
+    return TurnCamera
+
+
+def serve(bench, robot):
+    """Serve the camera of a robot, as task 4 wants it."""
+
+    def turn(request, response):
+        response.camera_image = robot.turn_camera(request.deg_turn)
+        return response
+
+    node = Node('camera')
+    node.create_service(service_type(), 'turn_camera', turn)
+    bench.spin(node)
+
+
+def no_answer(bench):
+    """Say why a call of turn_camera got no answer."""
+    kinds = dict(bench.tester.get_service_names_and_types()).get('/turn_camera', [])
+    if kinds == ['custom_interfaces/srv/TurnCamera'] and bench.tester.count_services('turn_camera'):
+        return 'turn_camera is called, and does not answer'
+    return 'there is no service turn_camera of the type TurnCamera'
+
+
+def turns_of(robot):
+    """Return what the robot's record says of its camera."""
+    return [event.text for event in robot.record.events if event.kind == 'camera']
+
+
+def is_picture(image, robot, degrees):
+    """Return whether it is what the camera sees now, after one turn by the degrees."""
+    turns = turns_of(robot)
+    if turns != [f'The camera looks {degrees:g} degrees to the left.']:
+        return ' '.join(turns) or 'the camera was not turned'
+    seen = robot.turn_camera(0.0)
+    right = image.data == seen.data and image.width == seen.width
+    return right or 'the picture is not what the camera sees'
+
+
+def with_camera(CameraServer, act):
+    """Start a robot, its camera server and a client's node, and return what `act` does with them.
+
+    `act` gets the session, the node and the robot.
+    """
+    with ros_session() as session:
+        robot = Robot(ROOMS)
+        client = Node('client')
+        for node in (CameraServer(robot), client):
+            executor = SingleThreadedExecutor()
+            executor.add_node(node)
+            session.spin(executor)
+        return act(session, client, robot)

@@ -1,0 +1,65 @@
+"""What a command must not do halfway, nor at the same time as another process."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import signal
+import time
+from collections.abc import Iterator
+
+SHARED_MEMORY = '/dev/shm'
+TURN_TIMEOUT_S = 5.0  # after which the message of Fast DDS is better than to wait longer
+POLL_S = 0.01
+
+_timed_out = False  # the last wait for a turn did
+
+
+@contextlib.contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Let Ctrl+C wait for the end of the block. It is for the main thread."""
+    interrupts = []
+    handler = signal.signal(signal.SIGINT, lambda number, frame: interrupts.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        if interrupts:
+            signal.raise_signal(signal.SIGINT)
+
+
+@contextlib.contextmanager
+def one_process_at_a_time() -> Iterator[None]:
+    """Wait for the turn of this process to make or to end a participant.
+
+    Fast DDS numbers some ports in shared memory across all domains. It prints an error if one
+    process wants the number that another one gives back at this moment. So all processes that know
+    of it, ours and those that the README asks, hold a lock on the folder /dev/shm meanwhile. A
+    process that was stopped may hold it for ever: once a wait has timed out, the next ones do not
+    wait.
+    """
+    global _timed_out
+    try:
+        folder = os.open(SHARED_MEMORY, os.O_RDONLY)
+    except OSError:  # no shared memory, no such port
+        yield
+        return
+    try:
+        deadline = time.monotonic() + (0.0 if _timed_out else TURN_TIMEOUT_S)
+        while not (locked := _lock(folder)) and time.monotonic() < deadline:
+            time.sleep(POLL_S)
+        _timed_out = not locked
+        yield
+    finally:
+        # A child that was forked meanwhile has the folder open, too: closing would not unlock it.
+        fcntl.flock(folder, fcntl.LOCK_UN)
+        os.close(folder)
+
+
+def _lock(folder: int) -> bool:
+    try:
+        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
