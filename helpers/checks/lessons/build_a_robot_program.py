@@ -381,6 +381,16 @@ def scanned(**seen):
     return ranges
 
 
+def scene(seen):
+    """Say what `scanned` is given: 1.5 m at 10 degrees to the left."""
+    sides = {'l': 'left', 'r': 'right'}
+    beams = [
+        f'{metres:g} m at {int(beam[1:])} degrees to the {sides[beam[0]]}'
+        for beam, metres in seen.items()
+    ]
+    return ' and '.join(beams) or 'nothing in sight'
+
+
 @tasks.add(3)
 def reach_and_speed(workspace):
     def reaches(*cases):
@@ -388,8 +398,14 @@ def reach_and_speed(workspace):
             function = module(workspace, 'logic').reach
             for seen, degrees, right in cases:
                 metres = function(scanned(**seen), np.radians(DEGREES), math.radians(degrees))
-                if not (isinstance(metres, float | int) and abs(metres - right) < 0.01):
-                    return f'with {seen}, {degrees} degrees: {metres}, not {right:.2f}'
+                if not isinstance(metres, float | int):
+                    kind = 'None' if metres is None else f'the type {type(metres).__name__}'
+                    return f'it returns {kind}, and no number'
+                if not abs(metres - right) < 0.01:
+                    return (
+                        f'with {scene(seen)}, the reach at {degrees} degrees is {metres:.2f}, '
+                        f'not {right:.2f}'
+                    )
             return True
 
         return test
@@ -556,8 +572,8 @@ def a_free_heading(workspace):
                 heading = function(scanned(**seen), np.radians(DEGREES), math.radians(wanted), far)
                 heading = heading if heading is None else round(math.degrees(heading))
                 if heading != right:
-                    scene = seen if len(seen) < 2 else 'a box 0.6 m ahead'
-                    return f'with {scene}, wanted {wanted} degrees: {heading}, not {right}'
+                    things = scene(seen) if len(seen) < 2 else 'a box 0.6 m ahead'
+                    return f'with {things}, wanted {wanted} degrees: {heading}, not {right}'
             return True
 
         return test
