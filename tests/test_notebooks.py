@@ -39,7 +39,11 @@ def test_each_task_has_answers_that_try_its_check(lesson):
     answers = yaml.load(file.read_text(), yaml.BaseLoader) if file.exists() else {}
     numbers = range(1, len(lesson.tasks) + 1)
     wanted = {f'{number} {kind}' for number in numbers for kind in ('wrong', 'right')}
-    assert answers.keys() == wanted, f'{file.name} beside tests/answers/test_answers.py says how.'
+    differ = ', '.join(sorted(answers.keys() ^ wanted))
+    assert not differ, (
+        f'tests/answers/{file.name} lacks these, or has too many: {differ}. The top of '
+        'tests/answers/test_answers.py says how answers are written.'
+    )
 
 
 def test_kernels_and_rules_read_the_same_tasks():

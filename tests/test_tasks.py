@@ -125,6 +125,25 @@ def test_what_it_prints_is_shown_and_bounded(capsys, number):
     assert sum(map(len, lines)) < 25_000
 
 
+@pytest.mark.parametrize(
+    ('points', 'sentence'),
+    [
+        (lambda answer: None, 'This task cannot be judged: its check returns no points'),
+        (lambda answer: [('it is 7', lambda: True)], "the point 'it is 7' of its check must be"),
+        (lambda answer: [('it is 7', True, '')], "the point 'it is 7' of its check must be"),
+        (lambda answer: answer.points, 'its check ended with AttributeError: '),
+    ],
+)
+def test_a_mistake_of_the_check_is_not_the_students(capsys, number, points, sentence):
+    tasks = Tasks()
+    tasks.add(number)(points)
+    tasks.check(number, 'an answer')
+    said = ' '.join(capsys.readouterr().out.split())
+    assert sentence in said
+    assert said.endswith(f'Task {number}: not judged.')
+    assert 'your code' not in said
+
+
 def test_interrupt_is_no_try(capsys, number, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt

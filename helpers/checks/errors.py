@@ -13,6 +13,7 @@ from pathlib import Path
 from types import FrameType
 
 HELPERS = str(Path(__file__).resolve().parents[1]) + os.sep
+LESSONS = os.path.join(HELPERS, 'checks', 'lessons') + os.sep
 INSTALLED = tuple(
     os.path.realpath(sysconfig.get_path(name)) + os.sep for name in ('stdlib', 'purelib', 'platlib')
 )
@@ -87,6 +88,9 @@ def sentence(error: BaseException) -> str:
         text = 'a function calls itself without end'
     elif isinstance(error, SystemExit):
         text = 'your code ends the program'
+    elif isinstance(error, NameError) and frames and frames[-1].filename.startswith(LESSONS):
+        where = f'line {frames[-1].lineno} of {os.path.basename(frames[-1].filename)}'
+        text += f'. It is the check that uses it, in {where}: import it there'
     elif isinstance(error, NameError) and error.name:
         text += '. Is it defined in the cell of the task, or in a cell above that has not run?'
     elif re.match(r'[A-Z]\w*\.\w+\(\) missing 1 required positional argument', text):

@@ -25,15 +25,18 @@ The function of a task gets what the student wrote, and returns its points: what
 and a hint, which appears at the second wrong try. A test is a function without arguments. It
 returns True, or a text that says what was found instead; whatever it raises is what was found. The
 points are judged in their order, in a process apart (see apart.py), so what a check does to the
-notebook's objects is undone when it ends.
+notebook's objects is undone when it ends. What the function itself raises is a mistake of the
+check: the task cannot be judged, and the verdict says in which line.
 """
 
 from __future__ import annotations
 
 import ast
 import inspect
+import os
 import threading
 import time
+import traceback
 from collections.abc import Callable, Sequence
 from functools import wraps
 from types import CodeType, FrameType
@@ -183,6 +186,8 @@ def _judge(
         if kind == 'points':
             verdict.points = [Point(what) for what, _ in content]
             hints = [hint for _, hint in content]
+        elif kind == 'mistake':
+            verdict.note = f'This task cannot be judged: {content}.'
         else:
             verdict.points[tried].ok, verdict.points[tried].found, names_line = content
             if names_line:
@@ -210,7 +215,11 @@ def _worker(points: Callable[[], Sequence[Test]], send: Callable) -> None:
         f'A thread of yours ended with {sentence(error.exc_value or error.exc_type())}'
     )
     threads = set(threading.enumerate())
-    tests = list(points())
+    try:
+        tests = _tests_of(points())
+    except Exception as error:  # of the check, not of the student
+        send(('mistake', _mistake(error)))
+        return
     send(('points', [(what, hint) for what, _, hint in tests]))
     for number, (_, test, _) in enumerate(tests):
         failures.clear()
@@ -236,6 +245,32 @@ def _worker(points: Callable[[], Sequence[Test]], send: Callable) -> None:
         send(('point', (ok, found, names_line)))
         if never_ends:
             break
+
+
+def _tests_of(points: object) -> list[Test]:
+    """Return the points that a check gave. Raises Failed if it cannot try them."""
+    tests = list(points) if points is not None else []
+    if not tests:
+        raise Failed('its check returns no points, as if a `return` were missing')
+    for point in tests:
+        if not (isinstance(point, tuple) and len(point) == 3 and callable(point[1])):
+            name = point[0] if isinstance(point, tuple) and point else point
+            raise Failed(
+                f'the point {name!r} of its check must be what is right, a test to call and a '
+                "hint, as in ('it keeps 7', lambda: keeps(7), 'Append it.')"
+            )
+    return tests
+
+
+def _mistake(error: Exception) -> str:
+    """Say what is wrong with a check that did not return its points, and in which line."""
+    if isinstance(error, Failed):
+        return str(error)
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    said = f'its check ended with {type(error).__name__}: {error}'
+    if frame.filename == __file__:  # what the notebook hands over is not what the check takes
+        return said
+    return f'{said}, in line {frame.lineno} of {os.path.basename(frame.filename)}'
 
 
 def _still_runs(thread: threading.Thread) -> str:

@@ -12,12 +12,12 @@ A file `<lesson>.yaml` beside this one has the answers of a lesson's tasks:
         self.publisher.publish(Twist(linear=Vector3(x=self.speed), angular=Vector3(z=self.turn)))
 
 An answer is the notebook's solution, edited: `old text: new text`. ` ... ` in the old text is
-whatever lies between, and a space is any white space. If the old text is not in the solution, the
-starter is edited. New lines are indented as the line in which the old text begins. An answer that
-has little in common with both is given as a whole, as text.
+whatever lies between, and a space is any white space. The solution must have each old text exactly
+once. If it has not, the starter is edited, which must. New lines are indented as the line in which
+the old text begins. An answer that has little in common with both is given as a whole, as text.
 
 YAML wants quotes around text that begins with a quote, a bracket or another sign of its own, or
-that has a colon or a # with a space in it.
+that has a colon with a space behind it, or a # with a space before it.
 """
 
 import re
@@ -51,7 +51,7 @@ def tasks_of(path: Path) -> set[int]:
 def source_of(answer: str | dict[str, str], *sources: str) -> str:
     """Return the source of an answer: its own text, or the first source that it can edit.
 
-    Raises ValueError if no source has each old text exactly once.
+    Raises ValueError with one sentence if no source has each old text exactly once.
     """
     if isinstance(answer, str):
         return answer
@@ -60,7 +60,13 @@ def source_of(answer: str | dict[str, str], *sources: str) -> str:
         if all(len(places) == 1 for places in found):
             edits = zip((place.span() for [place] in found), answer.values(), strict=True)
             return edited(source, list(edits))
-    raise ValueError(f'Neither the solution nor the starter has this exactly once: {list(answer)}')
+    counts = {old: [len(re.findall(pattern(old), source)) for source in sources] for old in answer}
+    found = [
+        f'`{old}` is {in_solution} times in the solution and {" or ".join(map(str, in_starter))} '
+        'times in the starter'
+        for old, (in_solution, *in_starter) in counts.items()
+    ]
+    raise ValueError(f'An old text must be there exactly once, but {"; ".join(found)}.')
 
 
 def pattern(old: str) -> str:
@@ -93,20 +99,27 @@ def judge(kernel: Kernel, answers: list, key: str, cells: dict[str, list[str]]) 
     """Run each answer, and its check twice: each time it must find of which kind the answer is."""
     kind = key.split()[1]
     assert len(answers) >= LEAST[kind], (
-        f'There are {len(answers)} answers "{key}", and at least {LEAST[kind]} are wanted.'
+        f'There are {len(answers)} answers below `{key}:`, and at least {LEAST[kind]} are wanted.'
     )
     starters = cells['exercise']
     files = starters if len(starters) > 1 else []  # the answer changes what they have written
     for answer in answers:
-        source = source_of(answer, *cells['solution'], *starters)
+        try:
+            source = source_of(answer, *cells['solution'], *starters)
+        except ValueError as error:
+            text = f'An answer below `{key}:` cannot be made. {error}'
+            raise pytest.fail.Exception(text, pytrace=False) from None
         said = run_all(kernel, files, [source])
         for _ in range(2):
             said += run_all(kernel, cells['check'])
             solved = [verdict['solved'] for verdict in kernel.verdicts]
             # A name that the answer does not define is an error of the cell, not a verdict.
-            assert solved == [kind == 'right'] or (kind == 'wrong' and not solved), (
-                f'Task {key} answer:\n{source}\nThe check said:\n{said}'
-            )
+            if solved != [kind == 'right'] and not (kind == 'wrong' and not solved):
+                pytest.fail(
+                    f'This answer stands below `{key}:`, and its check says something else.\n'
+                    f'{source}\n\nThe check said:\n{said}',
+                    pytrace=False,
+                )
 
 
 @pytest.mark.parametrize(
@@ -144,9 +157,9 @@ def test_check_judges_right_and_wrong_answers(lesson, task):
                     break
                 number += 1
         assert cells['solution'], f'The lesson {lesson} has no task {task}.'
-        run_all(kernel, cells['exercise'], cells['check'])
+        said = run_all(kernel, cells['exercise'], cells['check'])
         assert [verdict['solved'] for verdict in kernel.verdicts] == [False], (
-            'The starter is right.'
+            f'The starter must be wrong. Its check said:\n{said}'
         )
         judge(kernel, answers.get(f'{task} wrong', []), f'{task} wrong', cells)
         # What a right answer builds stays, so the solution comes after the wrong ones.

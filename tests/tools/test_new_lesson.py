@@ -78,6 +78,17 @@ def test_added_in_the_middle_and_at_the_end(tmp_path, capsys):
     assert changed == ['notebooks/00_start_here.ipynb']
 
 
+def test_a_lesson_that_git_does_not_know_is_not_taken_out(tmp_path, capsys):
+    copy = copied(tmp_path / 'copy')
+    assert new.main([MIDDLE], copy) == 0
+    git(copy, 'commit', '-qam', 'All but the new files')
+    capsys.readouterr()
+    assert new.main([MIDDLE, '--remove'], copy) == 1
+    error = capsys.readouterr().err
+    assert f'tests/answers/{MIDDLE}.yaml' in error
+    assert 'git add -A' in error
+
+
 @pytest.fixture(scope='module')
 def changed(tmp_path_factory):
     """A copy of this checkout with a change in the last lesson that is not committed."""

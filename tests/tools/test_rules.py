@@ -69,5 +69,11 @@ def test_a_cell_that_keeps_a_rule_is_left_alone(rule, cell):
     assert complaints(rule, cell) == []
 
 
+def test_what_is_wrong_with_a_solution_is_said():
+    points = [{'what': 'it is 7', 'ok': True}, {'what': 'it is 8', 'ok': False, 'found': '9'}]
+    assert rules.said([{'points': points}]) == ' "it is 8": 9'
+    assert rules.said([{'note': 'It cannot be judged.', 'points': []}]) == ' It cannot be judged.'
+
+
 def test_the_template_is_a_notebook_of_its_own():
     nbformat.validate(template())

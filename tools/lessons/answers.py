@@ -41,5 +41,9 @@ def _git(*arguments: str) -> str:
 if __name__ == '__main__':
     files = answered()
     if files:
-        print(f'Answers of yours are in {", ".join(files)}: not read by ruff.', file=sys.stderr)
+        print(
+            f'Answers of yours, or new tasks, are in {", ".join(files)}: ruff does not read these '
+            'until you commit them. `make lint` reads all.',
+            file=sys.stderr,
+        )
     print(', '.join(f"'notebooks/{file}'" for file in files))

@@ -177,8 +177,8 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
             plan = plan_to_remove(options.name, root)
         else:
             plan = plan_to_add(options.name, options.after, root)
-        if (plan.moved or plan.removed) and _git(root, 'status', '--porcelain', '-uno'):
-            raise ValueError('Commit your changes first: the new numbers would mix with them.')
+        if plan.moved or plan.removed:
+            _committed(root, plan)
         if plan.removed:
             _git(root, 'rm', '-q', *plan.removed)
         for old in _free_first(plan.moved):
@@ -200,6 +200,17 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
         print('Look at these lines, which name a lesson by its old number:', *lines, sep='\n')
     print(f'Now run `make notebooks LESSON={plan.run}`.')
     return 0
+
+
+def _committed(root: Path, plan: Plan) -> None:
+    """Raise ValueError if git could not bring back what the plan changes."""
+    back = '`git reset --hard` is then the way back.'
+    if _git(root, 'status', '--porcelain', '-uno'):
+        raise ValueError(f'Commit your changes first, with `git add -A`: {back}')
+    files = [*plan.removed, *map(_path, plan.moved)]
+    known = _git(root, 'ls-files', '-z', '--', *files).split('\0')
+    if new := [path for path in files if path not in known]:
+        raise ValueError(f'Commit {", ".join(new)} first, with `git add -A`: {back}')
 
 
 def _path(stem: str) -> str:

@@ -21,7 +21,7 @@ MAX_CODE_LINES = 24  # what a screen has room for
 PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 MIN_WORDS = 6  # of an alternative text
 TASK = ('exercise', 'check', 'solution')
-FOLDED = {'solution': '%%solution ', 'harness': '# ', 'notes': NOTE}
+FOLDED = {'solution': '%%solution ', 'notes': NOTE}
 TAGS = {'predict', 'nbval-ignore-output', 'deck-break', *TASK, *FOLDED}
 REASON = '# Not compared: '
 THIS_MACHINE = {str(Path(__file__).resolve().parents[2]), str(Path.home()), sys.prefix} - {'/'}
@@ -63,6 +63,16 @@ def verdicts(cell: NotebookNode) -> list[dict]:
     """Return what the checks of a cell found, as data."""
     data = [output.get('metadata', {}).get(KEY) for output in cell.outputs]
     return [verdict for verdict in data if verdict]
+
+
+def said(found: list[dict]) -> str:
+    """Return what verdicts say is not right, to follow a sentence."""
+    sentences = [verdict['note'] for verdict in found if verdict.get('note')]
+    for verdict in found:
+        for point in verdict['points']:
+            if not point['ok']:
+                sentences.append(f'"{point["what"]}": {point.get("found", "False")}')
+    return f' {"; ".join(sentences)}' if sentences else ''
 
 
 def alternative_texts(cell: NotebookNode) -> Iterator[str]:
@@ -211,7 +221,10 @@ def tagged(lesson: Lesson) -> Iterator[str]:
             yield f'{name} has the unknown tag {tag!r}.'
         folded = tags(cell) & FOLDED.keys()
         if ('jupyter' in cell.metadata) != bool(folded):
-            yield f'{name}: hide the source of a {", a ".join(FOLDED)}, and of nothing else.'
+            yield (
+                f'{name}: fold cells with the tag {" or ".join(FOLDED)}, by a click on the bar '
+                'at their left, and no others.'
+            )
         for tag in folded - {'notes'}:
             if not cell.source.startswith(FOLDED[tag]):
                 yield f'{name} has the tag {tag}: begin it with `{FOLDED[tag].strip()}`.'
@@ -304,9 +317,9 @@ def tasks_are_checked(lesson: Lesson) -> Iterator[str]:
             yield f'{name!r}: its solution must begin with `%%solution {count}`.'
         starters, solutions = verdicts(check), verdicts(solution)
         if [verdict['solved'] for verdict in starters] != [False]:
-            yield f'{name!r}: its check finds nothing missing in the starter.'
+            yield f'{name!r}: its check finds nothing missing in the starter.{said(starters)}'
         if [verdict['solved'] for verdict in solutions] != [True]:
-            yield f'{name!r}: its solution does not pass its check.'
+            yield f'{name!r}: its solution does not pass its check.{said(solutions)}'
     if sum(bool(tags(cell) & set(TASK)) for cell in lesson.notebook.cells) != inside:
         yield 'A cell has the tag of a task, but is under no "### ✎ Task".'
 
