@@ -9,6 +9,11 @@ JupyterLab keeps the id of a cell, and so do the lessons: a cell is found again 
 lesson by its name without its number. A cell, or another file, that only one side has changed is
 taken from that side. Where both have changed it, both are there.
 
+In version 0.2 the code of a check stood in the lesson, in folded cells, and `helpers` had other
+rooms. A cell of that version that a student has changed may no longer run: it is kept as text. In a
+folder of version 0.2 `make update` runs the program of version 0.2, which leaves such a cell as
+code: the next `make update` makes it text.
+
 Why no kept tool: of 200 histories drawn as in classroom/tests/test_update.py, nbdime 4.0.4 left
 conflict markers inside cells in 39 (strategy inline), or lost words in 5 (union). nbgitpuller keeps
 one side of a conflict only (`git merge -Xours`), and needs git.
@@ -30,23 +35,34 @@ import nbformat
 from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell, new_notebook
 
+from helpers.notebook import MARK
+
 ROOT = Path(__file__).resolve().parents[1]
 BASE = '.handed_out'  # beside the lessons: what was handed out
 APART = (BASE, '.git', 'wheels')
 LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # wherever they are
+# What nbformat and this program raise for a file that is no notebook, or has no ids.
+UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, nbformat.ValidationError)
 YOURS = '*Your version of the cell above, from before the update:*'
+NO_LONGER_RUNS = 'Your version, from before the update. It no longer runs: copy what you need.'
+# What was in version 0.2 only: the first line of each check, and the imports of each lesson.
+CHECK_OF_0_2 = '✔ Check of task'
+IMPORT_OF_0_2 = re.compile(r'^from helpers\.(classroom|session) import ', re.MULTILINE)
 
 
 def merge(base: NotebookNode, mine: NotebookNode, newer: NotebookNode) -> NotebookNode:
     """Return the newer notebook with what was written in `mine` since `base`.
 
     The order is that of the newer one. A cell that was added in `mine` follows the one that it
-    followed there. Outputs are those of `mine` if the source of a cell is the same.
+    followed there. Outputs are those of `mine` if the source of a cell is the same. Once a student
+    has saved the lesson, none are those of the repository.
     """
     old = {cell.id: cell.source for cell in base.cells}
     present = {cell.id for cell in mine.cells}
     merged = nbformat.from_dict(newer)
-    merged.cells = [c for c in newer.cells if c.id in present or old.get(c.id) != c.source]
+    if MARK not in mine.metadata:
+        _remove_outputs(merged)
+    merged.cells = [c for c in merged.cells if c.id in present or old.get(c.id) != c.source]
     at = 0  # where a cell goes that only `mine` has
     for cell in mine.cells:
         theirs = next((one for one in merged.cells if one.id == cell.id), None)
@@ -67,6 +83,13 @@ def merge(base: NotebookNode, mine: NotebookNode, newer: NotebookNode) -> Notebo
     return merged
 
 
+def _remove_outputs(notebook: NotebookNode) -> None:
+    notebook.metadata.pop(MARK, None)
+    for cell in notebook.cells:
+        if cell.cell_type == 'code':
+            cell.outputs, cell.execution_count = [], None
+
+
 def _changed(cell: NotebookNode, **changes: object) -> NotebookNode:
     return nbformat.from_dict({**cell, **changes})
 
@@ -81,7 +104,7 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
     for file in files_of(newer):
         target, own, old = mine / file, _found(mine / file), _found(base / file)
         data, was, now = (newer / file).read_bytes(), _bytes(old), _bytes(own)
-        if data == now == was or data == was and own == target:
+        if data == was and own == target:
             continue
         if now not in (None, was, data):
             try:
@@ -99,6 +122,63 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
         if not (newer / file).exists() and _bytes(mine / file) == _bytes(base / file):
             (mine / file).unlink(missing_ok=True)
     return said
+
+
+def keep_old_cells_as_text(mine: Path, newer: Path) -> list[str]:
+    """Turn cells of version 0.2 that no longer run into text; return a sentence for each lesson."""
+    said = []
+    for file in files_of(newer):
+        if file.suffix != '.ipynb' or _bytes(mine / file) in (None, _bytes(newer / file)):
+            continue
+        try:
+            own, lesson = (nbformat.read(folder / file, as_version=4) for folder in (mine, newer))
+            old = ids_of_0_2(own, lesson)
+        except UNREADABLE:
+            continue
+        if old:
+            _make_text(own, old)
+            data = (nbformat.writes(own) + '\n').encode()
+            _write(mine / file, data, (mine / file).stat().st_mode)
+            said.append(f'{file}: cells of yours that no longer run, now kept as text: {len(old)}.')
+    return said
+
+
+def ids_of_0_2(mine: NotebookNode, newer: NotebookNode) -> set[str]:
+    """Return the ids of cells of version 0.2 that a student has changed and that no longer run.
+
+    What supports a check (the tag `harness`) would even take the place of a function of the same
+    name that the lesson imports now.
+    """
+    ids, sources = ({cell[key] for cell in newer.cells} for key in ('id', 'source'))
+    found, above = set(), ''
+    for cell in mine.cells:
+        tags = cell.metadata.get('tags', [])
+        is_old = (
+            'harness' in tags
+            or ('check' in tags and CHECK_OF_0_2 in cell.source)
+            or (above == YOURS and IMPORT_OF_0_2.search(cell.source))
+        )
+        is_known = cell.id in ids or cell.source in sources
+        if cell.cell_type == 'code' and is_old and not is_known:
+            found.add(cell.id)
+        above = cell.source
+    return found
+
+
+def _make_text(notebook: NotebookNode, ids: set[str]) -> None:
+    """Turn cells of code into text that unfolds."""
+    cells = []
+    for cell in notebook.cells:
+        if cell.id in ids:
+            if cells and cells[-1].source == YOURS:
+                cells.pop()
+            longest = max(map(len, re.findall('`+', cell.source)), default=0)
+            fence = '`' * max(3, longest + 1)
+            code = f'{fence}python\n{cell.source}\n{fence}'
+            summary = f'<summary><em>{NO_LONGER_RUNS}</em></summary>'
+            cell = new_markdown_cell(f'<details>{summary}\n\n{code}\n\n</details>')
+        cells.append(cell)
+    notebook.cells = cells
 
 
 def files_of(folder: Path) -> list[Path]:
@@ -130,7 +210,7 @@ def _merged(base: Path, mine: Path, newer: Path) -> bytes:
         old = nbformat.read(base, as_version=4) if base.is_file() else new_notebook()
         notebooks = (nbformat.read(path, as_version=4) for path in (mine, newer))
         return (nbformat.writes(merge(old, *notebooks)) + '\n').encode()
-    except (LookupError, TypeError, AttributeError, nbformat.ValidationError) as problem:
+    except UNREADABLE as problem:
         raise ValueError from problem
 
 
@@ -149,6 +229,7 @@ def update_from_folder(newer: Path, mine: Path) -> list[str]:
     After an interruption the next update goes on: to merge once more changes nothing.
     """
     said = merge_folders(mine / BASE, mine, newer)
+    said += keep_old_cells_as_text(mine, newer)
     merge_folders(mine / BASE, mine / BASE, newer)
     return said
 
@@ -204,6 +285,7 @@ def update_from_git(mine: Path) -> list[str]:
             committed(mine, name, Path(folder, name[-4:])) for name in ('HEAD', '@{upstream}')
         )
         said = merge_folders(base, mine, newer)
+        said += keep_old_cells_as_text(mine, newer)
     _git(mine, 'The lessons are new, but git could not note it', 'reset', '@{upstream}')
     return said
 

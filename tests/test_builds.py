@@ -51,6 +51,12 @@ Traceback (most recent call last):
     setup(nam='robot')
 TypeError: a name is missing
 """
+COLCON_RUNS_SETUP = """\
+Traceback (most recent call last):
+  ...
+  File "<string>", line 9, in <module>
+NameError: name 'find_package' is not defined
+"""
 
 CMAKE_RUNS_PYTHON = """CMake Error at /opt/ros/rosidl_adapt_interfaces.cmake:57 (message):
   execute_process(/usr/bin/python -m rosidl_adapter)
@@ -102,6 +108,7 @@ gmake[2]: *** [build.make:76: rosidl_generator] Error 1
             "KeyError: 'sensor_msgs'. Line 160 of __init__.py: pkg_dir = include_map[pkg]",
         ),
         ("error: can't copy 'x': no such file", "error: can't copy 'x': no such file"),
+        (COLCON_RUNS_SETUP, "NameError: name 'find_package' is not defined. Line 9 of setup.py"),
         (TRACEBACK, "TypeError: a name is missing. Line 3 of setup.py: setup(nam='robot')"),
     ],
 )  # fmt: skip

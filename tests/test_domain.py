@@ -4,6 +4,7 @@ import contextlib
 import fcntl
 import os
 import random
+from pathlib import Path
 
 import pytest
 import rclpy
@@ -12,7 +13,7 @@ from rclpy.node import Node
 from support.nodes import LIMIT_S, Listener, spin
 from support.processes import run_python, running
 
-from helpers.ros import domain, graph_environment, ros_session
+from helpers.ros import domain, graph_environment, remove_dead_segments, ros_session
 from helpers.ros.domain import configure_discovery, reserve_domain_id
 
 
@@ -196,3 +197,16 @@ def test_participants_are_made_and_ended_in_turn(turn, monkeypatch):
         assert has(turn)
     assert has(turn)
     assert free == {('made', False), ('ended', False)}
+
+
+def test_what_a_killed_process_left_in_shared_memory_is_removed():
+    dead, living = (Path('/dev/shm', f'fastrtps_{number:016x}') for number in (os.getpid(), 1))
+    for name in dead, living:
+        name.touch()
+        Path(f'{name}_el').touch()
+    with open(f'{living}_el') as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH)
+        remove_dead_segments()
+        assert [dead.exists(), living.exists()] == [False, True]
+    remove_dead_segments()
+    assert not living.exists()

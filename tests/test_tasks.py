@@ -251,6 +251,13 @@ def test_a_cell_that_failed_is_not_judged_by_what_it_was_before():
         assert 'Found: it is 3' in kernel.run('check(1, two)')
 
 
+def test_a_check_before_its_task_says_what_to_run():
+    with Kernel() as kernel:
+        kernel.run(f'%load_ext helpers.notebook.kernel\nimport helpers.ros.session{LESSON}')
+        assert 'two is not there yet: run the cell of the task above' in kernel.run('check(1, two)')
+        assert 'not there yet' not in kernel.run('print(two)')
+
+
 def test_a_check_leaves_the_kernel_as_it_was():
     with Kernel() as kernel:
         kernel.run(LESSON.replace('two == 2', 'two.append(4)'))

@@ -516,9 +516,13 @@ def test_a_terminal_starts_clean_in_the_workspace(other, monkeypatch):
 
 def test_a_new_workspace_is_empty_and_ignored(other):
     other.write('src/a/b.txt', 'text')
+    other.write('build/made.txt', 'text')
     again = Workspace(other.path.name)
     assert again.path == other.path
     assert list(again.path.rglob('*')) == [again.path / 'src']
+    before = again.path.with_name(f'{again.path.name}.before')
+    assert (before / 'src/a/b.txt').read_text() == 'text'
+    assert not (before / 'build').exists()
     if again.path.is_relative_to(ROOT) and (ROOT / '.git').exists():
         subprocess.run(['git', 'check-ignore', '-q', again.path], cwd=ROOT, check=True)
 

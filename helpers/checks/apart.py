@@ -13,8 +13,8 @@ Three processes take part:
   also ends them when this process ends or is interrupted;
 - the child of the guard, the worker, runs the function.
 
-A worker opens a ROS session like any process: no session may be open when it is forked. It speaks
-UDP only, so that Fast DDS leaves no file in the shared memory when it is killed.
+A worker opens a ROS session like any process; a session that is still open here is closed before.
+What a killed worker leaves in shared memory is removed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from typing import NoReturn
 import psutil
 
 from helpers.notebook import uninterrupted
-from helpers.ros import speak_udp_only
+from helpers.ros import leave_ros, remove_dead_segments
 
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 POLL_S = 0.05
@@ -80,6 +80,7 @@ class Apart:
         self.ending = Ending('exit', 0)
 
     def __iter__(self) -> Iterator[object]:
+        leave_ros()
         messages, guards_end = Pipe(duplex=False)
         alive, hold = os.pipe()  # the guard reads its end when nobody holds the other one any more
         guard = _fork()
@@ -139,6 +140,9 @@ def _be_guard(
             workers_end.close()
             os.close(printer)
             ending = _watch(worker, limits, from_worker, printed, messages, alive, dump.fileno())
+        _end_all()
+        if ending.reason != 'done' or ending.left:
+            remove_dead_segments()
         _send(messages, ending)
     finally:
         _end_all()
@@ -275,7 +279,6 @@ def _be_worker(
         faulthandler.register(signal.SIGUSR1, file=dump, all_threads=True)
         _limit_memory()
         gc.freeze()  # the objects of the kernel: a collection would only copy their pages
-        speak_udp_only()
         _leave_kernel()
 
         def send(message: object, cpu_s: float = limits[0], limit_s: float = limits[1]) -> None:

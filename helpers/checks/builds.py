@@ -122,7 +122,8 @@ def _python_error(lines: Sequence[str]) -> str:
     last = numbers[-1]
     code = lines[last + 1] if last + 1 < len(lines) else ''
     code = code if code.startswith('    ') else ''
-    return _with_line(exception, places[last][2], places[last][1], code)
+    file = 'setup.py' if places[last][1] == '<string>' else places[last][1]  # colcon reads it
+    return _with_line(exception, places[last][2], file, code)
 
 
 def _with_line(text: str, number: str, file: str, code: str) -> str:
@@ -144,7 +145,7 @@ def data_files_of(workspace: Workspace, package: str) -> list[tuple[str, list[st
         check=False,
     )
     if asked.returncode:
-        raise Failed(compile_error(asked.stderr.replace('"<string>"', '"setup.py"')))
+        raise Failed(compile_error(asked.stderr))
     pairs = ast.literal_eval(asked.stdout.splitlines()[-1]) or []
     for pair in pairs:
         if not (

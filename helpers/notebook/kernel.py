@@ -15,8 +15,8 @@ NOT_RUN = (
     'This kernel has not run the first cells of the lesson: choose Run > Run All Above Selected '
     'Cell, then run this cell again.'
 )
-LATER_PART = re.compile(r'# ✔ Check of task \d+, part [2-9]')
-PARTS = 'Run all parts of this check in their order, from part 1 on.'
+CHECK = re.compile(r'check\(\d+,')
+NO_ANSWER = '{} is not there yet: run the cell of the task above, then this one again.'
 NO_GUESS = '{} is a guess: make it in its cell above, run that cell, then this one again.'
 
 
@@ -37,8 +37,8 @@ def load_ipython_extension(shell) -> None:
             print(NOT_RUN)
         elif (getattr(error, 'name', None) or '').startswith('my_'):
             print(NO_GUESS.format(error.name))
-        elif traceback.tb_next and LATER_PART.match(_first_line(traceback.tb_next)):
-            print(PARTS)
+        elif traceback.tb_next and CHECK.match(_first_line(traceback.tb_next)):
+            print(NO_ANSWER.format(error.name))
 
     shell.set_custom_exc((NameError, UsageError), explain)
 

@@ -2,13 +2,14 @@
 
 from helpers.ros.connections import NOT_OF_A_LESSON, nearly
 from helpers.ros.conversions import START_NS, quaternion, seconds_of, stamp_of, yaw_of
-from helpers.ros.domain import one_process_at_a_time, speak_udp_only
+from helpers.ros.domain import one_process_at_a_time, remove_dead_segments
 from helpers.ros.session import (
     Session,
     current_session,
     find,
     frames,
     graph_environment,
+    leave_ros,
     ros_session,
 )
 
@@ -20,12 +21,13 @@ __all__ = [
     'find',
     'frames',
     'graph_environment',
+    'leave_ros',
     'nearly',
     'one_process_at_a_time',
     'quaternion',
+    'remove_dead_segments',
     'ros_session',
     'seconds_of',
-    'speak_udp_only',
     'stamp_of',
     'yaw_of',
 ]

@@ -9,6 +9,7 @@ import os
 import socket
 import time
 from collections.abc import Iterator
+from pathlib import Path
 
 from helpers.ros.session_record import recorded
 
@@ -21,7 +22,6 @@ _reserved = contextlib.ExitStack()
 atexit.register(_reserved.close)
 _domain_id: int | None = None
 _timed_out = False  # the last wait for a turn timed out
-_transports: dict[str, str] = {}  # the variable that names them, if they are not the usual ones
 
 
 def reserve_domain_id() -> int:
@@ -97,19 +97,23 @@ def configure_discovery(discovery: str) -> None:
 def domain_variables(domain_id: int, discovery: str) -> dict[str, str]:
     """Return the variables with which another process hears this one."""
     variables = {'ROS_DOMAIN_ID': str(domain_id), 'ROS_AUTOMATIC_DISCOVERY_RANGE': discovery}
-    variables |= _transports
     if discovery == 'SUBNET' and 'ROS_STATIC_PEERS' in os.environ:
         variables['ROS_STATIC_PEERS'] = os.environ['ROS_STATIC_PEERS']
     return variables
 
 
-def speak_udp_only() -> None:
-    """Let this process, and those that it starts, use no shared memory: it may be killed.
+def remove_dead_segments() -> None:
+    """Remove what killed processes have left in shared memory, as `fastdds shm clean` does.
 
-    Whoever is killed leaves its segments in /dev/shm.
+    Fast DDS holds a lock on a file beside each segment and each port, as long as its owner lives.
     """
-    _transports['FASTDDS_BUILTIN_TRANSPORTS'] = 'UDPv4'
-    os.environ.update(_transports)
+    with one_process_at_a_time():  # nobody is just making one
+        for lock in Path(SHARED_MEMORY).glob('fastrtps_*_[es]l'):
+            with contextlib.suppress(OSError), lock.open('rb') as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                name = lock.name[:-3]
+                for left in (lock.name, name, f'sem.{name}_mutex'):
+                    Path(SHARED_MEMORY, left).unlink(missing_ok=True)
 
 
 @contextlib.contextmanager

@@ -38,7 +38,7 @@ try:
     from rclpy.node import Node
     from rclpy.publisher import Publisher
     from rclpy.service import Service
-    from rclpy.signals import SignalHandlerOptions
+    from rclpy.signals import SignalHandlerOptions, uninstall_signal_handlers
     from rclpy.subscription import Subscription
 
     from helpers.ros import connections, private
@@ -98,6 +98,18 @@ def graph_environment() -> dict[str, str]:
     return _open_session.environment
 
 
+def leave_ros() -> None:
+    """Close the open session, or end a bare rclpy.init() of the notebook, with rclpy's own thread.
+
+    Then this process can be forked: `rclpy.try_shutdown()` leaves a thread that waits for signals,
+    and a copy of this process, which has no such thread, would wait for its end for ever.
+    """
+    if _open_session is not None:
+        _open_session._clean_up()
+    rclpy.try_shutdown()
+    uninstall_signal_handlers()
+
+
 class SessionClosedError(Exception):
     """Raised in a callback that still waits, or loops without end, when its session closes."""
 
@@ -123,10 +135,7 @@ class Session:
         global _open_session
         if self._context is not None:
             raise RuntimeError('A session opens once: make a new one with `ros_session()`.')
-        if _open_session is not None:
-            _open_session._clean_up()
-        if rclpy.ok():  # a bare rclpy.init() of the notebook
-            rclpy.shutdown()
+        leave_ros()
         if self._domain_id is None:
             self._domain_id = reserve_domain_id()
         else:
@@ -364,6 +373,7 @@ class Session:
             self._rosout.close()
         self._failures += destroy_nodes(self._context)
         rclpy.try_shutdown()
+        uninstall_signal_handlers()
         self._shared.close()
         self._closed = True
         if _open_session is self:

@@ -32,7 +32,8 @@ SMALL_RCLCPP = Path(__file__).with_name('small_rclcpp')
 COLLEAGUE = Path(__file__).with_name('colleague.sh')
 CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
 
-EMPTY_AGAIN = 'The workspace is empty again: run the cells below this one again, too.'
+EMPTY_AGAIN = 'The workspace is empty again: run the cells below this one again, too. '
+EMPTY_AGAIN += 'What was in it is in {}.'
 
 _open_workspace: Workspace | None = None
 
@@ -73,14 +74,13 @@ class Workspace:
         # What the last sourcing gave, and the state of the folder `install` then.
         self._sourced: tuple[object, dict[str, str]] | None = None
         self._parts: dict[Path, list[str]] = {}  # of the files that several cells write
-        if self.path.exists():
-            with uninterrupted():  # rmtree makes an OSError of an Interrupt
-                shutil.rmtree(self.path)
-        (self.path / 'src').mkdir(parents=True)
+        with uninterrupted():  # rmtree makes an OSError of an Interrupt
+            kept = _put_aside(self.path) if underlay is None else None
+            shutil.rmtree(self.path, ignore_errors=True)
+            (self.path / 'src').mkdir(parents=True)
         if underlay is None:
-            again = _open_workspace is not None and _open_workspace.path == self.path
-            if again and somebody_watches():  # a second run without a student prints the same
-                print(EMPTY_AGAIN)
+            if kept and somebody_watches():  # a second run without a student prints the same
+                print(EMPTY_AGAIN.format(f'{kept.parent.name}/{kept.name}'))
             _open_workspace = self
         else:
             underlay._overlays[name] = self
@@ -296,6 +296,20 @@ class Workspace:
             process.stop()
         self._processes.clear()
         self.terminals.clear()
+
+
+def _put_aside(folder: Path) -> Path | None:
+    """Keep the files of a workspace beside it, without what was built. Return where they are.
+
+    A student may have worked on them, also in an editor, before the kernel was restarted.
+    """
+    for built in ('build', 'install', 'log'):
+        shutil.rmtree(folder / built, ignore_errors=True)
+    if not any(path.is_file() for path in folder.rglob('[!.]*')):
+        return None
+    kept = folder.with_name(f'{folder.name}.before')
+    shutil.rmtree(kept, ignore_errors=True)
+    return folder.rename(kept)
 
 
 def _state(install: Path) -> list[int]:

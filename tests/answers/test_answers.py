@@ -32,6 +32,7 @@ from support.kernel import NOTEBOOKS, Kernel
 from helpers.checks.progress import with_tasks
 
 HERE = Path(__file__).parent
+RUNS_COMMANDS = re.compile(r'check\(\d+, workspace, [A-Z]')  # a text of commands
 LEAST = {'wrong': 5, 'right': 3}  # answers of a task
 
 FILES = sorted(HERE.glob('*.yaml'))
@@ -117,7 +118,7 @@ def test_check_judges_right_and_wrong_answers(lesson, task):
     [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{lesson}.ipynb')
     answers = answers_of(HERE / f'{lesson}.yaml')
     cells = defaultdict(list)  # the cells of this task, by their tag
-    number = 1  # of the task that comes next
+    number, check = 1, ''  # of the task that comes next
     with Kernel() as kernel:
         for cell in nbformat.read(path, 4).cells:
             [tag] = {'exercise', 'check', 'solution'}.intersection(
@@ -129,8 +130,13 @@ def test_check_judges_right_and_wrong_answers(lesson, task):
                 cells[tag].append(
                     cell.source.split('\n', 1)[1] if tag == 'solution' else cell.source
                 )
+            elif tag == 'check' and RUNS_COMMANDS.match(cell.source):
+                check = cell.source
             elif tag == 'solution':
                 kernel.run(cell.source.split('\n', 1)[1])
+                if check:  # it clones or builds what the next tasks need
+                    kernel.run(check)
+                check = ''
             elif not tag:
                 kernel.run(cell.source)
             if tag == 'solution':

@@ -146,10 +146,12 @@ class LabPage:
 
 
 def printed(cell: dict[str, Any]) -> str:
-    """Return what a cell printed."""
-    return ''.join(
-        ''.join(output['text']) for output in cell['outputs'] if output['output_type'] == 'stream'
-    )
+    """Return what a cell printed or showed as text."""
+    texts = [
+        output.get('text') or output.get('data', {}).get('text/plain', '')
+        for output in cell['outputs']
+    ]
+    return ''.join(map(''.join, texts))
 
 
 def complaints(cell: dict[str, Any]) -> list[str]:

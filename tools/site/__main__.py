@@ -87,9 +87,9 @@ def is_widget(output: NotebookNode) -> bool:
 
 
 def _fold(cell: NotebookNode) -> None:
-    """Fold the source of a solution, of a check, and of what is folded in JupyterLab."""
-    if 'check' in tags(cell) or cell.metadata.get('jupyter', {}).get('source_hidden'):
-        kind = next(iter(tags(cell) & {'solution', 'check'}), 'code')
+    """Fold the source of what is folded in JupyterLab, such as a solution."""
+    if cell.metadata.get('jupyter', {}).get('source_hidden'):
+        kind = 'solution' if 'solution' in tags(cell) else 'code'
         cell.metadata['mystnb'] = {
             f'code_prompt_{verb}': f'{verb.capitalize()} the {kind}' for verb in ('show', 'hide')
         }

@@ -6,13 +6,13 @@ in simulated time and in this process, or as it is launched.
 
 import importlib
 import math
-import re
 import sys
 import time
 
 import numpy as np
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Log
+from rcl_interfaces.srv import GetParameters
 from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -20,11 +20,14 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import BatteryState, LaserScan
 from test_msgs.action import Fibonacci
 
-from helpers.checks.bench import STATUS
+from helpers.checks.bench import STATUS, Bench
+from helpers.checks.builds import build, builds
 from helpers.checks.planted import planted, run_tests
+from helpers.checks.programs import DIED, error_of_launch, started
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import CORRIDOR, EMPTY, ROOMS, Floor, Pose, Robot
 from helpers.ros import ros_session
+from helpers.workspace import without_folders
 
 tasks = Tasks()
 check = tasks.check
@@ -213,7 +216,7 @@ def launched(workspace, arguments, floor, order, seconds, seed=0):
         action = ActionClient(client, Fibonacci, 'patrol')
         session.spin(spun(client))
         with workspace.start(LAUNCH + arguments, 'program') as program:
-            if problem := _begun(program, action, robot):
+            if problem := _begun(workspace, program, action, robot):
                 return robot, problem
             sent = action.send_goal_async(Fibonacci.Goal(order=order))
             session.wait_until(sent.done)
@@ -228,11 +231,11 @@ def launched(workspace, arguments, floor, order, seconds, seed=0):
                     time.sleep(0.004)
                     robot.run(0)
                 if len(robot.record.commands) == before:
-                    return robot, f'a scan had no command. {printed(program.lines)}'
+                    return robot, f'a scan had no command. {printed(workspace, program.lines)}'
     return robot, STATUS[ended.result().status] if ended.done() else 'not ended'
 
 
-def _begun(program, action, robot):
+def _begun(workspace, program, action, robot):
     """Wait until the launched node is there. Return why it is not, or nothing."""
 
     def is_ready():
@@ -245,10 +248,10 @@ def _begun(program, action, robot):
         if 'process started' in text:
             begun_s = min(begun_s, time.monotonic())
         without = '[patrol-' not in text and time.monotonic() > begun_s + 10
-        if 'process has died' in text or without:
+        if DIED in text or without:
             break
     if not is_ready():
-        return f'no node patrol with an action came. {printed(program.lines)}'
+        return f'no node patrol with an action came. {printed(workspace, program.lines)}'
     if '[robot-' in ' '.join(program.lines):
         return 'with robot:=false it starts a robot'
     limit = time.monotonic() + 20
@@ -259,13 +262,11 @@ def _begun(program, action, robot):
     return ''
 
 
-def printed(lines):
+def printed(workspace, lines):
     """Return what a launched program printed of its first error, or its last line."""
-    wrong = r'Error|Exception|\[ERROR\]|has died|not found|neither|[Ii]nvalid|mismatched|No such'
-    errors = [line.strip() for line in lines if re.search(wrong, line)]
-    shown = (errors or [line.strip() for line in lines if line.strip()][-1:] or ['nothing'])[:2]
-    text = ' / '.join(re.sub(r'/\S*/(?=[^/\s]+)', '', line) for line in shown)
-    return f'ros2 launch printed: {text[:300]}'
+    text = without_folders('\n'.join(lines), workspace.path)
+    last = ['nothing', *(line for line in text.splitlines() if line.strip())][-1]
+    return f'ros2 launch printed: {error_of_launch(text) or last}'
 
 
 CELLAR = Floor.from_text(
@@ -317,9 +318,7 @@ def a_node_that_drives(workspace):
         return 0.7 < way < 0.9 or f'in 3 s it drove {way:.1f} m'
 
     def one_for_each_scan():
-        robot = drive(EMPTY, module(workspace, 'patrol').Patrol, 2)
-        scans, commands = len(robot.record.scans), len(robot.record.commands)
-        return scans - 2 <= commands <= scans or f'{commands} commands for {scans} scans'
+        return one_command_a_scan(drive(EMPTY, module(workspace, 'patrol').Patrol, 2))
 
     def has_command():
         with ros_session():
@@ -336,6 +335,12 @@ def a_node_that_drives(workspace):
         ('one command for each scan', one_for_each_scan, 'Publish in the callback of the scan.'),
         ('command(v, w)', has_command, 'twist.linear.x and twist.angular.z'),
     ]
+
+
+def one_command_a_scan(robot):
+    """Return whether as many commands came as scans, or else their numbers."""
+    scans, commands = len(robot.record.scans), len(robot.record.commands)
+    return scans - 2 <= commands <= scans or f'{commands} commands for {scans} scans'
 
 
 @tasks.add(2)
@@ -376,6 +381,16 @@ def scanned(**seen):
     return ranges
 
 
+def scene(seen):
+    """Say what `scanned` is given: 1.5 m at 10 degrees to the left."""
+    sides = {'l': 'left', 'r': 'right'}
+    beams = [
+        f'{metres:g} m at {int(beam[1:])} degrees to the {sides[beam[0]]}'
+        for beam, metres in seen.items()
+    ]
+    return ' and '.join(beams) or 'nothing in sight'
+
+
 @tasks.add(3)
 def reach_and_speed(workspace):
     def reaches(*cases):
@@ -383,8 +398,14 @@ def reach_and_speed(workspace):
             function = module(workspace, 'logic').reach
             for seen, degrees, right in cases:
                 metres = function(scanned(**seen), np.radians(DEGREES), math.radians(degrees))
-                if not (isinstance(metres, float | int) and abs(metres - right) < 0.01):
-                    return f'with {seen}, {degrees} degrees: {metres}, not {right:.2f}'
+                if not isinstance(metres, float | int):
+                    kind = 'None' if metres is None else f'the type {type(metres).__name__}'
+                    return f'it returns {kind}, and no number'
+                if not abs(metres - right) < 0.01:
+                    return (
+                        f'with {scene(seen)}, the reach at {degrees} degrees is {metres:.2f}, '
+                        f'not {right:.2f}'
+                    )
             return True
 
         return test
@@ -449,7 +470,7 @@ def stop_before_a_wall(workspace):
             if robot.bumps:
                 return 'it hits something'
             if fastest > 0.5001:
-                return f'it drives at {fastest:g} m/s'
+                return f'it drives at {fastest:.2g} m/s: more than 0.5'
             return 0.2 < ahead < near_m or f'it stands still {ahead:.1f} m from it'
 
         return test
@@ -551,8 +572,8 @@ def a_free_heading(workspace):
                 heading = function(scanned(**seen), np.radians(DEGREES), math.radians(wanted), far)
                 heading = heading if heading is None else round(math.degrees(heading))
                 if heading != right:
-                    scene = seen if len(seen) < 2 else 'a box 0.6 m ahead'
-                    return f'with {scene}, wanted {wanted} degrees: {heading}, not {right}'
+                    things = scene(seen) if len(seen) < 2 else 'a box 0.6 m ahead'
+                    return f'with {things}, wanted {wanted} degrees: {heading}, not {right}'
             return True
 
         return test
@@ -824,11 +845,9 @@ def the_whole_node(workspace):
 
     def stands(tour):
         speeds = tour.speeds(0.2)
-        scans = len(tour.robot.record.scans)
         if set(speeds) != {(0.0, 0.0)}:
             return f'it commands {sorted(set(speeds))[-1:] or "nothing"}'
-        count = len(tour.robot.record.commands)
-        return scans - 2 <= count <= scans or f'{count} commands for {scans} scans'
+        return one_command_a_scan(tour.robot)
 
     def two_places(tour):
         tour.send(2)
@@ -838,10 +857,11 @@ def the_whole_node(workspace):
         if tour.robot.bumps or tour.status() != 'SUCCEEDED':
             return f'{tour.status()} at {x:.1f}, {y:.1f}, bumps: {tour.robot.bumps}'
         if fastest > 0.5001:
-            return f'it drives at {fastest:g} m/s, and the speed is 0.5 at first'
+            return f'it drives at {fastest:.2g} m/s, and the speed is 0.5 at first'
         tour.run(1)
-        near = math.dist((x, y), ROOMS.places['C']) < 0.3
-        return (near and tour.robot.stopped) or f'at {x:.1f}, {y:.1f}'
+        if math.dist((x, y), ROOMS.places['C']) > 0.3 or not tour.robot.stopped:
+            return f'at {x:.1f}, {y:.1f}'
+        return one_command_a_scan(tour.robot)
 
     def cancel(tour):
         tour.send(2)
@@ -937,16 +957,10 @@ def the_route(workspace):
 
 @tasks.add(13, limit_s=90)
 def install_it(workspace):
-    @once
-    def build():
-        workspace.terminal('rm -rf build install')
-        return workspace.build('patrol_pkg')
-
-    def builds():
-        return build().ok or ' '.join(str(build().errors[-1]).split())
+    it_builds = once(lambda: builds(workspace, 'patrol_pkg'))
 
     def after_build(test):
-        return lambda: test() if build().ok else 'not judged: it does not build'
+        return lambda: test() if it_builds() is True else 'not judged: it does not build'
 
     def has_programs():
         lines = workspace.terminal(
@@ -968,6 +982,9 @@ def install_it(workspace):
         wanted = ['config/rooms.yaml', 'launch/planted.launch.xml']
         wanted += ['launch/patrol.launch.xml'] if launch_file.exists() else []
         missing = [name for name in wanted if not (share / name).is_file()]
+        if 'launch/planted.launch.xml' in missing:
+            missing = [name for name in missing if not name.startswith('launch/')]
+            missing += ['launch/planted.launch.xml, which the check has put into launch']
         return not missing or f'share/patrol_pkg has no {", no ".join(missing)}'
 
     def wants_pytest():
@@ -977,18 +994,19 @@ def install_it(workspace):
         given = workspace.terminal(f'cd {PACKAGE}; python -B .given.py; rm .given.py')
         return 'pytest' in given.partition('extras_require')[2] or 'extras_require has no pytest'
 
+    files = "('share/' + name + '/config', glob('config/*')), and the same for launch"
     return [
-        ('it builds', builds, "entry_points={'console_scripts': [...]}"),
+        ('it builds', it_builds, "entry_points={'console_scripts': [...]}"),
         ('two programs', after_build(has_programs), "'patrol = patrol_pkg.main:main'"),
-        ('its files', after_build(has_files), "('share/' + name + '/config', glob('config/*'))"),
-        ('pytest', wants_pytest, "extras_require={'test': ['pytest']}"),
+        ('its files', after_build(has_files), files),
+        ('pytest', after_build(wants_pytest), "extras_require={'test': ['pytest']}"),
     ]
 
 
 @tasks.add(14, limit_s=90, cpu_s=20)
 def one_file_starts_it(workspace):
     def drives_in_step():
-        workspace.build('patrol_pkg')
+        build(workspace, 'patrol_pkg')
         share = 'install/patrol_pkg/share/patrol_pkg/config/'
         for floor in ('short', 'corridor'):
             text = 'patrol:\n  ros__parameters:\n    route: [1.0, 0.0]\n'
@@ -1001,23 +1019,21 @@ def one_file_starts_it(workspace):
         return 0.7 < way < 1.1 or f'its route is 1 m long in short.yaml, and it drove {way:.0f} m'
 
     def starts_both():
-        outcomes = []
-        for arguments in ('', 'floor:=corridor'):
-            with workspace.start(LAUNCH + arguments, 'both') as both:
-                limit = time.monotonic() + 20
-                while both.running and time.monotonic() < limit:
-                    text = '\n'.join(both.lines)
-                    if 'drives on the floor' in text or 'process has died' in text:
-                        break
-                    time.sleep(0.05)
-            text = '\n'.join(both.lines)
-            if 'drives on the floor' not in text:
-                return f'with {arguments or "no argument"} no robot drives. {printed(both.lines)}'
-            floor = text.partition('drives on the floor ')[2].partition('.')[0]
-            outcomes.append((text.count('process started'), floor))
-        right = [(2, 'rooms'), (2, 'corridor')]
-        text = f'programs and floor: {outcomes[0]}, with floor:=corridor {outcomes[1]}'
-        return outcomes == right or text
+        for arguments, floor in (('', 'rooms'), ('floor:=corridor', 'corridor')):
+            named = f'with {arguments or "no argument"}'
+            text, sim = launched_with_robot(workspace, arguments)
+            if DRIVES not in text:
+                return f'{named} no robot drives. {printed(workspace, text.splitlines())}'
+            if started(text) != ['patrol', 'robot']:
+                return f'{named} it starts {" and ".join(started(text))}'
+            if DIED in text:
+                return f'{named} a program dies. {printed(workspace, text.splitlines())}'
+            driven = text.partition(DRIVES)[2].partition('.')[0]
+            if driven != floor:
+                return f'{named} the robot drives on the floor {driven}'
+            if sim is not False:
+                return f'{named} the parameter use_sim_time of the node patrol is {sim}'
+        return True
 
     hint = '<param from="$(dirname)/../config/$(var floor).yaml"/>'
     own = 'if="$(var robot)", $(var floor)'
@@ -1025,6 +1041,27 @@ def one_file_starts_it(workspace):
         ('the program drives a robot that runs already', drives_in_step, hint),
         ('it starts its own robot on the floor', starts_both, own),
     ]
+
+
+DRIVES = 'drives on the floor '
+
+
+def launched_with_robot(workspace, arguments):
+    """Launch the program and its own robot. Return what it prints, and patrol's use_sim_time.
+
+    This is None if a program is missing or has died.
+    """
+    with Bench() as bench, workspace.start(LAUNCH + arguments, 'both') as both:
+
+        def text():
+            return '\n'.join(both.lines)
+
+        bench.wait(lambda: DRIVES in text() or DIED in text() or not both.running, 20)
+        if started(text()) != ['patrol', 'robot'] or DIED in text():
+            return text(), None
+        request = GetParameters.Request(names=['use_sim_time'])
+        answer = bench.call('/patrol/get_parameters', GetParameters, request, limit_s=10)
+        return text(), answer and answer.values[0].bool_value
 
 
 # --- Tests, and what they test: right programs, and wrong ones

@@ -10,6 +10,7 @@ from lifecycle_msgs.srv import GetState
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from helpers.checks.bench import Bench
+from helpers.checks.builds import build
 from helpers.checks.planted import planted, run_tests
 from helpers.checks.tasks import Tasks, once
 
@@ -298,10 +299,7 @@ def without_run(text):
 @tasks.add(6, limit_s=90)
 def run_them(workspace):
     def is_run():
-        workspace.terminal('rm -rf build install')
-        result = workspace.build()
-        if not result.ok:
-            return str(result.errors[-1])
+        build(workspace, 'brake_pkg', anew=True)
         file = f'{PACKAGE}/test/test_planted.py'
         workspace.write(file, 'def test_planted():\n    assert 1 == 2\n')
         summary = workspace.terminal(
