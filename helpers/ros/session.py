@@ -56,6 +56,7 @@ BREAK_OFF_S = 1.0
 LOG_NODE = '_session_log'
 POLL_S = 0.01
 QUIET_ROUNDS = 20
+QUIET_POLL_S = 0.001  # a round is an empty task of the executor, and takes less than this
 SAY_AFTER_S = 5.0
 MADE_BY_NODES = Publisher, Subscription, Client, Service
 # What rclpy raises for a thing that is destroyed, and for one that was only half made.
@@ -241,8 +242,9 @@ class Session:
         timeout_s: float = 30.0,
         progress: Callable[[], float] | None = None,
         status: Callable[[], str] | None = None,
+        poll_s: float = POLL_S,
     ) -> None:
-        """Wait until the predicate holds.
+        """Wait until the predicate holds. It is asked every `poll_s` seconds.
 
         `progress` returns the part that is done, 0 to 1. It is shown as a bar once the wait has
         taken 2 s; the bar disappears at the end. `status` returns a sentence on what has come.
@@ -270,7 +272,7 @@ class Session:
                     explained = True
                     if self._findings():
                         bar.say(self._why(f'Waited {SAY_AFTER_S:g} s so far.', status))
-                pause.wait(POLL_S)
+                pause.wait(poll_s)
 
     def _why(self, first: str, status: Callable[[], str] | None) -> str:
         none = ['Everything that was made is connected and spins, and no callback waits.']
@@ -306,10 +308,10 @@ class Session:
             elif task.done():
                 task, rounds = executor.create_task(int), rounds + 1
             elif 'free' not in states:
-                rounds += 1
+                rounds += QUIET_POLL_S / POLL_S  # an answer may be on its way: 0.2 s
             return rounds >= QUIET_ROUNDS
 
-        self.wait_until(is_quiet, timeout_s)
+        self.wait_until(is_quiet, timeout_s, poll_s=QUIET_POLL_S)
         return 'free' in states
 
     # --- The log
