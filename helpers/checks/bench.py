@@ -195,7 +195,8 @@ class Bench:
         free = True
         executors = [*self._executors, self._own_executor] if executor is None else [executor]
         for _ in executors:  # what one sends may be for one that was quiet before
-            free = all([self._wait_until_quiet(each, limit_s) for each in executors])
+            states = [self._wait_until_quiet(each, limit_s) for each in executors]
+            free = all(states)
         return free
 
     def _wait_until_quiet(self, executor: Executor, limit_s: float) -> bool:
