@@ -73,6 +73,7 @@ def execute(notebook: NotebookNode, folder: Path) -> NotebookNode:
         # Under nbval ipykernel sees this variable, and leaves output written at C level alone.
         'PYTEST_CURRENT_TEST': 'tools/lessons/run.py',
         FILE_VARIABLE: '',  # what is saved is the table of a reader who has solved nothing
+        'PYTHONPATH': str(folder.resolve().parent),  # the checks of this checkout
     }
     try:
         with tempfile.TemporaryFile() as from_c:
