@@ -44,6 +44,7 @@ DOCUMENTS = (
     'teaching',
     *CLASSROOM,
     'CONTRIBUTING',
+    'ros2/README',
     'tools/UPGRADING',
 )
 FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
