@@ -25,7 +25,7 @@ def test_run_all_and_move_a_slider(lab):
         drawn = shown.query_selector_all('.replay svg')  # by the script of a replay
         asked = [o for o in cell.get('outputs', []) if '<img ' in str(o.get('data', {}))]
         assert len(images) + len(drawn) >= len(asked)
-    cell = lab.show(lab.find('interactive_output'))
+    cell = lab.show(lab.find('model_with_sliders('))
     picture = cell.query_selector('.jp-RenderedHTML img')
     before = picture.get_attribute('src')
     lab.screenshot('slider_before')
