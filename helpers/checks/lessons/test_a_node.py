@@ -45,6 +45,16 @@ def all_pass(runs, names):
     return test
 
 
+def run_ours(workspace, name, source, module, versions):
+    """Run tests of ours beside the student's, each with its version. Their file goes again."""
+    file = workspace.file(f'{PACKAGE}/test/{name}')
+    file.write_text(source)
+    try:
+        return run_tests(workspace, PACKAGE, f'test/{name}', module, versions, only=True)
+    finally:
+        file.unlink()
+
+
 # --- Task 1: a function
 
 SPEED = """import math
@@ -131,14 +141,8 @@ def test_again_ends():
 def a_domain_of_its_own(workspace):
     @once
     def runs():
-        workspace.write(f'{PACKAGE}/test/alone.py', ALONE)
         versions = {'alone': BRAKE, 'again': BRAKE}
-        try:
-            return run_tests(
-                workspace, PACKAGE, 'test/alone.py', 'brake_pkg.brake', versions, only=True
-            )
-        finally:
-            workspace.file(f'{PACKAGE}/test/alone.py').unlink()
+        return run_ours(workspace, 'alone.py', ALONE, 'brake_pkg.brake', versions)
 
     def passes(name):
         return lambda: runs()[name].passes or f'with our test, {runs()[name].says}'
@@ -243,12 +247,8 @@ def test_waits(ticks, wanted, limit_s):
 def wait_for_an_event(workspace):
     @once
     def runs():
-        workspace.write(f'{PACKAGE}/test/our_waits.py', WAITS)
         versions = dict.fromkeys(('events', 'at_once', 'in_vain'), '')
-        try:
-            return run_tests(workspace, PACKAGE, 'test/our_waits.py', 'none', versions, only=True)
-        finally:
-            workspace.file(f'{PACKAGE}/test/our_waits.py').unlink()
+        return run_ours(workspace, 'our_waits.py', WAITS, 'none', versions)
 
     def passes(name):
         return lambda: runs()[name].passes or f'with our test, {runs()[name].says}'
@@ -406,14 +406,8 @@ OUR_TESTS = {
 def a_brake_with_a_lifecycle(workspace):
     @once
     def runs():
-        workspace.write(f'{PACKAGE}/test/ours.py', OURS)
         versions = {name: '' for name, _ in OUR_TESTS.values()}
-        try:
-            return run_tests(
-                workspace, PACKAGE, 'test/ours.py', 'brake_pkg.brake', versions, only=True
-            )
-        finally:
-            workspace.file(f'{PACKAGE}/test/ours.py').unlink()
+        return run_ours(workspace, 'ours.py', OURS, 'brake_pkg.brake', versions)
 
     def passes(name):
         def test():
