@@ -1,0 +1,24 @@
+"""What the tasks of this lesson are judged by."""
+
+from std_msgs.msg import Int32
+
+from helpers.checks.bench import Bench
+from helpers.checks.tasks import Tasks
+
+tasks = Tasks()
+check = tasks.check
+
+
+@tasks.add(1)
+def hear_the_numbers(Listener):
+    def keeps(*numbers):
+        with Bench() as bench:
+            listener = bench.spin(Listener())
+            bench.say('number', *(Int32(data=number) for number in numbers))
+        return listener.heard == [*numbers] or f'of {[*numbers]} it kept {listener.heard}'
+
+    hint = 'A list has .append(...), and an Int32 has .data.'
+    return [
+        ('it keeps two numbers in order', lambda: keeps(3, 1), hint),
+        ('it keeps one number', lambda: keeps(7), hint),
+    ]
