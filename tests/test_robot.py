@@ -9,14 +9,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from helpers.fusion import simulate
-from helpers.robot import CORRIDOR, EMPTY, ROOMS, Floor, Pose
+from helpers.robot import CORRIDOR, EMPTY, KIND, ROOMS, Floor, Pose
 from helpers.robot.body import (
     MAX_ACCELERATION,
     MAX_SPEED,
     MAX_TURN,
     RADIUS_M,
     RATE_HZ,
-    WATCHDOG_S,
     Body,
     arc,
 )
@@ -73,7 +72,7 @@ def test_it_stops_half_a_second_after_the_last_command():
         assert body.v == 0.5
         body.step()
     started_to_brake = body.t_s - 1 / RATE_HZ
-    assert started_to_brake - last == pytest.approx(WATCHDOG_S)
+    assert started_to_brake - last == pytest.approx(KIND.command_timeout_s)
     while body.v:
         body.step()
     assert body.t_s - started_to_brake == pytest.approx(0.5 / MAX_ACCELERATION)
@@ -122,9 +121,10 @@ def test_at_its_range_is_a_wall_and_before_it_none(place, yaw):
 
 
 def test_the_beams_go_from_right_to_left():
-    scan = Sensors(0, False, None).scan(Body(CORRIDOR))
+    scan, first, step = Sensors(0, False, None).scan(Body(CORRIDOR))
+    assert (first, step) == pytest.approx((-math.pi / 2, math.radians(1)))
     assert scan[[0, 90, 180]] == pytest.approx([0.75, 3.25, 0.75])
-    nothing = Sensors(0, True, None).scan(Body(EMPTY))
+    nothing, _, _ = Sensors(0, True, None).scan(Body(EMPTY))
     assert nothing.dtype == np.float32
     assert np.isposinf(nothing).all()
 

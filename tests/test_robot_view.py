@@ -77,7 +77,7 @@ def long_drive():
         record.poses.append(Step(body.t_s, *body.pose, body.v, body.w))
         if step % 5 == 0:
             record.commands.append(command)
-            record.scans.append(Scan(len(record.scans), body.t_s, 0, sensors.scan(body)))
+            record.scans.append(Scan(len(record.scans), body.t_s, 0, *sensors.scan(body)))
         if body.bumps > before:
             record.events.append(Event(body.t_s, 'bump', f'It hit something in step {step}.'))
     return record

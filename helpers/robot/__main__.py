@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.utilities import remove_ros_args
 
 from helpers.robot import FLOORS, Floor, Robot
+from helpers.robot.drivers import DRIVERS
 
 
 def main() -> None:
@@ -18,14 +20,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog='python -m helpers.robot', description=__doc__)
     parser.add_argument('--floor', default='empty', help=f'{", ".join(FLOORS)}, or a text file')
     parser.add_argument('--seed', type=int, default=0, help='decides the errors of the sensors')
+    parser.add_argument('--driver', default='kind', choices=DRIVERS, help='how it speaks')
+    parser.add_argument(
+        '--habit',
+        action='append',
+        default=[],
+        metavar='NAME=VALUE',
+        help='another habit of its drivers, such as command_timeout_s=null (the value is JSON)',
+    )
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     try:
+        habits = dict(habit.split('=', 1) for habit in options.habit)
+        habits = {name: json.loads(value) for name, value in habits.items()}
+        driver = DRIVERS[options.driver].but(**habits)
         floor = FLOORS.get(options.floor) or Floor.from_text(Path(options.floor).read_text())
     except (OSError, ValueError) as error:
         parser.error(str(error))
     rclpy.init(args=sys.argv)
     try:
-        robot = Robot(floor, seed=options.seed, spin=False)
+        robot = Robot(floor, seed=options.seed, driver=driver, spin=False)
         print(f'The robot drives on the floor {floor.name}.', flush=True)
         rclpy.spin(robot)
     except ValueError as error:

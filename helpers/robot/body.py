@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from helpers.robot.drivers import KIND, Driver
 from helpers.robot.floor import Floor, Pose
 from helpers.robot.record import Command
 
 RATE_HZ = 50
-RADIUS_M = 0.11  # a disc; a TurtleBot 3 Burger has 0.105 m
-MAX_SPEED = 1.0  # m/s; a TurtleBot 3 Waffle has 0.26, which is slow to look at
-MAX_TURN = 1.82  # rad/s, as a Waffle
+# Of the course's robot: a TurtleBot 3 Burger is as large, and drives 0.2 m/s, slow to look at.
+RADIUS_M, MAX_SPEED, MAX_TURN = KIND.radius_m, KIND.max_speed, KIND.max_turn
 # Nav2 drives a TurtleBot 3 with these limits: acc_lim_x and acc_lim_theta of its parameters.
 MAX_ACCELERATION = 2.5  # m/s^2
 MAX_TURN_ACCELERATION = 3.2  # rad/s^2
-WATCHDOG_S = 0.5
 FREE_AGAIN_M = 0.005  # so far from what it touched, the next touch is another bump
 
 
@@ -25,18 +24,18 @@ class Body:
     A step changes speed and turning rate towards the last command, as fast as the limits allow. It
     drives an arc with their means over the step: so a straight start or stop is exactly
     v^2 / (2 a) long. Where it would enter a wall it goes as far as to touch it, and stops; it can
-    still turn, and drive away. 0.5 s after the last command it brakes.
+    still turn, and drive away. When its drivers no longer count a command, it brakes.
 
     A step ends outside of all walls. One that only grazes a corner on its way, by less than half a
     millimetre, is free. It does not slide, tip or push: that is the work of a physics engine.
     """
 
-    def __init__(self, floor: Floor, start: Pose | None = None) -> None:
-        self.floor, self.pose = floor, start or floor.start
-        if not floor.clearance(self.pose.x, self.pose.y) >= RADIUS_M:
+    def __init__(self, floor: Floor, start: Pose | None = None, driver: Driver = KIND) -> None:
+        self.floor, self.pose, self.driver = floor, start or floor.start, driver
+        if not floor.clearance(self.pose.x, self.pose.y) >= driver.radius_m:
             raise ValueError(
                 f'The robot would start in a wall at {self.pose.x:g}, {self.pose.y:g} m: choose a '
-                f'start that is {RADIUS_M} m or more from all walls and boxes.'
+                f'start that is {driver.radius_m} m or more from all walls and boxes.'
             )
         self.step_number = 0
         self.v = self.w = self.ax = 0.0
@@ -53,14 +52,15 @@ class Body:
 
     def step(self, commands: Iterable[Command] = ()) -> None:
         """Move on by a step. `commands` have arrived since the last one; the last one counts."""
-        for command in commands:
-            self.command, self.watched = command, False
+        for t_s, v, w in commands:
+            self.command = Command(t_s, self.driver.heard(v), self.driver.heard(w))
+            self.watched = False
         now_s, (_, v, w) = self.t_s, self.command
-        if now_s - self.command.t_s >= WATCHDOG_S:
+        if now_s - self.command.t_s >= self.driver.timeout_s:
             self.watched, v, w = math.isfinite(self.command.t_s), 0.0, 0.0
         old_v, old_w = self.v, self.w
-        self.v = _towards(old_v, _within(v, MAX_SPEED), MAX_ACCELERATION / RATE_HZ)
-        self.w = _towards(old_w, _within(w, MAX_TURN), MAX_TURN_ACCELERATION / RATE_HZ)
+        self.v = _towards(old_v, _within(v, self.driver.max_speed), MAX_ACCELERATION / RATE_HZ)
+        self.w = _towards(old_w, _within(w, self.driver.max_turn), MAX_TURN_ACCELERATION / RATE_HZ)
         self._move((old_v + self.v) / 2, (old_w + self.w) / 2)
         self.ax = (self.v - old_v) * RATE_HZ
         self.step_number += 1
@@ -72,7 +72,7 @@ class Body:
             self.pose = arc(self.pose, v, w, 1 / RATE_HZ)
             return
         end = arc(self.pose, v, w, 1 / RATE_HZ)
-        gap = self.floor.clearance(end.x, end.y) - RADIUS_M
+        gap = self.floor.clearance(end.x, end.y) - self.driver.radius_m
         if gap >= 0 or not length:
             self.touching = self.touching and gap < FREE_AGAIN_M
             self.pose, self._free_m = end, max(0.0, gap)
@@ -80,7 +80,7 @@ class Body:
         free, blocked = 0.0, 1.0  # parts of the step
         while (half := (free + blocked) / 2) not in (free, blocked):
             at = arc(self.pose, v, w, half / RATE_HZ)
-            if self.floor.clearance(at.x, at.y) >= RADIUS_M:
+            if self.floor.clearance(at.x, at.y) >= self.driver.radius_m:
                 free = half
             else:
                 blocked = half

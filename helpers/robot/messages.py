@@ -12,8 +12,10 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan, NavSatFix, NavSatStatus
 from std_msgs.msg import Header
 
+from helpers.robot.drivers import Driver
 from helpers.robot.floor import Floor, Pose
-from helpers.robot.sensors import ANGLES, RANGE_MAX, RANGE_MIN, VARIANCES
+from helpers.robot.record import Scan
+from helpers.robot.sensors import RANGE_MAX, RANGE_MIN, VARIANCES
 from helpers.ros import quaternion, stamp_of
 
 DATUM = 10.7769, 106.7009, 0.0  # where x, y = 0, 0 is: degrees north and east, m. As in lesson 16
@@ -63,20 +65,26 @@ def _six_by_six(covariance: np.ndarray) -> np.ndarray:
     return full.ravel()
 
 
-def odometry(header: Header, child_frame: str, pose: Pose, readings: dict[str, float]) -> Odometry:
+def odometry(
+    header: Header, child_frame: str, pose: Pose, readings: dict[str, float], driver: Driver
+) -> Odometry:
     """Return where the wheels think that the robot is, in their own frame, and how fast."""
     state = *pose, readings['vx'], 0.0, readings['vyaw']
     message = odometry_message(0.0, header.frame_id, state, POSE_COVARIANCE, TWIST_COVARIANCE)
     message.header, message.child_frame_id = header, child_frame
+    if driver.zero_covariance:
+        message.pose.covariance = message.twist.covariance = np.zeros(36)
     return message
 
 
-def imu(header: Header, readings: dict[str, float]) -> Imu:
+def imu(header: Header, readings: dict[str, float], driver: Driver) -> Imu:
     """Return what the IMU says. At rest it feels gravity, upwards."""
     message = Imu(header=header, orientation=quaternion(0, 0, readings['imu_yaw']))
     message.angular_velocity.z = readings['imu_vyaw']
     acceleration = message.linear_acceleration
     acceleration.x, acceleration.y, acceleration.z = readings['ax'], readings['ay'], 9.81
+    if driver.zero_covariance:
+        return message
     message.orientation_covariance = VARIANCES['imu_yaw'] * np.eye(3).ravel()
     message.angular_velocity_covariance = VARIANCES['imu_vyaw'] * np.eye(3).ravel()
     message.linear_acceleration_covariance = VARIANCES['ax'] * np.eye(3).ravel()
@@ -96,23 +104,35 @@ def fix(header: Header, readings: dict[str, float]) -> NavSatFix:
     return message
 
 
-def laser_scan(header: Header, ranges: np.ndarray) -> LaserScan:
+def laser_scan(header: Header, scan: Scan, driver: Driver) -> LaserScan:
     """Return a scan. All its beams are of the same moment."""
+    ranges = RANGE_MIN, RANGE_MAX
+    if driver.laser == 'ld08':
+        ranges = 0.0, 100.0  # not those of the sensor: so says its driver
     return LaserScan(
         header=header,
-        angle_min=float(ANGLES[0]),
-        angle_max=float(ANGLES[-1]),
-        angle_increment=math.radians(1),
+        angle_min=scan.first,
+        angle_max=scan.first + scan.step * (len(scan.ranges) - 1),
+        angle_increment=scan.step,
         scan_time=0.1,
-        range_min=RANGE_MIN,
-        range_max=RANGE_MAX,
-        ranges=array('f', ranges.tobytes()),
+        range_min=ranges[0],
+        range_max=ranges[1],
+        ranges=array('f', scan.ranges.tobytes()),
     )
 
 
-def battery(header: Header, t_s: float) -> BatteryState:
+def battery(header: Header, t_s: float, driver: Driver) -> BatteryState:
     """Return the battery's state: it is empty after two and a half hours."""
     left = max(0.0, 1 - t_s / LASTS_S)
+    if driver.battery_percent:
+        voltage = EMPTY_V + left * (FULL_V - EMPTY_V)
+        return BatteryState(
+            header=header,
+            present=True,
+            percentage=100 * left,
+            voltage=voltage,
+            design_capacity=CAPACITY_AH,
+        )
     message = BatteryState(header=header, present=True, percentage=left)
     message.voltage = EMPTY_V + left * (FULL_V - EMPTY_V)
     message.charge, message.current = CAPACITY_AH * left, -CAPACITY_AH * 3600 / LASTS_S

@@ -31,12 +31,29 @@ class Command(NamedTuple):
 
 
 class Scan(NamedTuple):
-    """A scan: its number, the stamp of its message, and its ranges (181,), float32, in m."""
+    """A scan: its number, the stamp of its message, and its ranges (beams,), float32, in m.
+
+    Beam k looks `first + k * step` (rad) to the left.
+    """
 
     seq: int
     t_s: float
     stamp_ns: int
     ranges: np.ndarray
+    first: float
+    step: float
+
+    def drawn(self, count: int, most_m: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return angles and ranges (count,) for a picture, from the right to the left.
+
+        What is unknown is 0 there, and what is farther than `most_m` ends there.
+        """
+        angles = self.first + self.step * np.arange(len(self.ranges))
+        turned = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
+        order = np.argsort(turned, kind='stable')
+        few = order[np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)]
+        known = np.nan_to_num(self.ranges[few], nan=0.0, posinf=most_m, neginf=0.0)
+        return turned[few], known.clip(0, most_m)
 
 
 class Event(NamedTuple):

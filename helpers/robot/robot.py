@@ -6,14 +6,16 @@ import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 
+import numpy as np
 from builtin_interfaces.msg import Time as Stamp
-from geometry_msgs.msg import TransformStamped, Twist
+from geometry_msgs.msg import TransformStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import Executor, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import BatteryState, Image, Imu, LaserScan, NavSatFix
@@ -23,22 +25,13 @@ from std_srvs.srv import Trigger
 from helpers.notebook import uninterrupted
 from helpers.robot import messages
 from helpers.robot.body import RATE_HZ, Body, wrapped
+from helpers.robot.drivers import KIND, Driver
 from helpers.robot.floor import EMPTY, Floor, Pose
 from helpers.robot.record import Command, DriveRecord, Event, Scan, Step
 from helpers.robot.sensors import Sensors
 from helpers.ros import START_NS, current_session, quaternion
 
-# RELIABLE, which both kinds of subscriptions hear, as a TurtleBot 3 in Gazebo has it. The drivers
-# of its real lasers are BEST_EFFORT.
-TOPICS = {
-    'odom': Odometry,
-    'imu/data': Imu,
-    'gps/fix': NavSatFix,
-    'scan': LaserScan,
-    'battery_state': BatteryState,
-    'camera/image_raw': Image,
-    'bumper': Bool,
-}
+GPS, CAMERA, BUMPER = 'gps/fix', 'camera/image_raw', 'bumper'
 SCAN_EVERY, PICTURE_EVERY = RATE_HZ // 10, RATE_HZ // 5  # steps
 CAMERA_FRAME = 'camera_optical_frame'
 
@@ -47,14 +40,18 @@ class Robot(Node):
     """A small robot on a floor. It lives beside your program, as another machine would.
 
     It hears `cmd_vel`, and publishes `odom`, `imu/data`, `gps/fix`, `scan`, `battery_state`,
-    `camera/image_raw` and `bumper`. Its executor and its thread are its own, so a slow node of
-    yours does not slow it; the session ends them. `start` replaces the start of the floor. The
-    `seed` decides the errors of the sensors; with `noise=False` they have none. The wheels slip
-    during `slip` (from, to in s). `mounting` says which sensors are turned, and by which yaw (rad):
-    `{'imu_link': 0.3, 'base_scan': -0.5}`; their messages are in their own frames, as they are.
+    `camera/image_raw` and `bumper`, as `driver` has them (see `helpers.robot.drivers`). Its
+    executor and its thread are its own, so a slow node of yours does not slow it; the session ends
+    them. `start` replaces the start of the floor. The `seed` decides the errors of the sensors;
+    with `noise=False` they have none. The wheels slip during `slip` (from, to in s). `mounting`
+    says which sensors are turned, and by which yaw (rad): `{'imu_link': 0.3, 'base_scan': -0.5}`;
+    their messages are in their own frames, as they are.
 
     With `sim_time=True` time passes in `run` alone, as fast as the program, and `/clock` says it.
     With `spin=False` the caller spins it, and no session is needed.
+
+    `blind = True` takes the laser away: all its ranges are NaN from then on. `clock_ahead_s` is by
+    how much (s) its stamps are ahead of the time.
 
     Raises RuntimeError where no session is open, TypeError for a floor that is none, and ValueError
     for a start in a wall and for a name that another node has.
@@ -74,16 +71,22 @@ class Robot(Node):
         noise: bool = True,
         slip: tuple[float, float] | None = None,
         mounting: Mapping[str, float] | None = None,
+        driver: Driver = KIND,
         sim_time: bool = False,
         spin: bool = True,
     ) -> None:
         if not isinstance(floor, Floor):
             raise TypeError(f'A robot needs a floor, such as CORRIDOR, not {floor!r}.')
-        self._body = Body(floor, start)
-        self._sensors = Sensors(seed, noise, slip, mounting)
+        if not isinstance(driver, Driver):
+            raise TypeError(f'A robot needs drivers, such as KIND or TURTLEBOT3, not {driver!r}.')
+        self.driver = driver
+        self._body = Body(floor, start, driver)
+        self._sensors = Sensors(seed, noise, slip, mounting, driver)
+        # What can go wrong: a laser that measures nothing, and a clock that is ahead of the others.
+        self.blind, self.clock_ahead_s = False, 0.0
         if spin:
             session = current_session()
-            check_names(session.node, name, namespace.strip('/'))
+            check_names(session.node, name, namespace.strip('/'), driver)
         super().__init__(name, namespace=namespace)
         self.floor, self.sim_time, self.record = floor, sim_time, DriveRecord(floor)
         self._arrived: list[Command] = []
@@ -118,9 +121,13 @@ class Robot(Node):
 
     def _make_topics(self) -> None:
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
-        self.create_subscription(Twist, 'cmd_vel', self._on_command, 10, event_callbacks=events)
-        self.create_service(Trigger, 'camera/turn_left', self._on_turn_left)
-        self._topics = {topic: self._publisher(kind, topic) for topic, kind in TOPICS.items()}
+        kind = command_type(self.driver)
+        self.create_subscription(kind, 'cmd_vel', self._on_command, 10, event_callbacks=events)
+        if self.driver.camera:
+            self.create_service(Trigger, 'camera/turn_left', self._on_turn_left)
+        self._topics = {
+            topic: self._publisher(kind, topic) for topic, kind in topics_of(self.driver).items()
+        }
         self._clock_topic = self._publisher(ClockMessage, '/clock') if self.sim_time else None
         self._remote = None
         try:
@@ -133,7 +140,12 @@ class Robot(Node):
     def _publisher(self, kind: type, topic: str) -> Publisher:
         # The default callbacks of events would double the time of each look for work.
         events = PublisherEventCallbacks(use_default_callbacks=False)
-        return self.create_publisher(kind, topic, 10, event_callbacks=events)
+        # RELIABLE, which both kinds of subscriptions hear, as a TurtleBot 3 in Gazebo has it. The
+        # drivers of its real lasers are BEST_EFFORT.
+        qos = QoSProfile(depth=10)
+        if kind is LaserScan and self.driver.laser == 'ld08':
+            qos = qos_profile_sensor_data
+        return self.create_publisher(kind, topic, qos, event_callbacks=events)
 
     # --- What one can ask
 
@@ -199,9 +211,11 @@ class Robot(Node):
 
     def command(self, v: float, w: float = 0.0) -> None:
         """Send a command (m/s, rad/s) to the topic `cmd_vel`, as a remote control does."""
-        self._remote = self._remote or self._publisher(Twist, 'cmd_vel')
-        message = Twist()
-        message.linear.x, message.angular.z = float(v), float(w)
+        kind = command_type(self.driver)
+        self._remote = self._remote or self._publisher(kind, 'cmd_vel')
+        message = kind()
+        twist = speeds_of(message)
+        twist.linear.x, twist.angular.z = float(v), float(w)
         self._remote.publish(message)
 
     def drive(self, v: float, w: float = 0.0, seconds: float = 1.0) -> None:
@@ -222,8 +236,9 @@ class Robot(Node):
 
     # --- What happens
 
-    def _on_command(self, message: Twist) -> None:
-        command = Command(self._now_s(), message.linear.x, message.angular.z)
+    def _on_command(self, message: Twist | TwistStamped) -> None:
+        twist = speeds_of(message)
+        command = Command(self._now_s(), twist.linear.x, twist.angular.z)
         if math.isfinite(command.v) and math.isfinite(command.w):
             self.record.commands.append(command)
             self._arrived.append(command)
@@ -255,7 +270,8 @@ class Robot(Node):
         if body.bumps > bumps:
             self._event('bump', f'It hit something at {body.pose.x:.2f}, {body.pose.y:.2f} m.')
         if body.watched and not watched and (body.command.v or body.command.w):
-            self._event('watchdog', 'No command came for 0.5 s: it stops.')
+            timeout_s = self.driver.timeout_s
+            self._event('watchdog', f'No command came for {timeout_s:g} s: it stops.')
         self._look()
 
     def _look(self) -> None:
@@ -266,33 +282,43 @@ class Robot(Node):
         else:
             late_s = self._now_s() - body.t_s
             stamp_ns = self.get_clock().now().nanoseconds - round(late_s * 1e9)
+        now = Time(nanoseconds=stamp_ns).to_msg()
+        stamp_ns += round(self.clock_ahead_s * 1e9)
         self._stamp = Time(nanoseconds=stamp_ns).to_msg()
         record.poses.append(Step(body.t_s, *body.pose, body.v, body.w))
         readings = self._sensors.read(body)
         if self.sim_time:
-            self._clock_topic.publish(ClockMessage(clock=self._stamp))
-        self._say(
-            'odom',
-            lambda: messages.odometry(
-                self._header('odom'),
-                f'{self._prefix}base_footprint',
-                self._sensors.odometry,
-                readings,
-            ),
-        )
-        self._say('imu/data', lambda: messages.imu(self._header('imu_link'), readings))
-        self._say('/tf', self._moving_frame)
+            self._clock_topic.publish(ClockMessage(clock=now))
+        driver = self.driver
+        if number * driver.rate_hz // RATE_HZ != (number - 1) * driver.rate_hz // RATE_HZ:
+            self._say(
+                'odom',
+                lambda: messages.odometry(
+                    self._header('odom'),
+                    f'{self._prefix}base_footprint',
+                    self._sensors.odometry,
+                    readings,
+                    driver,
+                ),
+            )
+            self._say(
+                driver.imu_topic, lambda: messages.imu(self._header('imu_link'), readings, driver)
+            )
+            self._say('/tf', self._moving_frame)
         if number % SCAN_EVERY == 0:
-            ranges = self._sensors.scan(body)
-            record.scans.append(Scan(len(record.scans), body.t_s, stamp_ns, ranges))
-            self._say('scan', lambda: messages.laser_scan(self._header('base_scan'), ranges))
-            self._say('bumper', lambda: Bool(data=body.touching))
+            ranges, first, step = self._sensors.scan(body)
+            if self.blind:
+                ranges = np.full_like(ranges, np.nan)
+            scan = Scan(len(record.scans), body.t_s, stamp_ns, ranges, first, step)
+            record.scans.append(scan)
+            self._say('scan', lambda: messages.laser_scan(self._header('base_scan'), scan, driver))
+            self._say(BUMPER, lambda: Bool(data=body.touching))
         if number % PICTURE_EVERY == 0:
-            self._say('camera/image_raw', self._picture)
+            self._say(CAMERA, self._picture)
         if number % RATE_HZ == 0:
-            self._say('gps/fix', lambda: messages.fix(self._header('gps_link'), readings))
-            self._say('battery_state', lambda: messages.battery(self._header(''), body.t_s))
-            for topic, sentence in other_types(self, self.get_namespace().strip('/')):
+            self._say(GPS, lambda: messages.fix(self._header('gps_link'), readings))
+            self._say('battery_state', lambda: messages.battery(self._header(''), body.t_s, driver))
+            for topic, sentence in other_types(self, self.get_namespace().strip('/'), driver):
                 self._warn(topic, sentence)
 
     def _say(self, topic: str, message: Callable) -> None:
@@ -327,7 +353,24 @@ class Robot(Node):
             self.get_logger().warning(text)
 
 
-def check_names(node: Node, name: str, namespace: str) -> None:
+def topics_of(driver: Driver) -> dict[str, type]:
+    """Return the topics that a robot with these drivers publishes, with their types."""
+    topics = {'odom': Odometry, driver.imu_topic: Imu, 'scan': LaserScan}
+    topics['battery_state'] = BatteryState
+    choices = [(driver.gps, GPS, NavSatFix), (driver.camera, CAMERA, Image)]
+    choices += [(driver.bumper, BUMPER, Bool)]
+    return topics | {topic: kind for has, topic, kind in choices if has}
+
+
+def command_type(driver: Driver) -> type:
+    return TwistStamped if driver.stamped_commands else Twist
+
+
+def speeds_of(message: Twist | TwistStamped) -> Twist:
+    return message.twist if isinstance(message, TwistStamped) else message
+
+
+def check_names(node: Node, name: str, namespace: str, driver: Driver) -> None:
     """Raise ValueError for names that are taken, before a robot spoils those of another.
 
     `node` is asked which there are.
@@ -337,15 +380,20 @@ def check_names(node: Node, name: str, namespace: str) -> None:
             f'There is a node {name} already: give this robot another name and namespace, '
             "as in Robot(name='robot_2', namespace='two')."
         )
-    for _, sentence in other_types(node, namespace):
+    for _, sentence in other_types(node, namespace, driver):
         raise ValueError(sentence)
 
 
-def other_types(node: Node, namespace: str) -> Iterator[tuple[str, str]]:
-    """Yield the topics of a robot that others use with other types, and what to do."""
+def other_types(node: Node, namespace: str, driver: Driver) -> Iterator[tuple[str, str]]:
+    """Yield the topics of a robot that others use with other types, and what to do.
+
+    There is none for drivers that do not look.
+    """
+    if not driver.names_wrong_types:
+        return
     start = f'/{namespace}/' if namespace else '/'
-    own = {start + topic: type_name(kind) for topic, kind in TOPICS.items()}
-    own[f'{start}cmd_vel'] = type_name(Twist)
+    own = {start + topic: type_name(kind) for topic, kind in topics_of(driver).items()}
+    own[f'{start}cmd_vel'] = type_name(command_type(driver))
     for topic, types in node.get_topic_names_and_types():
         for other in types:
             if other != own.get(topic, other):

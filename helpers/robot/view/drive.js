@@ -1,7 +1,7 @@
 // The drive of a robot: one more run under the slider of view.js, with a floor instead of lists.
 
 // Return what walk.js returns of a run: times, seek, scan. And `told`, which steps say something.
-function drive({ step, poses, commands, scans, view, events, bumps }) {
+function drive({ step, poses, commands, scans, events, bumps }) {
   const turn = w => (w ? ` and ${w.toFixed(2)} rad/s` : '');
   const speed = ([, v, w]) => `${v.toFixed(2)} m/s${turn(w)}`;
   const told = one => (one[1] || one[2] ? `The robot is told to drive ${speed(one)}.` : 'The robot is told to stop.');
@@ -33,10 +33,10 @@ function drive({ step, poses, commands, scans, view, events, bumps }) {
   // The path around what the laser saw, from where it was.
   function fan(scan) {
     if (!scan) return '';
-    const [ms, , ranges] = scan;
+    const [ms, , first, last, ranges] = scan;
     const { x, y, yaw } = pose(ms);
     const hits = ranges.map((range, k) => {
-      const angle = yaw + view * (k / (ranges.length - 1) - 0.5);
+      const angle = yaw + first + (last - first) * k / (ranges.length - 1);
       return [x + range / 100 * Math.cos(angle), y + range / 100 * Math.sin(angle)].map(at => at.toFixed(2)).join(' ');
     });
     return `M${x} ${y}L${hits.join('L')}z`;

@@ -98,7 +98,7 @@ class LiveView:
             record.floor,
             [row[1:3] for row in [*poses[::EVERY], now]],
             Pose(now.x, now.y, now.yaw),
-            scans[-1].ranges if scans else None,
+            scans[-1] if scans else None,
             [place(record, bump.t_s) for bump in bumps(record)],
         )
         told = speeds(*commands[-1][1:]) if commands else 'nothing yet'

@@ -16,7 +16,8 @@ import numpy as np
 from helpers.notebook import LOOK
 from helpers.robot.body import RADIUS_M
 from helpers.robot.floor import Floor, Pose
-from helpers.robot.sensors import ANGLES, RANGE_MAX
+from helpers.robot.record import Scan
+from helpers.robot.sensors import RANGE_MAX
 
 WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor
@@ -30,13 +31,13 @@ def floor_picture(
     floor: Floor,
     points: Iterable[tuple[float, float]],
     pose: Pose,
-    ranges: np.ndarray | None = None,
+    scan: Scan | None = None,
     bumps: Sequence[Pose] = (),
     seconds: Sequence[Pose] = (),
 ) -> str:
     """Return the SVG: the floor, the path through `points`, the robot at `pose` with its laser.
 
-    `ranges` is a scan around `pose`, in metres. `seconds` are the places that get a dot, `bumps`
+    `scan` was made at `pose`. `seconds` are the places that get a dot, `bumps`
     those where it hit something.
     """
     x, y, right, above = edges(floor)
@@ -49,7 +50,7 @@ def floor_picture(
     ring += f'a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
     parts = [
         _floor(floor, scale),
-        f'<path class="fan" d="{fan(pose, ranges)}" fill="{ROBOT}" fill-opacity=".16" '
+        f'<path class="fan" d="{fan(pose, scan)}" fill="{ROBOT}" fill-opacity=".16" '
         f'stroke="{ROBOT}" stroke-opacity=".6"/>',
         f'<path class="old" d="" fill="none" stroke="{WAITING}" '
         'stroke-width="2" stroke-dasharray="5 4"/>',
@@ -130,13 +131,12 @@ def crosses(poses: Sequence[Pose], r: float, a: float) -> str:
     )
 
 
-def fan(pose: Pose, ranges: np.ndarray | None) -> str:
+def fan(pose: Pose, scan: Scan | None) -> str:
     """Return a path around what the laser sees from a pose."""
-    if ranges is None or not len(ranges):
+    if scan is None:
         return ''
-    beams = np.linspace(0, len(ranges) - 1, BEAMS).round().astype(int)
-    few = ranges[beams].clip(0, RANGE_MAX)
-    angles = pose.yaw + ANGLES[beams]
+    angles, few = scan.drawn(BEAMS, RANGE_MAX)
+    angles = pose.yaw + angles
     xs, ys = pose.x + few * np.cos(angles), pose.y + few * np.sin(angles)
     hits = 'L'.join(f'{x:.2f} {y:.2f}' for x, y in zip(xs.tolist(), ys.tolist(), strict=True))
     return f'M{pose.x:.2f} {pose.y:.2f}L{hits}z'

@@ -12,8 +12,8 @@ import numpy as np
 
 from helpers.replay import Replay, replay
 from helpers.robot.floor import Pose
-from helpers.robot.record import DriveRecord, Event
-from helpers.robot.sensors import ANGLES, RANGE_MAX
+from helpers.robot.record import DriveRecord, Event, Scan
+from helpers.robot.sensors import RANGE_MAX
 from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
 from helpers.robot.view.scans import ScanRecording
 
@@ -61,7 +61,7 @@ class Drive:
             self.record_.floor,
             self.sampled()[1][:, :2].tolist(),
             place(self.record_, end),
-            scans[-1].ranges if scans else None,
+            scans[-1] if scans else None,
             [place(self.record_, bump.t_s) for bump in bumps(self.record_)],
             seconds=[place(self.record_, second) for second in range(min(int(end), POSES) + 1)],
         )
@@ -73,17 +73,15 @@ class Drive:
     def record(self) -> dict:
         """Return what drive.js needs: m and rad, and whole ms and cm (of ranges)."""
         step, poses = self.sampled()
-        few = np.linspace(0, len(ANGLES) - 1, BEAMS).round().astype(int)
         return {
             'name': self.name,
             'step': round(step, 4),
             'poses': poses.tolist(),
-            'view': round(float(ANGLES[-1] - ANGLES[0]), 4),
             'scans': [
                 [
                     round(1000 * scan.t_s),
                     scan.seq,
-                    (100 * scan.ranges[few].clip(0, RANGE_MAX)).round().astype(int).tolist(),
+                    *rays(scan),
                 ]
                 for scan in thinned(self.record_.scans, SCANS)
             ],
@@ -157,6 +155,13 @@ def replay_drive(
     words = called + words[0].upper() + words[1:]
     run = replace(run, summary=words, time_label=TIME_LABEL, after_s=after_s)
     return Replay((drive, run))
+
+
+def rays(scan: Scan) -> tuple[float, float, list[int]]:
+    """Return the angles of the first and the last ray that is drawn (rad), and all ranges (cm)."""
+    angles, ranges = scan.drawn(BEAMS, RANGE_MAX)
+    whole = (100 * ranges).round().astype(int).tolist()
+    return round(float(angles[0]), 4), round(float(angles[-1]), 4), whole
 
 
 def place(record: DriveRecord, t_s: float) -> Pose:

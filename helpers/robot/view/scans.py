@@ -10,7 +10,7 @@ from rclpy.subscription import Subscription
 from rclpy.time import Time
 
 from helpers.recording import Recording
-from helpers.robot.robot import Robot
+from helpers.robot.robot import Robot, speeds_of
 from helpers.ros import find
 
 
@@ -51,7 +51,8 @@ class ScanRecording(Recording):
 
         @functools.wraps(publish)
         def recorded_publish(message):
-            speeds = message.linear.x, message.angular.z
+            twist = speeds_of(message)
+            speeds = twist.linear.x, twist.angular.z
             self.sent.append((time.monotonic(), *speeds, self.runs_here()))
             publish(message)
 
