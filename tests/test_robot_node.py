@@ -2,9 +2,7 @@
 
 import contextlib
 import math
-import os
 import signal
-import sys
 import tempfile
 import time
 
@@ -16,12 +14,14 @@ from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from ros2_command.api import command_of
 from sensor_msgs.msg import LaserScan
 from std_srvs.srv import Trigger
 from support.nodes import LIMIT_S, Gate, spin
 from support.processes import running, traces
 from support.waits import wait_for
 
+from helpers.machine import build_environment
 from helpers.robot import CORRIDOR, EMPTY, KIND, ROOMS, Pose, Robot
 from helpers.robot.body import MAX_ACCELERATION, RADIUS_M, Body
 from helpers.robot.messages import DATUM, SKY
@@ -214,9 +214,10 @@ def test_a_robot_in_another_process_is_heard_and_ends():
 
 
 def robot_process(floor, *arguments):
-    """Start the robot as a launch file does: as a program, in the graph of the session."""
-    command = [sys.executable, '-m', 'helpers.robot', '--floor', floor, *arguments]
-    return Process('robot', command, {**os.environ, **graph_environment()}, tempfile.gettempdir())
+    """Start the robot as a launch file does: as a package that is installed beside ROS 2."""
+    environment = build_environment()
+    command = [*command_of('simulated_robot', 'robot', environment), '--floor', floor, *arguments]
+    return Process('robot', command, environment | graph_environment(), tempfile.gettempdir())
 
 
 def test_an_interrupt_ends_the_robot():

@@ -70,6 +70,9 @@ def build_environment() -> dict[str, str]:
         environment['LD_LIBRARY_PATH'] = os.pathsep.join(
             folder for folder in libraries if Path(folder).is_relative_to(sys.prefix)
         )
+    else:  # the robot of this course is in this environment, not in that of the other ROS 2
+        prefixes = environment.get('AMENT_PREFIX_PATH', '').split(os.pathsep)
+        environment['AMENT_PREFIX_PATH'] = os.pathsep.join(filter(None, [*prefixes, sys.prefix]))
     return environment
 
 
