@@ -6,6 +6,7 @@ import time
 from contextlib import suppress
 
 from geometry_msgs.msg import Twist
+from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
@@ -48,7 +49,7 @@ def say_none_if_you_do_not_know(distance_ahead):
             lambda: all_of(
                 lambda: says(2.0, 2.5, 2.0, 3.0, others=0.3),
                 lambda: says(0.4, 0.4, 5.0, 5.0),
-                lambda: says(1.5, 4.0, 1.5, 3.0, others=0.3, behind=True),
+                lambda: says(1.5, 1.5, 4.0, 3.0, others=0.3, behind=True),
             ),
             'Of the known ranges in `ahead`, the least.',
         ),
@@ -273,7 +274,7 @@ def stop_if_you_do_not_know(CarefulBrake):
         ),
         (
             'a scan from the future stops it, one that is 0.05 s ahead does not',
-            lambda: is_careful(60, [(2.0, -5), (2.0, -0.05), (2.0, -3600)], [0.0, 0.5, 0.0]),
+            lambda: is_careful(60, [(2.0, -1), (2.0, -0.05), (2.0, -3600)], [0.0, 0.5, 0.0]),
             both,
         ),
     ]
@@ -551,6 +552,8 @@ def a_watchdog(LaserWatchdog):
             bench.spin(watchdog)
             bench.wait(lambda: stops, short_s + LATE_S)
         waited_s = short_s + LATE_S
+        if ClockType.SYSTEM_TIME in {timer.clock.clock_type for timer in watchdog.timers}:
+            return 'its timer is on the system clock, which jumps when somebody sets it'
         return bool(stops) or f'with use_sim_time and no /clock, no stop came in {waited_s} s'
 
     steady = 'create_timer(0.1, self.timer_callback, clock=Clock(clock_type=ClockType.STEADY_TIME))'
