@@ -211,7 +211,7 @@ def hear_the_laser(asked):
             node.create_subscription(String, 'topic', heard.append, asked)
             bench.spin(node)
             bench.say('topic', *(String(data=str(number)) for number in range(4)), qos=offered)
-        return len(heard) == 4 or f'of four messages, {len(heard)} were heard'
+        return len(heard) == 4 or f'of four messages, {len(heard)} were received'
 
     def has_depth():
         with ros_session():
@@ -222,8 +222,8 @@ def hear_the_laser(asked):
 
     hint = 'Above, a QoSProfile has a depth and a reliability. Ask for less.'
     return [
-        ('it hears BEST_EFFORT', lambda: hears(ReliabilityPolicy.BEST_EFFORT), hint),
-        ('it hears RELIABLE', lambda: hears(ReliabilityPolicy.RELIABLE), hint),
+        ('it receives BEST_EFFORT', lambda: hears(ReliabilityPolicy.BEST_EFFORT), hint),
+        ('it receives RELIABLE', lambda: hears(ReliabilityPolicy.RELIABLE), hint),
         ('its depth is 10', has_depth, 'QoSProfile(depth=10, ...)'),
     ]
 
@@ -241,7 +241,7 @@ def a_program_of_its_own(workspace, file):
         if not went_on:
             return f'the program ended by itself. {(["It printed nothing", *process.lines])[-1]}'
         if teams != {team}:
-            return f'team {team}: the listener heard {", ".join(teams) or "nothing"}'
+            return f'team {team}: the listener received {", ".join(teams) or "nothing"}'
         if not any(f'[talker]: {team} talks' in line for line in process.lines):
             return f'its log has no line "[talker]: {team} talks"'
         ends = not any('Traceback' in line for line in process.lines)
