@@ -8,6 +8,7 @@ import time
 
 import ipywidgets as widgets
 import matplotlib.pyplot as plt
+import psutil
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
@@ -331,28 +332,36 @@ def spin_it_yourself(spin_until):
 # --- What cells of the lesson show
 
 PROGRAM = """
-import rclpy, signal
+import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 rclpy.init()
-node, executor = rclpy.create_node('ticking'), {executor}()
-node.create_timer(0.01, lambda: print('a callback ran', flush=True))
+node, executor = rclpy.create_node('resting'), {executor}()
 executor.add_node(node)
-signal.alarm(3)
+print('it spins', flush=True)
 executor.spin()
 """
-# It needs no other process, and would leave its shared memory behind when the alarm kills it.
+# It needs no other process, and would leave its shared memory behind when it is killed.
 ALONE = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF', 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
+SPIN_S = 2.0
 
 
-def runs_a_callback(executor):
-    """Return whether an executor, by its name, runs a callback in three seconds of `spin()`.
+def cpu_of_spin(executor):
+    """Return the CPU time (s) of two seconds of `spin()` in which nothing happens.
 
-    It spins in a program of its own, which an alarm kills.
+    The executor, by its name, spins in a program of its own, which is killed.
     """
     command = [sys.executable, '-c', PROGRAM.format(executor=executor)]
-    ended = subprocess.run(command, env=os.environ | ALONE, capture_output=True, timeout=60)
-    return b'a callback ran' in ended.stdout
+    with subprocess.Popen(command, env=os.environ | ALONE, stdout=subprocess.PIPE) as program:
+        try:
+            program.stdout.readline()
+            process = psutil.Process(program.pid)
+            before = process.cpu_times()
+            time.sleep(SPIN_S)
+            after = process.cpu_times()
+        finally:
+            program.kill()
+    return after.user + after.system - before.user - before.system
 
 
 def model_with_sliders():
