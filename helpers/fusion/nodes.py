@@ -28,7 +28,7 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter
 from helpers.fusion.messages import from_odometry, table_of
-from helpers.robot import EMPTY, ON_THE_FLOOR, Pose, Robot, odometry_message, trip
+from helpers.robot import EMPTY, KIND, ON_THE_FLOOR, Pose, Robot, odometry_message, trip
 from helpers.ros import quaternion, ros_session, seconds_of, stamp_of, yaw_of
 
 # The 15 numbers of each `..._config` and covariance, in their order.
@@ -318,7 +318,10 @@ def localize(
         )
 
     with ros_session():
-        robot = Robot(EMPTY, start=Pose(*start), seed=1, sim_time=True, mounting=mounting)
+        driver = KIND.but(publish_tf=False)  # a filter publishes it
+        robot = Robot(
+            EMPTY, start=Pose(*start), seed=1, sim_time=True, mounting=mounting, driver=driver
+        )
         filters = [
             EkfNode(name, *files, remap={'odometry/filtered': f'{name}/odometry'}) for name in heard
         ]
