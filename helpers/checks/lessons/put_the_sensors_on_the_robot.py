@@ -3,6 +3,7 @@
 import contextlib
 import io
 import math
+import time
 from collections import Counter
 from difflib import get_close_matches
 from typing import NamedTuple
@@ -29,6 +30,7 @@ check = tasks.check
 
 DESCRIPTION = 'src/small_robot/urdf/small_robot.urdf'
 MOUNTING = {'base_scan': math.radians(-30), 'imu_link': math.radians(20)}  # as it is described
+SETTLED_S = 8.0  # so long after their start programs may take to say something
 # The frames that have a parent when the robot and its filters run.
 CHILDREN = {'odom', 'base_footprint', 'base_link', 'gps_link', 'base_scan', 'imu_link'}
 # What is said on the topics of the robot. A subscription of another type hears nothing.
@@ -241,8 +243,8 @@ def fix_three_faults(workspace, settings, StaticBroadcaster):
         if flat:
             return f'two_d_mode is not true for {", ".join(flat)}'
         given = yaml.safe_load(workspace.file(settings).read_text(encoding='utf-8'))
-        section = given.get('navsat_transform', given.get('/navsat_transform', {}))
-        waits = section.get('ros__parameters', {}).get('wait_for_datum')
+        section = given.get('navsat_transform') or given.get('/navsat_transform') or {}
+        waits = (section.get('ros__parameters') or {}).get('wait_for_datum')
         return waits is True or 'navsat_transform has no wait_for_datum: true'
 
     def is_parent(parent, child):
@@ -601,7 +603,9 @@ class Launched(NamedTuple):
 
 
 def watch_launch(workspace, file):
-    """Launch a file until all runs, at most 25 s, and return what it does.
+    """Launch a file until all runs, and return what it does.
+
+    It waits 30 s at most, and SETTLED_S after the nodes of all programs have been discovered.
 
     Raises Failed, with the first error that it prints, if it starts nothing.
     """
@@ -609,6 +613,7 @@ def watch_launch(workspace, file):
 
     command = f'source install/setup.bash\nros2 launch {file}'
     topics = 'odometry/filtered', 'odometry/map'
+    discovered_s: list[float] = []
     children: set[str] = set()
 
     def hear_frames(messages):
@@ -620,6 +625,7 @@ def watch_launch(workspace, file):
         late = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         transforms = bench.hear('/tf', TFMessage), bench.hear('/tf_static', TFMessage, qos=late)
         poses = {topic: bench.hear(topic, Odometry) for topic in topics}
+        own_nodes = len(bench.tester.get_node_names())
         with workspace.start(command, 'the launch') as process:
 
             def names(infos):
@@ -635,10 +641,16 @@ def watch_launch(workspace, file):
             def all_runs():
                 for messages in transforms:
                     hear_frames(messages)
-                done = all(poses.values()) and children >= CHILDREN and len(hear_imu()) > 1
-                return done or not process.running or DIED in '\n'.join(process.lines)
+                text = '\n'.join(process.lines)
+                if all(poses.values()) and children >= CHILDREN and len(hear_imu()) > 1:
+                    return True
+                nodes = len(bench.tester.get_node_names()) - own_nodes
+                if not discovered_s and 0 < len(started(text)) <= nodes:
+                    discovered_s.append(time.monotonic())
+                settled = discovered_s and time.monotonic() - discovered_s[0] > SETTLED_S
+                return settled or not process.running or DIED in text
 
-            bench.wait(all_runs, 25)
+            bench.wait(all_runs, 30)
             text = '\n'.join(process.lines)
             launched = Launched(
                 started(text),

@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 from geometry_msgs.msg import Twist, TwistStamped
 from mcap import records
 from mcap.stream_reader import StreamReader
+from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
@@ -390,12 +391,14 @@ def ask_the_bag_for_the_type(speeds):
         return list(found) == right or f'of {kind} with {right} m/s it returns {found}'
 
     def refuses():
-        with bag_of([(1, '/cmd_vel', Bool(data=True))]) as path:
-            try:
-                found = speeds(path)
-            except TypeError:
-                return True
-        return f'of a /cmd_vel that is std_msgs/msg/Bool it returns {found}'
+        for message in (Bool(data=True), Range(), Odometry()):
+            with bag_of([(1, '/cmd_vel', message)]) as path:
+                try:
+                    found = speeds(path)
+                except TypeError:
+                    continue
+            return f'of a /cmd_vel whose type is {type(message).__name__} it returns {found}'
+        return True
 
     name = "connection.msgtype == 'geometry_msgs/msg/TwistStamped'"
     return [
