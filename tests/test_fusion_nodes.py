@@ -57,7 +57,7 @@ def test_covariances_of_another_length_are_refused():
 
 
 def test_a_variance_of_zero_is_the_least_one():
-    node = SimpleNamespace(ekf=ExtendedKalmanFilter(), used={'odom0': 0}, first_used_s={})
+    node = SimpleNamespace(ekf=ExtendedKalmanFilter(), used={'odom0': 0})
     for stamp_s in (1.0, 2.0):
         message = Odometry()
         message.header.stamp = stamp_of(stamp_s)

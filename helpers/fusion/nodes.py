@@ -70,10 +70,9 @@ class EkfNode(_Configured):
     second (30), it publishes its estimate on `odometry/filtered`, and on /tf the transform from
     `world_frame` to what is below it.
 
-    By the names of the inputs, such as `odom0`: `parts` are those of the state that it may use,
-    `used` counts the measurements that were used, and `first_used_s` is when the first one was.
-    `initial` are the variances that the files give it at the start; `two_d` is whether they ask for
-    a filter of two dimensions.
+    By the names of the inputs, such as `odom0`: `parts` are those of the state that it may use, and
+    `used` counts the measurements that were used. `two_d` is whether the files ask for a filter of
+    two dimensions.
     """
 
     def __init__(
@@ -88,12 +87,11 @@ class EkfNode(_Configured):
         self._due_s = -math.inf  # when the next estimate is due
         self.world = given.get('world_frame', 'odom')
         self.base = given.get('base_link_frame', 'base_link')
-        self.initial = self._variances('initial_estimate_covariance')
+        initial = self._variances('initial_estimate_covariance')
         noise = self._variances('process_noise_covariance')
-        self.ekf = ExtendedKalmanFilter(noise, self.initial)
+        self.ekf = ExtendedKalmanFilter(noise, initial)
         self.parts: dict[str, list[str]] = {}
         self.used: dict[str, int] = {}
-        self.first_used_s: dict[str, float] = {}
         self._parents: dict[str, tuple[str, float]] = {}  # each frame's parent, and its yaw in it
         self._in_odom = 0.0, 0.0, 0.0
         latched = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -175,7 +173,6 @@ class EkfNode(_Configured):
             innovation = self.ekf.process(t, names, values, covariance, gate)
             if innovation is None or innovation.accepted:
                 self.used[key] += 1
-                self.first_used_s.setdefault(key, t)
 
     def _yaw_in_base(self, frame: str) -> float | None:
         """Return by how much a frame is turned in the robot's, or None if nobody says so."""
@@ -290,15 +287,12 @@ class Localized(NamedTuple):
     frames: pd.DataFrame
     parts: dict[str, dict[str, list[str]]]
     used: dict[str, dict[str, int]]
-    first_used_s: dict[str, dict[str, float]]
-    initial: dict[str, dict[str, float]]
     two_d: dict[str, bool]
 
 
 def localize(
     files: Sequence[str | os.PathLike],
     make_broadcaster: Callable[[], Node],
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     seconds: float = 25.0,
     mounting: Mapping[str, float] | None = None,
 ) -> Localized:
@@ -320,7 +314,7 @@ def localize(
     with ros_session():
         driver = KIND.but(publish_tf=False)  # a filter publishes it
         robot = Robot(
-            EMPTY, start=Pose(*start), seed=1, sim_time=True, mounting=mounting, driver=driver
+            EMPTY, start=Pose(0, 0, 0), seed=1, sim_time=True, mounting=mounting, driver=driver
         )
         filters = [
             EkfNode(name, *files, remap={'odometry/filtered': f'{name}/odometry'}) for name in heard
