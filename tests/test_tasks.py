@@ -8,6 +8,7 @@ import pytest
 from support.kernel import Kernel
 
 from helpers.checks import tasks as module
+from helpers.checks.errors import sentence
 from helpers.checks.tasks import NOT_TRIED, Tasks, once
 from helpers.checks.verdict import AGAIN, Point, Verdict, bundle
 
@@ -294,3 +295,11 @@ def test_an_int_in_a_float_field_is_an_error():
         assert "The 'x' field must be of type 'float'" in kernel.run(f'{early}Vector3(x=1)')
         late = 'from sensor_msgs.msg import Range'
         assert "The 'range' field must" in kernel.run(f'{late}\nRange(range=1)')
+
+
+def test_a_name_that_the_students_code_does_not_know_is_one_sentence():
+    try:
+        exec('distance < 1.0')  # what a callback raises has no text of its own
+    except NameError as error:
+        said = sentence(error)
+    assert said.startswith("NameError: name 'distance' is not defined. Is it defined in the cell")
