@@ -1,24 +1,149 @@
-"""What the tasks of this lesson are judged by."""
+"""What the tasks of the lesson "Find the fault" are judged by."""
 
-from std_msgs.msg import Int32
+import re
 
-from helpers.checks.bench import Bench
-from helpers.checks.tasks import Tasks
+from helpers.checks.errors import Failed
+from helpers.checks.programs import error_of_launch
+from helpers.checks.tasks import Tasks, once
+from helpers.faults import KINDS, OTHER, drive
 
 tasks = Tasks()
 check = tasks.check
 
+STOP_M = 0.7  # in the file of the drive that judges
+NEARER_M, FARTHER_M = 0.35, 0.15  # it may stop so far from that: it is heard late, and measured
+LEAST = 6  # letters of a line
 
-@tasks.add(1)
-def hear_the_numbers(Listener):
-    def keeps(*numbers):
-        with Bench() as bench:
-            listener = bench.spin(Listener())
-            bench.say('number', *(Int32(data=number) for number in numbers))
-        return listener.heard == [*numbers] or f'of {[*numbers]} it kept {listener.heard}'
 
-    hint = 'A list has .append(...), and an Int32 has .data.'
+def find(case, kind, command, line):
+    """Judge what somebody says is wrong, and by what it is seen."""
+
+    def outputs():
+        wanted = words(command)
+        if wanted in ('', 'None'):
+            raise Failed('no command yet')
+        found = [said for ran, said in case.commands() if wanted in words(ran)]
+        if not found:
+            raise Failed(f'since {case.name} is here, no cell with %%terminal has run: {wanted}')
+        return found
+
+    def lines():
+        wanted = words(line)
+        if wanted in ('', 'None'):
+            raise Failed('no line yet')
+        printed = [words(one) for said in outputs() for one in said.splitlines()]
+        found = [one for one in printed if wanted == one or wanted in one and len(wanted) >= LEAST]
+        if not found:
+            raise Failed(f'{words(command)} has printed no line with: {wanted}')
+        return found
+
+    def was_run():
+        return bool(outputs())
+
+    def was_printed():
+        return bool(lines())
+
+    def shows_the_fault():
+        for pair in case.fault.evidence:
+            if re.search(pair.command, words(command)) and any(
+                re.search(pair.line, one) for one in lines()
+            ):
+                return True
+        lines()
+        return 'a robot without a fault could print this, too'
+
+    def is_of_this_kind():
+        if kind not in KINDS:
+            return f'{kind!r} is none of the kinds'
+        return kind == case.fault.kind or f'{kind}: no'
+
     return [
-        ('it keeps two numbers in order', lambda: keeps(3, 1), hint),
-        ('it keeps one number', lambda: keeps(7), hint),
+        ('the command was run', was_run, 'Run it in a cell that begins with %%terminal.'),
+        ('it has printed the line', was_printed, 'Copy the line from its output.'),
+        ('the line shows the fault', shows_the_fault, case.fault.hint),
+        ('the kind of the fault', is_of_this_kind, case.fault.hint),
     ]
+
+
+def mend(case):
+    """Judge a robot that somebody has mended, on another floor and with another limit."""
+
+    @once
+    def driven():
+        if not case.is_changed:
+            raise Failed(f'the files of {case.name} are as you got them')
+        return drive(case, OTHER, trouble=case.fault.trouble, params=params(case))
+
+    def drives_off():
+        end = driven()
+        if end.how == 'died':
+            raise Failed(error_of_launch(end.said) or 'the launch has ended, and said nothing')
+        return end.how != 'stands' or with_mends(case, 'it does not move')
+
+    def minds_its_laser():
+        end = driven()
+        if end.braked is None:
+            return 'it did not come so far'
+        if not end.braked:
+            return with_mends(case, 'it drives on')
+        return end.went_on or with_mends(case, 'it stops, and never goes on')
+
+    def arrives():
+        end = driven()
+        if end.how in ('stands', 'died'):
+            return 'it did not come so far'
+        if end.how == 'hits':
+            return with_mends(case, 'it hits something')
+        if end.how == 'goes on':
+            return with_mends(case, 'it does not come to an end')
+        away_m = end.free_m - STOP_M
+        if -NEARER_M <= away_m <= FARTHER_M:
+            return True
+        found = f'it stops {end.free_m:.1f} m before something, and stop_m was {STOP_M}'
+        return with_mends(case, found)
+
+    def rests():
+        end = driven()
+        return end.stands_at_exit or 'its last command was to drive'
+
+    trouble = {
+        'blind': 'while its laser sees nothing it stops, then it goes on',
+        'clock': 'while the stamps of its scans are wrong it stops, then it goes on',
+    }[case.fault.trouble]
+    return [
+        (f'on another floor {case.name} drives off', drives_off, case.fault.hint),
+        (trouble, minds_its_laser, case.fault.hint),
+        ('it stops where its file says, and hits nothing', arrives, case.fault.hint),
+        ('Ctrl+C leaves it at rest', rests, 'How does brake.py end?'),
+    ]
+
+
+for number in (1, 3, 5, 7, 9):
+    tasks.add(number)(find)
+    tasks.add(number + 1, limit_s=120, cpu_s=60)(mend)
+
+
+def words(text):
+    """Return a text without what white space means nothing."""
+    return ' '.join(str(text).split()) if text is not ... else ''
+
+
+def params(case):
+    """Write the robot's own file of parameters with another limit, and return how it is given."""
+    file = f'install/{case.name}/share/{case.name}/config/{case.name}.yaml'
+    try:
+        text = case.workspace.file(file).read_text(encoding='utf-8')
+    except OSError:
+        raise Failed(f'{file} cannot be read: is config/{case.name}.yaml still there?') from None
+    text, count = re.subn(r'(\bstop_m["\']?\s*:\s*)[-\d.]+', rf'\g<1>{STOP_M}', text)
+    if not count:
+        raise Failed(f'config/{case.name}.yaml says no stop_m any more')
+    case.workspace.write('judged.yaml', text)
+    return 'params_file:=judged.yaml'
+
+
+def with_mends(case, found):
+    """Return what was found, and what is said of each tempting mend that is seen."""
+    changed = case.added() + '\n' + '\n'.join(ran for ran, _ in case.commands())
+    said = [mend.says for mend in case.fault.wrong if re.search(mend.sees, changed)]
+    return '. '.join([found, *said])
