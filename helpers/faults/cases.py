@@ -65,14 +65,15 @@ class Evidence:
 class Fault:
     """What `fault.yaml` of a folder says.
 
-    `kind` is one of `KINDS`, `broken` a sentence, `fails` how a drive of `Drive.how` ends. `look`
+    `kind` is one of `KINDS`; a guess of one in `also` is right, too. `broken` is a sentence, and
+    `breaks` the edits of the healthy files. `fails` has how a drive may end (see `Drive.how`). `look`
     and `line` are a command and a line of its output that is evidence. `trouble` is what happens to
     its laser on the drive that judges a mend.
     """
 
     name: str
     kind: str
-    fails: str
+    fails: tuple[str, ...]
     broken: str
     hint: str
     look: str
@@ -80,6 +81,8 @@ class Fault:
     evidence: tuple[Evidence, ...]
     right: tuple[Mend, ...]
     wrong: tuple[Mend, ...]
+    breaks: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    also: tuple[str, ...] = ()
     trouble: str = 'blind'
 
     @property
@@ -90,16 +93,31 @@ class Fault:
     @cached_property
     def files(self) -> dict[str, str]:
         """The files of the robot's package in src, by their paths."""
-        return _files(HEALTHY) | {
+        files = _files(HEALTHY) | {
             path: text
             for path, text in _files(self.folder).items()
             if path != FILE and not path.startswith(f'{INSTALLED}/')
         }
+        for path, edits in self.breaks.items():
+            files[path] = edited(files[path], edits, f'{self.name}: {path}')
+        return files
 
     @cached_property
     def installed(self) -> dict[str, str]:
         """Files that are built, and then replaced in src by those of `files`."""
         return _files(self.folder / INSTALLED)
+
+
+def edited(text: str, edits: Mapping[str, str], where: str) -> str:
+    """Return a text with each old part replaced by its new one.
+
+    Raises ValueError if an old one is not there exactly once.
+    """
+    for old, new in edits.items():
+        if text.count(old) != 1:
+            raise ValueError(f'{where} has {old!r} {text.count(old)} times, not once.')
+        text = text.replace(old, new)
+    return text
 
 
 def _files(folder: Path) -> dict[str, str]:
@@ -116,6 +134,7 @@ def read(folder: Path) -> Fault:
         told = yaml.safe_load((folder / FILE).read_text(encoding='utf-8'))
         mends = {key: tuple(Mend(**mend) for mend in told.pop(key)) for key in ('right', 'wrong')}
         evidence = tuple(Evidence(**pair) for pair in told.pop('evidence'))
+        told |= {key: tuple(told.get(key, ())) for key in ('fails', 'also')}
         fault = Fault(name=folder.name, evidence=evidence, **mends, **told)
     except (OSError, yaml.YAMLError, TypeError, KeyError, AttributeError) as error:
         raise ValueError(f'{folder.name}/{FILE}: {error}') from None
@@ -204,11 +223,8 @@ class Case:
         for path, edits in mend.edit.items():
             file = self.workspace.file(f'src/{self.name}/{self.named(path)}')
             text = file.read_text(encoding='utf-8') if file.exists() else ''
-            for old, new in edits.items():
-                if text.count(self.named(old)) != 1:
-                    count = text.count(self.named(old))
-                    raise ValueError(f'{self.fault.name}: {old!r} is {count} times in {path}.')
-                text = text.replace(self.named(old), self.named(new))
+            named = {self.named(old): self.named(new) for old, new in edits.items()}
+            text = edited(text, named, f'{self.fault.name}: {path}')
             file.write_text(text, encoding='utf-8')
         if mend.run:
             print(self.workspace.terminal(self.named(mend.run)))

@@ -69,6 +69,7 @@ class Drive:
     said: str  # what the launch has printed
     moved_m: float  # from start to end, straight
     free_m: float  # ahead of its middle, at the end
+    turned: float  # at the end (rad)
     braked: bool | None  # while its laser saw nothing; None: it did not come so far
     went_on: bool  # after that
     stands_at_exit: bool  # its last command, after Ctrl+C, was to stop
@@ -91,6 +92,8 @@ def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', pa
             watcher = Watcher(session, robot, program, trouble)
             robot.run(READY_S + LONGEST_S + ENDS_S, until=watcher.is_over)
             end_launch(program)
+        for record in session.records():  # what programs log stands in their terminal
+            record.printed = True
         x, y, yaw = robot.pose
         robot.run(0.2)  # its last command may be on its way
         last = robot.record.commands[-1:]
@@ -99,6 +102,7 @@ def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', pa
             record=robot.record,
             said=without_folders('\n'.join(program.lines), workspace.path),
             moved_m=watcher.moved_m,
+            turned=math.remainder(yaw - watcher.start.yaw, math.tau),
             free_m=float(place.floor.ranges(x, y, yaw + AHEAD)[0].min()),
             braked=watcher.braked,
             went_on=watcher.went_on,
@@ -115,12 +119,12 @@ class Watcher:
         self._begun_s, self._ready_s = time.monotonic(), None
         self._moved_at_s = self._still_at_s = self._trouble_at_s = None
         self._trouble_at_m = 0.0
-        self._start = robot.pose
+        self.start = robot.pose
 
     @property
     def moved_m(self) -> float:
         """How far it is from its start."""
-        return math.dist(self._start[:2], self.robot.pose[:2])
+        return math.dist(self.start[:2], self.robot.pose[:2])
 
     def is_over(self) -> bool:
         """Return whether something is decided, and keep in `how` what."""

@@ -10,8 +10,9 @@ from helpers.faults import KINDS, OTHER, drive
 tasks = Tasks()
 check = tasks.check
 
-STOP_M = 0.7  # in the file of the drive that judges
+STOP_M = 0.9  # in the file of the drive that judges
 NEARER_M, FARTHER_M = 0.35, 0.15  # it may stop so far from that: it is heard late, and measured
+TURNED = 0.3  # rad, to both sides
 LEAST = 6  # letters of a line
 
 
@@ -55,7 +56,7 @@ def find(case, kind, command, line):
     def is_of_this_kind():
         if kind not in KINDS:
             return f'{kind!r} is none of the kinds'
-        return kind == case.fault.kind or f'{kind}: no'
+        return kind in (case.fault.kind, *case.fault.also) or f'{kind}: no'
 
     return [
         ('the command was run', was_run, 'Run it in a cell that begins with %%terminal.'),
@@ -96,6 +97,8 @@ def mend(case):
             return with_mends(case, 'it hits something')
         if end.how == 'goes on':
             return with_mends(case, 'it does not come to an end')
+        if abs(end.turned) > TURNED:
+            return with_mends(case, 'it does not keep its direction')
         away_m = end.free_m - STOP_M
         if -NEARER_M <= away_m <= FARTHER_M:
             return True

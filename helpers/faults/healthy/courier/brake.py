@@ -7,6 +7,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Float64
 
 from courier.ahead import distance_ahead
 from courier.program import run
@@ -25,6 +26,7 @@ class Brake(Node):
         self.wanted, self.wanted_at, self.scan_at = Twist(), None, None
         self.said = ''
         self.publisher = self.create_publisher(TwistStamped, 'cmd_vel', 1)
+        self.ages = self.create_publisher(Float64, '~/scan_age', 1)
         self.create_subscription(Twist, 'wanted', self.on_wanted, 1)
         self.create_subscription(LaserScan, 'scan', self.on_scan, NEWEST)
         self.create_timer(0.1, self.watch, clock=self.steady)
@@ -43,8 +45,11 @@ class Brake(Node):
     def reason_to_stop(self, scan):
         """Return why the robot must not drive, or an empty text."""
         age_s = (self.get_clock().now() - Time.from_msg(scan.header.stamp)).nanoseconds / 1e9
-        if not -AHEAD_S <= age_s <= MAX_AGE_S:
-            return 'the stamp of the scan is not of now'
+        self.ages.publish(Float64(data=age_s))
+        if age_s > MAX_AGE_S:
+            return 'the scan is old'
+        if age_s < -AHEAD_S:
+            return 'the scan is of the future'
         if self.is_old(self.wanted_at):
             return 'nobody says where to go'
         distance = distance_ahead(scan)
