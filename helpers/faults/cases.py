@@ -17,6 +17,7 @@ HERE = Path(__file__).parent
 HEALTHY = HERE / 'healthy'
 NAME = 'courier'  # of the package in the folders; a robot has its own
 FILE = 'fault.yaml'
+GIVEN = 'given'  # a folder of the workspace: each package as it was
 INSTALLED = 'installed'  # files that are built, and then replaced in src alone
 
 # The kinds of faults that people meet, by the word with which one is guessed.
@@ -66,9 +67,9 @@ class Fault:
     """What `fault.yaml` of a folder says.
 
     `kind` is one of `KINDS`; a guess of one in `also` is right, too. `broken` is a sentence, and
-    `breaks` the edits of the healthy files. `fails` has how a drive may end (see `Drive.how`). `look`
-    and `line` are a command and a line of its output that is evidence. `trouble` is what happens to
-    its laser on the drive that judges a mend.
+    `breaks` the edits of the healthy files. `fails` has how a drive may end (see `Drive.how`).
+    `look` and `line` are a command and a line of its output that is evidence. `trouble` is what
+    happens to its laser on the drive that judges a mend.
     """
 
     name: str
@@ -207,8 +208,12 @@ class Case:
 
     def reset(self) -> None:
         """Write its package as it was, and build it."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        for folder in (self.folder, self.workspace.file(f'{GIVEN}/{self.name}')):
+            shutil.rmtree(folder, ignore_errors=True)
         self.write(self.fault.files)
+        self.workspace.write(f'{GIVEN}/COLCON_IGNORE', '')
+        for path, text in self.given.items():
+            self.workspace.write(f'{GIVEN}/{self.name}/{path}', text)
         if self.fault.installed:
             for folder in ('build', 'install'):
                 shutil.rmtree(self.workspace.file(f'{folder}/{self.name}'), ignore_errors=True)
@@ -233,12 +238,13 @@ class Case:
 def take(workspace: Workspace, fault: Fault, name: str, anew: bool = False) -> Case:
     """Put a robot with a fault into the workspace, and build its package.
 
-    If it is there already, it stays as it was left. `anew` begins again.
+    If it is there already, with the same fault, it stays as it was left. `anew` begins again.
     Raises ValueError for a name that no package can have, RuntimeError if it cannot be built.
     """
     if not re.fullmatch('[a-z][a-z0-9_]*', name):
         raise ValueError(f'A robot has a name such as ada, not {name!r}.')
     case = Case(workspace, fault, name)
-    if anew or not case.folder.exists():
+    before = _files(workspace.file(f'{GIVEN}/{name}'))
+    if anew or not case.folder.exists() or before != case.given:
         case.reset()
     return case

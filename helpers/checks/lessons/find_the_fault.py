@@ -1,19 +1,104 @@
 """What the tasks of the lesson "Find the fault" are judged by."""
 
+import difflib
+import random
 import re
+import time
 
+from helpers.checks import progress
 from helpers.checks.errors import Failed
 from helpers.checks.programs import error_of_launch
 from helpers.checks.tasks import Tasks, once
-from helpers.faults import KINDS, OTHER, drive
+from helpers.faults import FAULTS, KINDS, OTHER, take
+from helpers.faults import drive as drive_apart
 
 tasks = Tasks()
 check = tasks.check
 
+CORE = {'ada': 'deaf_brake', 'bo': 'unread_limit', 'cleo': 'slow_look', 'dan': 'second_voice'}
+OTHERS = 'eve', 'finn', 'gus', 'hana', 'ivo', 'joy', 'kim', 'leo', 'mia', 'noa', 'oli', 'pia'
+LAST = 10  # the task that mends one of the others
+UP_S = 40.0
+NODES = '/brake', '/manager', '/robot', '/route'
 STOP_M = 0.9  # in the file of the drive that judges
 NEARER_M, FARTHER_M = 0.35, 0.15  # it may stop so far from that: it is heard late, and measured
 TURNED = 0.3  # rad, to both sides
-LEAST = 6  # letters of a line
+LEAST = 3  # letters of a line
+
+
+# --- Robots
+
+
+def robot(workspace, name):
+    """Return the robot ada, bo, cleo or dan; its package is in src."""
+    return take(workspace, FAULTS[CORE[name]], name)
+
+
+def next_robot(workspace, seed):
+    """Return the next robot: the number decides in which order they come.
+
+    First those come that have not been mended yet, without those of the core. Then all of them.
+    """
+    known = progress.about(LAST)
+    left = [fault for fault in FAULTS if fault not in {*known, *CORE.values()}]
+    order = sorted(left or FAULTS)
+    random.Random(seed).shuffle(order)
+    return take(workspace, FAULTS[order[0]], OTHERS[len(known) % len(OTHERS)])
+
+
+def drive(case):
+    """Drive a robot in the page, and say what it did."""
+    end = drive_apart(case, name=case.name)
+    print(case.name, did(end))
+
+
+def did(end):
+    """Return what a robot did, in words that do not move."""
+    if end.how == 'stops':
+        near = end.free_m < 0.8
+        return 'stops near the wall.' if near else 'stops far away from the wall.'
+    if end.how == 'died':
+        return f'cannot be launched: {error_of_launch(end.said)}'
+    return {
+        'stands': 'does not move.',
+        'hits': 'hits the wall.',
+        'goes on': 'drives on and on.',
+    }[end.how]
+
+
+def wait_until_up(case):
+    """Wait until the robot and the three nodes of its package are there."""
+    end_s = time.monotonic() + UP_S
+    while not set(NODES) <= set(case.workspace.terminal('ros2 node list').splitlines()):
+        if time.monotonic() > end_s:
+            raise TimeoutError(f'Of {case.name} not all nodes have come: does its launch run?')
+
+
+def give_up(case):
+    """Say what is wrong with a robot, how it is seen, and what mends it."""
+    fault = case.fault
+    print(f'{fault.broken}\nSeen by: {case.named(fault.look)}\nIts line: {fault.line}')
+    mend = fault.right[0]
+    print(*(case.named(line) for line in mends(fault, mend)), sep='\n')
+
+
+def mends(fault, mend):
+    """Return a mend as lines: commands, or what goes and comes in a file."""
+    lines = mend.run.splitlines()
+    for path, edits in mend.edit.items():
+        before = fault.files[path]
+        after = before
+        for old, new in edits.items():
+            after = after.replace(old, new)
+        changed = difflib.unified_diff(before.splitlines(), after.splitlines(), n=0, lineterm='')
+        lines += [
+            f'In {path}:',
+            *(line for line in changed if not re.match(r'---|\+\+\+|@@', line)),
+        ]
+    return lines
+
+
+# --- Tasks
 
 
 def find(case, kind, command, line):
@@ -46,7 +131,7 @@ def find(case, kind, command, line):
 
     def shows_the_fault():
         for pair in case.fault.evidence:
-            if re.search(pair.command, words(command)) and any(
+            if re.search(case.named(pair.command), words(command)) and any(
                 re.search(pair.line, one) for one in lines()
             ):
                 return True
@@ -73,7 +158,7 @@ def mend(case):
     def driven():
         if not case.is_changed:
             raise Failed(f'the files of {case.name} are as you got them')
-        return drive(case, OTHER, trouble=case.fault.trouble, params=params(case))
+        return drive_apart(case, OTHER, trouble=case.fault.trouble, params=params(case))
 
     def drives_off():
         end = driven()
@@ -121,9 +206,14 @@ def mend(case):
     ]
 
 
-for number in (1, 3, 5, 7, 9):
-    tasks.add(number)(find)
-    tasks.add(number + 1, limit_s=120, cpu_s=60)(mend)
+def fault_of(case, *answer):
+    """Return which fault a task is about."""
+    return case.fault.name
+
+
+for number in (1, 3, 5, 7, LAST - 1):
+    tasks.add(number, about=fault_of)(find)
+    tasks.add(number + 1, limit_s=120, cpu_s=60, about=fault_of)(mend)
 
 
 def words(text):
