@@ -208,16 +208,13 @@ class Case:
 
     def reset(self) -> None:
         """Write its package as it was, and build it."""
-        for folder in (self.folder, self.workspace.file(f'{GIVEN}/{self.name}')):
-            shutil.rmtree(folder, ignore_errors=True)
+        for folder in ('src', 'build', 'install', GIVEN):
+            shutil.rmtree(self.workspace.file(f'{folder}/{self.name}'), ignore_errors=True)
         self.write(self.fault.files)
         self.workspace.write(f'{GIVEN}/COLCON_IGNORE', '')
         for path, text in self.given.items():
             self.workspace.write(f'{GIVEN}/{self.name}/{path}', text)
-        if self.fault.installed:
-            for folder in ('build', 'install'):
-                shutil.rmtree(self.workspace.file(f'{folder}/{self.name}'), ignore_errors=True)
-            self.write(self.fault.installed)
+        self.write(self.fault.installed)
         result = self.workspace.build(self.name, symlink_install=not self.fault.installed)
         if not result.ok:
             raise RuntimeError(str(result))

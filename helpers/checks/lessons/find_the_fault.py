@@ -74,6 +74,22 @@ def wait_until_up(case):
             raise TimeoutError(f'Of {case.name} not all nodes have come: does its launch run?')
 
 
+def seen(case):
+    """Run the command that shows what is wrong. Return the kind, the command and its line."""
+    fault, look = case.fault, case.named(case.fault.look)
+    if look.startswith('ros2 launch'):
+        case.workspace.terminals[case.name].wait_for(fault.line)
+    else:
+        case.workspace.terminal(f'source install/setup.bash\n{look}')
+    return fault.kind, look, fault.line
+
+
+def mend(case):
+    """Begin with the robot as it was, and mend it."""
+    case.write(case.fault.files)
+    case.mend(case.fault.right[0])
+
+
 def give_up(case):
     """Say what is wrong with a robot, how it is seen, and what mends it."""
     fault = case.fault
@@ -101,27 +117,27 @@ def mends(fault, mend):
 # --- Tasks
 
 
-def find(case, kind, command, line):
+def found(case, kind, command, line):
     """Judge what somebody says is wrong, and by what it is seen."""
 
     def outputs():
         wanted = words(command)
         if wanted in ('', 'None'):
             raise Failed('no command yet')
-        found = [said for ran, said in case.commands() if wanted in words(ran)]
-        if not found:
+        printed = [said for ran, said in case.commands() if wanted in words(ran)]
+        if not printed:
             raise Failed(f'since {case.name} is here, no cell with %%terminal has run: {wanted}')
-        return found
+        return printed
 
     def lines():
         wanted = words(line)
         if wanted in ('', 'None'):
             raise Failed('no line yet')
         printed = [words(one) for said in outputs() for one in said.splitlines()]
-        found = [one for one in printed if wanted == one or wanted in one and len(wanted) >= LEAST]
-        if not found:
+        same = [one for one in printed if wanted == one or (wanted in one and len(wanted) >= LEAST)]
+        if not same:
             raise Failed(f'{words(command)} has printed no line with: {wanted}')
-        return found
+        return same
 
     def was_run():
         return bool(outputs())
@@ -151,7 +167,7 @@ def find(case, kind, command, line):
     ]
 
 
-def mend(case):
+def mended(case):
     """Judge a robot that somebody has mended, on another floor and with another limit."""
 
     @once
@@ -212,8 +228,8 @@ def fault_of(case, *answer):
 
 
 for number in (1, 3, 5, 7, LAST - 1):
-    tasks.add(number, about=fault_of)(find)
-    tasks.add(number + 1, limit_s=120, cpu_s=60, about=fault_of)(mend)
+    tasks.add(number, about=fault_of)(found)
+    tasks.add(number + 1, limit_s=120, cpu_s=60, about=fault_of)(mended)
 
 
 def words(text):
