@@ -69,7 +69,7 @@ class Fault:
     `kind` is one of `KINDS`; a guess of one in `also` is right, too. `broken` is a sentence, and
     `breaks` the edits of the healthy files. `fails` has how a drive may end (see `Drive.how`).
     `look` and `line` are a command and a line of its output that is evidence. `trouble` is what
-    happens to its laser on the drive that judges a mend.
+    happens to its laser on the drive that judges a mend, and `keeps` has what must stay in a file.
     """
 
     name: str
@@ -85,6 +85,7 @@ class Fault:
     breaks: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     also: tuple[str, ...] = ()
     trouble: str = 'blind'
+    keeps: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def folder(self) -> Path:
@@ -196,6 +197,15 @@ class Case:
     def is_changed(self) -> bool:
         """Whether a file is not as it was, or a build may have changed what runs."""
         return self.files != self.given or bool(self.fault.installed)
+
+    def lost(self) -> str:
+        """Return what must stay in a file and does not, or an empty text."""
+        files = self.files
+        for path, texts in self.fault.keeps.items():
+            for text in texts:
+                if text not in files.get(self.named(path), ''):
+                    return f'{self.named(path)} must go on to have: {text}'
+        return ''
 
     def commands(self) -> list[tuple[str, str]]:
         """Return what was run in terminals since the robot was taken, and what was printed."""

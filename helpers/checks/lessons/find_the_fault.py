@@ -78,7 +78,7 @@ def seen(case):
     """Run the command that shows what is wrong. Return the kind, the command and its line."""
     fault, look = case.fault, case.named(case.fault.look)
     if look.startswith('ros2 launch'):
-        case.workspace.terminals[case.name].wait_for(fault.line)
+        case.workspace.terminals[case.name].wait_for(fault.line, UP_S)
     else:
         case.workspace.terminal(f'source install/setup.bash\n{look}')
     return fault.kind, look, fault.line
@@ -174,6 +174,8 @@ def mended(case):
     def driven():
         if not case.is_changed:
             raise Failed(f'the files of {case.name} are as you got them')
+        if lost := case.lost():
+            raise Failed(lost)
         return drive_apart(case, OTHER, trouble=case.fault.trouble, params=params(case))
 
     def drives_off():
