@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 import shutil
 from collections.abc import Mapping
@@ -44,13 +45,14 @@ KINDS = {
 class Mend:
     """A change of a robot: edits of its files, {file: {old: new}}, and commands in a terminal.
 
-    Of a wrong mend, `sees` is the pattern by which it is known in the lines that were added or the
-    commands that were run, and `says` what it does.
+    Of a wrong mend, `says` tells what it does. It is known by the pattern `sees`, in the lines that
+    were added and the commands that were run, or by a text that no file has any more, `lacks`.
     """
 
     edit: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     run: str = ''
     sees: str = ''
+    lacks: str = ''
     says: str = ''
 
 
@@ -185,18 +187,24 @@ class Case:
                     continue
         return found
 
-    def added(self) -> str:
-        """Return the lines of its files that were not there before."""
-        lines = []
-        for path, text in self.files.items():
-            before = self.given.get(path, '').splitlines()
-            lines += [line for line in text.splitlines() if line not in before]
-        return '\n'.join(lines)
-
     @property
     def is_changed(self) -> bool:
         """Whether a file is not as it was, or a build may have changed what runs."""
         return self.files != self.given or bool(self.fault.installed)
+
+    def wrong_mends(self) -> list[Mend]:
+        """Return those of the tempting mends that are seen in what was changed."""
+        files = self.files
+        changed = [commands for commands, _ in self.commands()]
+        for path, text in files.items():
+            lines = difflib.ndiff(self.given.get(path, '').splitlines(), text.splitlines())
+            changed += [line[2:] for line in lines if line.startswith('+ ')]
+        return [
+            mend
+            for mend in self.fault.wrong
+            if (mend.sees and re.search(mend.sees, '\n'.join(changed)))
+            or (mend.lacks and not any(mend.lacks in text for text in files.values()))
+        ]
 
     def lost(self) -> str:
         """Return what must stay in a file and does not, or an empty text."""

@@ -255,6 +255,4 @@ def params(case):
 
 def with_mends(case, found):
     """Return what was found, and what is said of each tempting mend that is seen."""
-    changed = case.added() + '\n' + '\n'.join(ran for ran, _ in case.commands())
-    said = [mend.says for mend in case.fault.wrong if re.search(mend.sees, changed)]
-    return '. '.join([found, *said])
+    return '. '.join([found, *(mend.says for mend in case.wrong_mends())])
