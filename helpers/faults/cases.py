@@ -147,6 +147,17 @@ def read(folder: Path) -> Fault:
     return fault
 
 
+def mend_in_words(fault: Fault) -> list[str]:
+    """Return what mends a robot, as lines: commands, or what goes and comes in its files."""
+    mend = fault.right[0]
+    lines = mend.run.splitlines()
+    for path, edits in mend.edit.items():
+        before = fault.files[path]
+        changed = difflib.ndiff(before.splitlines(), edited(before, edits, path).splitlines())
+        lines += [f'In {path}:', *(line for line in changed if line[0] in '-+')]
+    return lines
+
+
 FAULTS = {path.parent.name: read(path.parent) for path in sorted(HERE.glob(f'*/{FILE}'))}
 
 
@@ -189,8 +200,8 @@ class Case:
 
     @property
     def is_changed(self) -> bool:
-        """Whether a file is not as it was, or a build may have changed what runs."""
-        return self.files != self.given or bool(self.fault.installed)
+        """Whether a file is not as it was, or commands may have changed what runs."""
+        return bool(self.files != self.given or self.fault.installed or self.wrong_mends())
 
     def wrong_mends(self) -> list[Mend]:
         """Return those of the tempting mends that are seen in what was changed."""

@@ -20,7 +20,7 @@ from helpers.workspace import Process, without_folders
 DRIVER = TURTLEBOT3.but(max_speed=0.5)  # twice as fast as a real one, which is slow to look at
 LAUNCH = 'source install/setup.bash\nros2 launch {name} bringup.launch.xml robot:=false'
 READY_S, PATIENCE_S = 30.0, 3.0
-STILL_S, LONGEST_S = 1.2, 15.0
+STILL_S, LONGEST_S = 1.2, 12.0
 ENDS_S = 15.0  # launch waits 5 s, and once more, for a program that does not end
 TROUBLE_M, TROUBLE_S = 0.4, 1.4
 AHEAD = np.radians(np.arange(-10.0, 11.0))

@@ -1,6 +1,5 @@
 """What the tasks of the lesson "Find the fault" are judged by."""
 
-import difflib
 import random
 import re
 import time
@@ -9,7 +8,7 @@ from helpers.checks import progress
 from helpers.checks.errors import Failed
 from helpers.checks.programs import error_of_launch
 from helpers.checks.tasks import Tasks, once
-from helpers.faults import FAULTS, KINDS, OTHER, take
+from helpers.faults import FAULTS, KINDS, OTHER, mend_in_words, take
 from helpers.faults import drive as drive_apart
 
 tasks = Tasks()
@@ -54,6 +53,8 @@ def drive(case):
 
 def did(end):
     """Return what a robot did, in words that do not move."""
+    if end.how in ('stops', 'hits', 'goes on') and abs(end.turned) > TURNED:
+        return 'turns away.'
     if end.how == 'stops':
         near = end.free_m < 0.8
         return 'stops near the wall.' if near else 'stops far away from the wall.'
@@ -94,24 +95,7 @@ def give_up(case):
     """Say what is wrong with a robot, how it is seen, and what mends it."""
     fault = case.fault
     print(f'{fault.broken}\nSeen by: {case.named(fault.look)}\nIts line: {fault.line}')
-    mend = fault.right[0]
-    print(*(case.named(line) for line in mends(fault, mend)), sep='\n')
-
-
-def mends(fault, mend):
-    """Return a mend as lines: commands, or what goes and comes in a file."""
-    lines = mend.run.splitlines()
-    for path, edits in mend.edit.items():
-        before = fault.files[path]
-        after = before
-        for old, new in edits.items():
-            after = after.replace(old, new)
-        changed = difflib.unified_diff(before.splitlines(), after.splitlines(), n=0, lineterm='')
-        lines += [
-            f'In {path}:',
-            *(line for line in changed if not re.match(r'---|\+\+\+|@@', line)),
-        ]
-    return lines
+    print(*(case.named(line) for line in mend_in_words(fault)), sep='\n')
 
 
 # --- Tasks
@@ -255,4 +239,5 @@ def params(case):
 
 def with_mends(case, found):
     """Return what was found, and what is said of each tempting mend that is seen."""
-    return '. '.join([found, *(mend.says for mend in case.wrong_mends())])
+    said = [mend.says for mend in case.wrong_mends()]
+    return ' '.join([f'{found}.', *said]) if said else found

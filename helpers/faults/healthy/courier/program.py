@@ -12,7 +12,8 @@ def run(make_node):
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     node = make_node()
     try:
-        rclpy.spin(node)
+        while rclpy.ok():  # Python sees a signal between two of its own lines only
+            rclpy.spin_once(node, timeout_sec=0.1)
     except KeyboardInterrupt:
         pass
     finally:

@@ -9,7 +9,7 @@ from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
 from courier.program import run
 
-GAIN = 2.0  # rad/s for each rad
+GAIN = 4.0  # rad/s for each rad
 MAX_TURN = 1.0  # rad/s
 
 
