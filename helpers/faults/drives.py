@@ -22,7 +22,7 @@ LAUNCH = 'source install/setup.bash\nros2 launch {name} bringup.launch.xml robot
 READY_S, PATIENCE_S = 30.0, 3.0
 STILL_S, LONGEST_S = 1.2, 12.0
 ENDS_S = 15.0  # launch waits 5 s, and once more, for a program that does not end
-TROUBLE_M, TROUBLE_S = 0.4, 1.4
+TROUBLE_M, TROUBLE_S, PUSH_S = 0.4, 1.4, 0.5
 AHEAD = np.radians(np.arange(-10.0, 11.0))
 NODES = 3  # of the package
 DIED = 'process has died'
@@ -78,8 +78,9 @@ class Drive:
 def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', params='') -> Drive:
     """Launch a robot's programs beside it, and let it drive until something is decided.
 
-    With a `name` one sees it. `trouble` is 'blind' or 'clock': what happens to its laser for a
-    moment on its way. `params` are more words of `ros2 launch`.
+    With a `name` one sees it. `trouble` is what happens for a moment on its way: 'blind', its laser
+    sees nothing; 'clock', its stamps are ahead; 'push', it is blind, and somebody turns it by
+    remote control. `params` are more words of `ros2 launch`.
     """
     workspace = case.workspace
     end_launches(workspace.terminals.values())
@@ -164,17 +165,20 @@ class Watcher:
             self._set_trouble(True)
         if self.braked is not None:
             return False
-        if now_s - self._trouble_at_s < TROUBLE_S:
+        since_s = now_s - self._trouble_at_s
+        if self.trouble == 'push' and since_s < PUSH_S:
+            self.robot.command(0.0, 1.0)
+        if since_s < TROUBLE_S:
             return True
         self.braked, self._trouble_at_m = is_still, self.moved_m
         self._set_trouble(False)
         return False
 
     def _set_trouble(self, is_there: bool) -> None:
-        if self.trouble == 'blind':
-            self.robot.blind = is_there
-        else:
+        if self.trouble == 'clock':
             self.robot.clock_ahead_s = 5.0 if is_there else 0.0
+        else:
+            self.robot.blind = is_there
 
     def _waited_enough(self) -> bool:
         """Return whether a robot that stands will not move any more: a slow machine has longer."""

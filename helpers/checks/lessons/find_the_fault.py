@@ -198,6 +198,7 @@ def mended(case):
 
     trouble = {
         'blind': 'while its laser sees nothing it stops, then it goes on',
+        'push': 'while its laser sees nothing it stops, then it goes on',
         'clock': 'while the stamps of its scans are wrong it stops, then it goes on',
     }[case.fault.trouble]
     return [
