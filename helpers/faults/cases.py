@@ -46,7 +46,8 @@ class Mend:
     """A change of a robot: edits of its files, {file: {old: new}}, and commands in a terminal.
 
     Of a wrong mend, `says` tells what it does. It is known by the pattern `sees`, in the lines that
-    were added and the commands that were run, or by a text that no file has any more, `lacks`.
+    were added or, if it has a `run`, in the commands; or by a text that no file has any more,
+    `lacks`.
     """
 
     edit: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
@@ -205,15 +206,15 @@ class Case:
 
     def wrong_mends(self) -> list[Mend]:
         """Return those of the tempting mends that are seen in what was changed."""
-        files = self.files
-        changed = [commands for commands, _ in self.commands()]
+        files, added = self.files, []
         for path, text in files.items():
             lines = difflib.ndiff(self.given.get(path, '').splitlines(), text.splitlines())
-            changed += [line[2:] for line in lines if line.startswith('+ ')]
+            added += [line[2:] for line in lines if line.startswith('+ ')]
+        ran = '\n'.join(commands for commands, _ in self.commands())
         return [
             mend
             for mend in self.fault.wrong
-            if (mend.sees and re.search(mend.sees, '\n'.join(changed)))
+            if (mend.sees and re.search(mend.sees, ran if mend.run else '\n'.join(added)))
             or (mend.lacks and not any(mend.lacks in text for text in files.values()))
         ]
 
