@@ -12,6 +12,7 @@ from behind it. A room imports only from the rooms that stand above it in this l
     workspace  a colcon workspace for a notebook, and processes that end
     robot      a small robot behind real messages, and how one sees it
     fusion     one pose from several imperfect sensors
+    faults     somebody else's robots, each with a fault that one finds and mends
     checks     guesses and tasks: what is right, what the student's code did, and a hint
 
 tests/test_doors.py reads the list, and checks the imports.

@@ -85,6 +85,16 @@ def test_passed_tasks_are_kept(kept):
     assert kept.read_text() == 'lose_them 1\n'
 
 
+def test_what_a_task_was_about_is_kept_if_it_differs(kept):
+    tasks = Tasks()
+    tasks.add(1, about=str.lower)(lambda word: [('it is right', lambda: word != 'WRONG', '')])
+    for word in ('WRONG', 'ADA', 'BO', 'ADA'):
+        tasks.check(1, word)
+    assert progress.about(1) == ['ada', 'bo']
+    assert progress.about(2) == []
+    assert kept.read_text().splitlines()[0] == 'lose_them 1'
+
+
 def test_kernels_that_write_at_once_lose_nothing(kept, capsys):
     write = (
         'import random, sys; from helpers.checks import progress; '

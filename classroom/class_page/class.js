@@ -97,6 +97,8 @@ function show(state) {
     for (const key of ['solved', 'tried', 'open']) row.append(element('td', one[key]));
     return row;
   }));
+  put('about', state.about, ({ about, tasks }) =>
+    element('li', `${about}: ${tasks.map(({ number, who }) => `task ${number}: ${who.join(', ')}`).join('; ')}`));
   find('joins').textContent = state.joins.join('\n');
   if (cell) parent.postMessage(document.documentElement.offsetHeight, '*'); // to the deck
   if (shown.notes !== state.notes) find('notes').innerHTML = shown.notes = state.notes; // the lesson's

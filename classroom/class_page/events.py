@@ -31,6 +31,7 @@ KINDS = {
     'guess': _form(**EVENT, question=TEXT, value=VALUE),
     'outcome': _form(**EVENT, question=TEXT, value=VALUE),
     'task': _form(**EVENT, task={'type': 'integer'}, solved={'type': 'boolean'}),
+    'about': _form(**EVENT, about=TEXT, task={'type': 'integer'}),
     'cell': _form(**EVENT, cell=TEXT),
     'hand': _form(**EVENT, up={'type': 'boolean'}),
 }

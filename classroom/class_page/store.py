@@ -47,6 +47,11 @@ GROUP BY seat ORDER BY n
 SOLVED = """
 SELECT max(value) FROM events WHERE kind = 'task' AND lesson = ? AND what = ? GROUP BY seat
 """
+# Who has solved a task of which each student has another one, by what it was about.
+ABOUT = """
+SELECT DISTINCT what, value, seat FROM events WHERE kind = 'about' AND lesson = ?
+ORDER BY what, CAST(value AS INTEGER), seat
+"""
 
 
 class ClassStore:
@@ -175,6 +180,7 @@ class ClassStore:
                 if known.step_of[guess.asked] <= step <= known.step_of[guess.compared]
             ],
             'tasks': [self._task(lesson, number, len(names)) for number in known.tasks],
+            'about': self._about(lesson, names),
             'hands': [{'seat': seat, 'name': names.get(seat, '')} for seat in hands],
         }
 
@@ -202,6 +208,19 @@ class ClassStore:
         solved = tries.count(('true',))
         tried = len(tries) - solved
         return {'number': number, 'solved': solved, 'tried': tried, 'open': seats - len(tries)}
+
+    def _about(self, lesson: str, names: dict[int, str]) -> list[dict]:
+        found: dict[str, dict[str, list[str]]] = {}
+        for about, task, seat in self._db.execute(ABOUT, [lesson]):
+            who = names.get(seat) or f'seat {seat}'
+            found.setdefault(about, {}).setdefault(task, []).append(who)
+        return [
+            {
+                'about': about,
+                'tasks': [{'number': int(task), 'who': who} for task, who in by.items()],
+            }
+            for about, by in found.items()
+        ]
 
     def busiest(self) -> tuple[str, int] | None:
         """Return the lesson and the step at which most students are, None if nobody is."""

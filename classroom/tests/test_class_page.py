@@ -98,6 +98,19 @@ def test_steps_tasks_hands_and_notes(opened):
     assert [hand['name'] for hand in opened.view()['hands']] == ['']
 
 
+def test_who_has_solved_which_of_a_task_that_differs(opened):
+    ada, other = opened.join(name='Ada'), opened.join()
+    for number in (1, 2):
+        opened.tell(ada, event('about', number, about='plain_twist', task=1))
+    opened.tell(other, event('about', 3, about='slow_look', task=1))
+    seat = opened.view()['about'][1]['tasks'][0]['who'][0]
+    assert opened.view()['about'] == [
+        {'about': 'plain_twist', 'tasks': [{'number': 1, 'who': ['Ada']}]},
+        {'about': 'slow_look', 'tasks': [{'number': 1, 'who': [seat]}]},
+    ]
+    assert seat.startswith('seat ')
+
+
 def test_a_guess_is_shown_until_it_is_compared(opened):
     opened.tell(opened.join(), event(value=41), event('outcome', 1, question=QUESTION, value=14))
     for step, questions in enumerate([[], [QUESTION, OTHER], [QUESTION]]):
@@ -208,6 +221,7 @@ ATTACKS = [
     *({k: v for k, v in event().items() if k != missing} for missing in event()),
     *(event('task', task=n, solved=True) for n in [-1, 1.5, '1', 2**70, True]),
     event('task', task=1, solved=1),
+    event('about', about=3, task=1),
     event('hand', up='yes'),
     event('cell', cell='../..'),
     event() | {'lesson': '../02'},

@@ -76,8 +76,8 @@ def file() -> Path | None:
     return Path(named) if named else None
 
 
-def record(task: int) -> None:
-    """Keep that this task of the running lesson is solved.
+def record(task: int, about: str = '') -> None:
+    """Keep that this task of the running lesson is solved, and about what it was, in one word.
 
     If the file cannot be written nothing happens, since no lesson may fail because of it. `show`
     says so.
@@ -86,10 +86,20 @@ def record(task: int) -> None:
     if path is None or not lesson:
         return
     with suppress(OSError):
-        key = f'{lesson} {task}'
-        if key not in _read(path).splitlines():
-            with path.open('ab', buffering=0) as lines:  # a short write is one system call
-                lines.write(f'{key}\n'.encode())
+        for key in (f'{lesson} {task}', f'{lesson} {task} {about}'.strip()):
+            if key not in _read(path).splitlines():
+                with path.open('ab', buffering=0) as lines:  # a short write is one system call
+                    lines.write(f'{key}\n'.encode())
+
+
+def about(task: int) -> list[str]:
+    """Return what this task of the running lesson was about whenever it was solved."""
+    path, start = file(), f'{this_lesson()} {task} '
+    if path is None:
+        return []
+    with suppress(OSError):
+        return [line[len(start) :] for line in _read(path).splitlines() if line.startswith(start)]
+    return []
 
 
 def show() -> None:

@@ -72,18 +72,26 @@ class Tasks:
 
     def __init__(self) -> None:
         self._tasks: dict[int, tuple[Callable, float, float]] = {}
+        self._about: dict[int, Callable[..., str]] = {}
 
     def add(
-        self, number: int, limit_s: float = LIMIT_S, cpu_s: float = CPU_LIMIT_S
+        self,
+        number: int,
+        limit_s: float = LIMIT_S,
+        cpu_s: float = CPU_LIMIT_S,
+        about: Callable[..., str] | None = None,
     ) -> Callable[[Callable], Callable]:
         """Register a function as the judge of a task.
 
         Each of its points may use `cpu_s` seconds of CPU and `limit_s` seconds of the clock. If one
         needs more, those after it are not tried. A build is none of its CPU, but takes its time.
+        If a task is another one for each student, `about` gets the answer and says which.
         """
 
         def register(function: Callable) -> Callable:
             self._tasks[number] = function, cpu_s, limit_s
+            if about is not None:
+                self._about[number] = about
             return function
 
         return register
@@ -110,9 +118,12 @@ class Tasks:
         _show(verdict)
         if of == 'answer' and verdict.points:
             _solved[number] = verdict.solved
+            about = self._about[number](*answer) if number in self._about else ''
             if verdict.solved:
-                progress.record(number)
+                progress.record(number, about)
             classroom.tell_task(number, verdict.solved)
+            if about and verdict.solved:
+                classroom.tell_about(number, about)
 
 
 def once(function: Callable[[], object]) -> Callable[[], object]:

@@ -71,6 +71,7 @@ class Workspace:
         self.path = underlay.path / name if underlay else claim(name)
         self._processes: dict[tuple[str, ...], Process] = {}
         self.terminals: dict[str, Process] = {}
+        self._ran: list[tuple[str, str | Process]] = []  # in terminals
         # What the last sourcing gave, and the state of the folder `install` then.
         self._sourced: tuple[object, dict[str, str]] | None = None
         self._parts: dict[Path, list[str]] = {}  # of the files that several cells write
@@ -250,7 +251,10 @@ class Workspace:
         Raises TimeoutError if they take longer than 60 s.
         """
         with self._bash('terminal', commands) as shell:
-            shell.wait(60)
+            try:
+                shell.wait(60)
+            finally:
+                self._ran.append((commands, '\n'.join(shell.lines)))
         for workspace in (self, *self._overlays.values()):
             workspace._sourced = None  # the commands may have built
         text = without_folders('\n'.join(shell.lines), self.path)
@@ -266,7 +270,16 @@ class Workspace:
         if name in self.terminals:
             self.terminals[name].stop()
         self.terminals[name] = self._bash(name, commands)
+        self._ran.append((commands, self.terminals[name]))
         return self.terminals[name]
+
+    @property
+    def ran(self) -> list[tuple[str, str]]:
+        """What was run in terminals so far: the commands, and what they have printed."""
+        return [
+            (commands, said if isinstance(said, str) else '\n'.join(said.lines))
+            for commands, said in self._ran
+        ]
 
     def _bash(self, name: str, commands: str) -> Process:
         environment = build_environment() | self._environment_of_nodes()

@@ -1,24 +1,244 @@
-"""What the tasks of this lesson are judged by."""
+"""What the tasks of the lesson "Find the fault" are judged by."""
 
-from std_msgs.msg import Int32
+import random
+import re
+import time
 
-from helpers.checks.bench import Bench
-from helpers.checks.tasks import Tasks
+from helpers.checks import progress
+from helpers.checks.errors import Failed
+from helpers.checks.programs import error_of_launch
+from helpers.checks.tasks import Tasks, once
+from helpers.faults import FAULTS, KINDS, OTHER, mend_in_words, take
+from helpers.faults import drive as drive_apart
 
 tasks = Tasks()
 check = tasks.check
 
+CORE = {'ada': 'deaf_brake', 'bo': 'unread_limit', 'cleo': 'slow_look', 'dan': 'second_voice'}
+OTHERS = 'eve', 'finn', 'gus', 'hana', 'ivo', 'joy', 'kim', 'leo', 'mia', 'noa', 'oli', 'pia'
+LAST = 10  # the task that mends one of the others
+UP_S = 60.0
+NODES = '/brake', '/manager', '/robot', '/route'
+STOP_M = 0.9  # in the file of the drive that judges
+NEARER_M, FARTHER_M = 0.35, 0.15  # it may stop so far from that: it is heard late, and measured
+TURNED = 0.3  # rad, to both sides
+LEAST = 3  # letters of a line
 
-@tasks.add(1)
-def hear_the_numbers(Listener):
-    def keeps(*numbers):
-        with Bench() as bench:
-            listener = bench.spin(Listener())
-            bench.say('number', *(Int32(data=number) for number in numbers))
-        return listener.heard == [*numbers] or f'of {[*numbers]} it kept {listener.heard}'
 
-    hint = 'A list has .append(...), and an Int32 has .data.'
+# --- Robots
+
+
+def robot(workspace, name):
+    """Return the robot ada, bo, cleo or dan; its package is in src."""
+    return take(workspace, FAULTS[CORE[name]], name)
+
+
+def next_robot(workspace, seed):
+    """Return the next robot: the number decides in which order they come.
+
+    First those come that have not been mended yet, without those of the core. Then all of them.
+    """
+    known = progress.about(LAST)
+    left = [fault for fault in FAULTS if fault not in {*known, *CORE.values()}]
+    order = sorted(left or FAULTS)
+    random.Random(seed).shuffle(order)
+    return take(workspace, FAULTS[order[0]], OTHERS[len(known) % len(OTHERS)])
+
+
+def drive(case):
+    """Drive a robot in the page, and say what it did."""
+    end = drive_apart(case, name=case.name)
+    print(case.name, did(end))
+
+
+def did(end):
+    """Return what a robot did, in words that do not move."""
+    if end.how in ('stops', 'hits', 'goes on') and abs(end.turned) > TURNED:
+        return 'turns away.'
+    if end.how == 'stops':
+        near = end.free_m < 0.8
+        return 'stops near the wall.' if near else 'stops far away from the wall.'
+    if end.how == 'died':
+        return f'cannot be launched: {error_of_launch(end.said)}'
+    return {
+        'stands': 'does not move.',
+        'hits': 'hits the wall.',
+        'goes on': 'drives on and on.',
+    }[end.how]
+
+
+def wait_until_up(case):
+    """Wait until the robot and the three nodes of its package are there."""
+    end_s = time.monotonic() + UP_S
+    while not set(NODES) <= set(case.workspace.terminal('ros2 node list').splitlines()):
+        if time.monotonic() > end_s:
+            raise TimeoutError(f'Of {case.name} not all nodes have come: does its launch run?')
+
+
+def seen(case):
+    """Run the command that shows what is wrong. Return the kind, the command and its line."""
+    fault, look = case.fault, case.named(case.fault.look)
+    if look.startswith('ros2 launch'):
+        case.workspace.terminals[case.name].wait_for(fault.line, UP_S)
+    else:
+        case.workspace.terminal(f'source install/setup.bash\n{look}')
+    return fault.kind, look, fault.line
+
+
+def mend(case):
+    """Begin with the robot as it was, and mend it."""
+    case.write(case.fault.files)
+    case.mend(case.fault.right[0])
+
+
+def give_up(case):
+    """Say what is wrong with a robot, how it is seen, and what mends it."""
+    fault = case.fault
+    print(f'{fault.broken}\nSeen by: {case.named(fault.look)}\nIts line: {fault.line}')
+    print(*(case.named(line) for line in mend_in_words(fault)), sep='\n')
+
+
+# --- Tasks
+
+
+def found(case, kind, command, line):
+    """Judge what somebody says is wrong, and by what it is seen."""
+
+    def outputs():
+        wanted = words(command)
+        if wanted in ('', 'None'):
+            raise Failed('no command yet')
+        printed = [said for ran, said in case.commands() if wanted in words(ran)]
+        if not printed:
+            raise Failed(f'since {case.name} is here, no cell with %%terminal has run: {wanted}')
+        return printed
+
+    def lines():
+        wanted = words(line)
+        if wanted in ('', 'None'):
+            raise Failed('no line yet')
+        printed = [words(one) for said in outputs() for one in said.splitlines()]
+        same = [one for one in printed if wanted == one or (wanted in one and len(wanted) >= LEAST)]
+        if not same:
+            raise Failed(f'{words(command)} has printed no line with: {wanted}')
+        return same
+
+    def was_run():
+        return bool(outputs())
+
+    def was_printed():
+        return bool(lines())
+
+    def shows_the_fault():
+        for pair in case.fault.evidence:
+            if re.search(case.named(pair.command), words(command)) and any(
+                re.search(pair.line, one) for one in lines()
+            ):
+                return True
+        lines()
+        return 'a robot without a fault could print this, too'
+
+    def is_of_this_kind():
+        if kind not in KINDS:
+            return f'{kind!r} is none of the kinds'
+        return kind in (case.fault.kind, *case.fault.also) or f'{kind}: no'
+
     return [
-        ('it keeps two numbers in order', lambda: keeps(3, 1), hint),
-        ('it keeps one number', lambda: keeps(7), hint),
+        ('the command was run', was_run, 'Run it in a cell that begins with %%terminal.'),
+        ('it has printed the line', was_printed, 'Copy the line from its output.'),
+        ('the line shows the fault', shows_the_fault, case.fault.hint),
+        ('the kind of the fault', is_of_this_kind, case.fault.hint),
     ]
+
+
+def mended(case):
+    """Judge a robot that somebody has mended, on another floor and with another limit."""
+
+    @once
+    def driven():
+        if not case.is_changed:
+            raise Failed(f'the files of {case.name} are as you got them')
+        if lost := case.lost():
+            raise Failed(lost)
+        return drive_apart(case, OTHER, trouble=case.fault.trouble, params=params(case))
+
+    def drives_off():
+        end = driven()
+        if end.how == 'died':
+            raise Failed(error_of_launch(end.said) or 'the launch has ended, and said nothing')
+        return end.how != 'stands' or with_mends(case, 'it does not move')
+
+    def minds_its_laser():
+        end = driven()
+        if end.braked is None:
+            return 'it did not come so far'
+        if not end.braked:
+            return with_mends(case, 'it drives on')
+        return end.went_on or with_mends(case, 'it stops, and never goes on')
+
+    def arrives():
+        end = driven()
+        if end.how in ('stands', 'died'):
+            return 'it did not come so far'
+        if end.how == 'hits':
+            return with_mends(case, 'it hits something')
+        if end.how == 'goes on':
+            return with_mends(case, 'it does not come to an end')
+        if abs(end.turned) > TURNED:
+            return with_mends(case, 'it does not keep its direction')
+        away_m = end.free_m - STOP_M
+        if -NEARER_M <= away_m <= FARTHER_M:
+            return True
+        found = f'it stops {end.free_m:.1f} m before something, and stop_m was {STOP_M}'
+        return with_mends(case, found)
+
+    def rests():
+        end = driven()
+        return end.stands_at_exit or 'its last command was to drive'
+
+    trouble = {
+        'blind': 'while its laser sees nothing it stops, then it goes on',
+        'push': 'while its laser sees nothing it stops, then it goes on',
+        'clock': 'while the stamps of its scans are wrong it stops, then it goes on',
+    }[case.fault.trouble]
+    return [
+        (f'on another floor {case.name} drives off', drives_off, case.fault.hint),
+        (trouble, minds_its_laser, case.fault.hint),
+        ('it stops where its file says, and hits nothing', arrives, case.fault.hint),
+        ('Ctrl+C leaves it at rest', rests, 'How does brake.py end?'),
+    ]
+
+
+def fault_of(case, *answer):
+    """Return which fault a task is about."""
+    return case.fault.name
+
+
+for number in (1, 3, 5, 7, LAST - 1):
+    tasks.add(number, about=fault_of)(found)
+    tasks.add(number + 1, limit_s=120, cpu_s=60, about=fault_of)(mended)
+
+
+def words(text):
+    """Return a text without what white space means nothing."""
+    return ' '.join(str(text).split()) if text is not ... else ''
+
+
+def params(case):
+    """Write the robot's own file of parameters with another limit, and return how it is given."""
+    file = f'install/{case.name}/share/{case.name}/config/{case.name}.yaml'
+    try:
+        text = case.workspace.file(file).read_text(encoding='utf-8')
+    except OSError:
+        raise Failed(f'{file} cannot be read: is config/{case.name}.yaml still there?') from None
+    text, count = re.subn(r'(\bstop_m["\']?\s*:\s*)[-\d.]+', rf'\g<1>{STOP_M}', text)
+    if not count:
+        raise Failed(f'config/{case.name}.yaml says no stop_m any more')
+    case.workspace.write('judged.yaml', text)
+    return 'params_file:=judged.yaml'
+
+
+def with_mends(case, found):
+    """Return what was found, and what is said of each tempting mend that is seen."""
+    said = [mend.says for mend in case.wrong_mends()]
+    return ' '.join([f'{found}.', *said]) if said else found

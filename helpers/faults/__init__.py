@@ -1,0 +1,30 @@
+"""Somebody else's robots, each with a fault that one finds and mends.
+
+    ada = take(workspace, FAULTS['...'], 'ada')     its package is in src/ada, and built
+    drive(ada, name='ada')                          in the page, as it is launched
+
+The folder `healthy` is a package that works: a route that wants to go straight on, a brake between
+it and the robot, and a manager. Each other folder here is a fault: the files that it changes, and
+`fault.yaml`, which says what is broken, how it is found, which mends are right, and which are
+tempting and wrong. Another fault is another folder: CONTRIBUTING.md says what is in its file.
+
+    cases    read the folders, put a robot into a workspace, mend it
+    drives   drive it, in the page or to judge it
+"""
+
+from helpers.faults.cases import FAULTS, KINDS, Case, Fault, Mend, mend_in_words, take
+from helpers.faults.drives import OTHER, SEEN, Drive, drive
+
+__all__ = [
+    'FAULTS',
+    'KINDS',
+    'OTHER',
+    'SEEN',
+    'Case',
+    'Drive',
+    'Fault',
+    'Mend',
+    'drive',
+    'mend_in_words',
+    'take',
+]

@@ -1,0 +1,212 @@
+"""Drive a robot as it is launched, in the page or to judge it, and say what it did."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from helpers.faults.cases import Case
+from helpers.robot import CORRIDOR, TURTLEBOT3, DriveRecord, Floor, Pose, Robot, watch
+from helpers.ros import Session, ros_session
+from helpers.workspace import Process, without_folders
+
+DRIVER = TURTLEBOT3.but(max_speed=0.5)  # twice as fast as a real one, which is slow to look at
+LAUNCH = 'source install/setup.bash\nros2 launch {name} bringup.launch.xml robot:=false'
+READY_S, PATIENCE_S = 30.0, 3.0
+STILL_S, LONGEST_S = 1.2, 12.0
+ENDS_S = 15.0  # launch waits 5 s, and once more, for a program that does not end
+TROUBLE_M, TROUBLE_S, PUSH_S = 0.4, 1.4, 0.5
+AHEAD = np.radians(np.arange(-10.0, 11.0))
+NODES = 3  # of the package
+DIED = 'process has died'
+
+
+@dataclass(frozen=True)
+class Place:
+    """A floor, and where the robot starts on it."""
+
+    floor: Floor
+    start: Pose | None = None
+
+
+SEEN = Place(CORRIDOR, Pose(2.25, 1.25, 0.0))
+OTHER = Place(
+    Floor.from_text(
+        """
+#######
+#     #
+#     #
+#     #
+#  o  #
+#     #
+#     #
+#     #
+#  ^  #
+#######
+""",
+        name='storeroom',
+    )
+)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What a robot did.
+
+    `how` it ended is 'stands' (it never moved), 'hits', 'stops' (it drove, and stands), 'goes on'
+    (too long), or 'died' (a program did, or the launch file cannot be read).
+    """
+
+    how: str
+    record: DriveRecord
+    said: str  # what the launch has printed
+    moved_m: float  # from start to end, straight
+    free_m: float  # ahead of its middle, at the end
+    turned: float  # at the end (rad)
+    braked: bool | None  # while its laser saw nothing; None: it did not come so far
+    went_on: bool  # after that
+    stands_at_exit: bool  # its last command, after Ctrl+C, was to stop
+
+
+def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', params='') -> Drive:
+    """Launch a robot's programs beside it, and let it drive until something is decided.
+
+    With a `name` one sees it. `trouble` is what happens for a moment on its way: 'blind', its laser
+    sees nothing; 'clock', its stamps are ahead; 'push', it is blind, and somebody turns it by
+    remote control. `params` are more words of `ros2 launch`.
+    """
+    workspace = case.workspace
+    end_launches(workspace.terminals.values())
+    words = f'{LAUNCH.format(name=case.name)} {params}'.strip()
+    with ros_session() as session:
+        robot = Robot(place.floor, start=place.start, driver=DRIVER)
+        if name:
+            watch(robot, name=name)
+        with workspace.start(words, f'the launch of {case.name}') as program:
+            watcher = Watcher(session, robot, program, trouble)
+            robot.run(READY_S + LONGEST_S + ENDS_S, until=watcher.is_over)
+            end_launch(program)
+        for record in session.records():  # what programs log stands in their terminal
+            record.printed = True
+        x, y, yaw = robot.pose
+        robot.run(0.2)  # its last command may be on its way
+        last = robot.record.commands[-1:]
+        return Drive(
+            how=watcher.how or 'goes on',
+            record=robot.record,
+            said=without_folders('\n'.join(program.lines), workspace.path),
+            moved_m=watcher.moved_m,
+            turned=math.remainder(yaw - watcher.start.yaw, math.tau),
+            free_m=float(place.floor.ranges(x, y, yaw + AHEAD)[0].min()),
+            braked=watcher.braked,
+            went_on=watcher.went_on,
+            stands_at_exit=not last or last[0].v == last[0].w == 0,
+        )
+
+
+class Watcher:
+    """Looks at a drive until it is over, and brings the trouble."""
+
+    def __init__(self, session: Session, robot: Robot, program: Process, trouble: str) -> None:
+        self.session, self.robot, self.program, self.trouble = session, robot, program, trouble
+        self.how, self.braked, self.went_on = '', None, False
+        self._begun_s, self._ready_s = time.monotonic(), None
+        self._moved_at_s = self._still_at_s = self._trouble_at_s = None
+        self._trouble_at_m = 0.0
+        self.start = robot.pose
+
+    @property
+    def moved_m(self) -> float:
+        """How far it is from its start."""
+        return math.dist(self.start[:2], self.robot.pose[:2])
+
+    def is_over(self) -> bool:
+        """Return whether something is decided, and keep in `how` what."""
+        self.how = self._decide()
+        return bool(self.how)
+
+    def _decide(self) -> str:
+        robot, now_s = self.robot, self.robot.t_s
+        if robot.bumps:
+            return 'hits'
+        if not self.program.running or any(DIED in line for line in self.program.lines):
+            return 'died'
+        step = robot.record.poses[-1]
+        is_still = step.v == 0 == step.w
+        if self._moved_at_s is None:
+            if is_still:
+                return 'stands' if self._waited_enough() else ''
+            self._moved_at_s = now_s
+        if self.trouble and self._is_in_trouble(now_s, is_still):
+            return ''
+        if self.braked is not None and self.moved_m > self._trouble_at_m + 0.1:
+            self.went_on = True
+        if not is_still:
+            self._still_at_s = None
+        elif self._still_at_s is None:
+            self._still_at_s = now_s
+        elif now_s - self._still_at_s > STILL_S:
+            return 'stops'
+        return 'goes on' if now_s - self._moved_at_s > LONGEST_S else ''
+
+    def _is_in_trouble(self, now_s: float, is_still: bool) -> bool:
+        """Bring the trouble when it is on its way, and end it after its time."""
+        if self._trouble_at_s is None:
+            if self.moved_m < TROUBLE_M:
+                return False
+            self._trouble_at_s = now_s
+            self._set_trouble(True)
+        if self.braked is not None:
+            return False
+        since_s = now_s - self._trouble_at_s
+        if self.trouble == 'push' and since_s < PUSH_S:
+            self.robot.command(0.0, 1.0)
+        if since_s < TROUBLE_S:
+            return True
+        self.braked, self._trouble_at_m = is_still, self.moved_m
+        self._set_trouble(False)
+        return False
+
+    def _set_trouble(self, is_there: bool) -> None:
+        if self.trouble == 'clock':
+            self.robot.clock_ahead_s = 5.0 if is_there else 0.0
+        else:
+            self.robot.blind = is_there
+
+    def _waited_enough(self) -> bool:
+        """Return whether a robot that stands will not move any more: a slow machine has longer."""
+        now_s = time.monotonic()
+        if self._ready_s is None:
+            names = set(self.session.node.get_node_names()) - {self.robot.get_name()}
+            names.discard(self.session.node.get_name())
+            if len(names) < NODES and now_s - self._begun_s < READY_S:
+                return False
+            self._ready_s = now_s
+        return now_s - self._ready_s > max(PATIENCE_S, 1.5 * (self._ready_s - self._begun_s))
+
+
+def end_launch(process: Process) -> None:
+    """Press Ctrl+C, and wait for all programs of a launch."""
+    if process.running:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGINT)
+    _wait(lambda: not process.running, ENDS_S)
+
+
+def end_launches(processes) -> None:
+    """End the launches of terminals that are still open, of which robots would hear."""
+    for process in [*processes]:
+        end_launch(process)
+
+
+def _wait(condition: Callable[[], bool], limit_s: float) -> None:
+    end_s = time.monotonic() + limit_s
+    while not condition() and time.monotonic() < end_s:
+        time.sleep(0.02)

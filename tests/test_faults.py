@@ -1,0 +1,156 @@
+"""The faults, as their folders say them. tests/answers/test_faults.py drives them all."""
+
+import ast
+import re
+import xml.dom.minidom
+
+import pytest
+import yaml
+
+from helpers.checks.lessons.find_the_fault import CORE, OTHERS, found, mended
+from helpers.faults import FAULTS, KINDS, OTHER, Case, drive, take
+from helpers.faults.cases import FILE, HEALTHY, edited, read
+from helpers.workspace import Workspace
+
+MENDS = [(fault, mend) for fault in FAULTS.values() for mend in (*fault.right, *fault.wrong)]
+
+
+@pytest.fixture(scope='module')
+def workspace():
+    opened = Workspace('test_faults')
+    yield opened
+    opened.close()
+
+
+def results(points):
+    """Return for each point whether it is met, or what was found."""
+    said = []
+    for _, test, _ in points:
+        try:
+            result = test()
+        except Exception as error:
+            result = str(error)
+        said.append(result if isinstance(result, str) else bool(result))
+    return said
+
+
+class Offline(Workspace):
+    """A folder in which nothing runs."""
+
+    def __init__(self, path):
+        self.path, self._parts, self._ran = path, {}, []
+
+    def terminal(self, commands):
+        self._ran.append((commands, ''))
+        return ''
+
+
+def check_syntax(path, text):
+    if path.endswith('.py'):
+        ast.parse(text)
+    elif path.endswith('.yaml'):
+        yaml.safe_load(text)
+    elif path.endswith('.xml'):
+        xml.dom.minidom.parseString(text)
+
+
+@pytest.mark.parametrize('name', FAULTS)
+def test_a_folder_says_all(name):
+    fault = FAULTS[name]
+    assert {fault.kind, *fault.also} <= {*KINDS}
+    assert {*fault.fails} <= {'stands', 'hits', 'stops', 'goes on'}
+    assert fault.broken.endswith('.')
+    assert fault.hint.endswith(('.', '?'))
+    assert len(fault.right) >= 2
+    assert len(fault.wrong) == 3
+    assert any(re.search(pair.command, fault.look) for pair in fault.evidence)
+    for path, text in fault.files.items():
+        check_syntax(path, text)
+    for mend in fault.wrong:
+        assert bool(mend.sees) != bool(mend.lacks)
+        assert mend.says.endswith('.')
+
+
+@pytest.mark.parametrize(('fault', 'mend'), MENDS)
+def test_a_mend_can_be_made_and_is_known(fault, mend, tmp_path):
+    robot = Case(Offline(tmp_path), fault, 'ada')
+    robot.write(fault.files)
+    assert robot.files == robot.given
+    robot.mend(mend)
+    assert robot.files != robot.given or mend.run
+    for path, text in robot.files.items():
+        check_syntax(path, text)
+    assert mend in robot.wrong_mends() or mend in fault.right
+
+
+def test_the_core_has_four_and_each_other_one_a_name():
+    assert {*CORE.values()} <= {*FAULTS}
+    assert len(OTHERS) >= len(FAULTS)
+    assert len({*CORE, *OTHERS}) == len(CORE) + len(OTHERS)
+
+
+def test_a_file_that_does_not_say_all_is_named(tmp_path):
+    (tmp_path / FILE).write_text('kind: qos\nright: []\nwrong: []\nevidence: []\nlook_: x\n')
+    with pytest.raises(ValueError, match=f'{tmp_path.name}/{FILE}: .*look_'):
+        read(tmp_path)
+    with pytest.raises(ValueError, match='has .b. 0 times, not once'):
+        edited('a', {'b': 'c'}, 'a file')
+
+
+def test_the_healthy_package_drives_and_its_tests_pass(workspace):
+    fault = FAULTS['deaf_brake']
+    robot = take(workspace, fault, 'ada', anew=True)
+    assert 'as you got them' in results(mended(robot))[0]
+    robot.mend(fault.right[0])
+    assert robot.files['ada/brake.py'] == robot.named((HEALTHY / 'courier/brake.py').read_text())
+    assert results(mended(robot)) == [True] * 4
+    said = workspace.terminal('source install/setup.bash\npython3 -m pytest -q src/ada')
+    assert '2 passed' in said
+    # What is left as it is stays; what belongs to another fault does not.
+    take(workspace, fault, 'ada')
+    assert robot.files != robot.given
+    take(workspace, FAULTS['unread_limit'], 'ada')
+    assert robot.files['ada/brake.py'] != robot.given['ada/brake.py']
+
+
+@pytest.mark.parametrize(
+    ('path', 'text', 'said'),
+    [
+        ('config/ada.yaml', 'brake: [stop_m: 0.5', 'Error parsing|parse params file'),
+        ('config/ada.yaml', 'nothing: 1\n', 'says no stop_m any more'),
+        ('launch/bringup.launch.xml', '<launch>', 'no valid XML'),
+        ('launch/bringup.launch.xml', None, 'was not found'),
+        ('ada/brake.py', 'def main(:\n', 'SyntaxError.* of brake.py'),
+        ('ada/brake.py', 'import no_such\n', "No module named 'no_such'.*Line 1 of brake.py"),
+    ],
+)
+def test_what_cannot_run_is_named(workspace, path, text, said):
+    robot = take(workspace, FAULTS['deaf_brake'], 'ada', anew=True)
+    file = robot.folder / path
+    file.unlink() if text is None else file.write_text(text)
+    first = results(mended(robot))[0]
+    assert re.search(said, first), first
+    assert str(workspace.path) not in first
+
+
+def test_evidence_must_have_been_run(workspace):
+    robot = take(workspace, FAULTS['private_topic'], 'bo', anew=True)
+    command, line = 'ros2 topic info /wanted', 'Publisher count: 0'
+    assert results(found(robot, ..., ..., ...))[:2] == ['no command yet', 'no line yet']
+    assert 'no cell with %%terminal has run' in results(found(robot, 'name', command, line))[0]
+    workspace.terminal(f'echo "{line}" # {command}')
+    assert results(found(robot, 'name', command, line)) == [True] * 4
+    assert results(found(robot, 'nam', command, 'count'))[2:] == [
+        True,
+        "'nam' is none of the kinds",
+    ]
+    assert 'has printed no line with: count: 7' in results(found(robot, 3, command, 'count: 7'))[1]
+    assert results(found(robot, 'qos', command, line))[3] == 'qos: no'
+
+
+def test_a_drive_can_have_a_clock_that_is_ahead(workspace):
+    fault = FAULTS['two_clocks']
+    robot = take(workspace, fault, 'cleo', anew=True)
+    robot.mend(fault.right[0])
+    end = drive(robot, OTHER, trouble='clock')
+    assert (end.how, end.braked, end.went_on, end.stands_at_exit) == ('stops', True, True, True)
