@@ -102,7 +102,7 @@ class Workspace:
         """Write a file of the workspace, and the folders above it.
 
         With `part`, 1 or more, only this part of the file is written anew. An empty line separates
-        the parts. Raises ValueError if the part before it was not written.
+        the parts, two are before a class or a function of Python. Raises ValueError if the part before it was not written.
         """
         file = self.file(relative_path)
         with uninterrupted():  # a file of which one half is written would be lost
@@ -112,7 +112,7 @@ class Workspace:
                 if not 1 <= part <= len(parts) + 1:
                     raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
                 parts[part - 1 : part] = [text]
-                text = '\n'.join(parts)
+                text = parts[0] + ''.join(_line_before(each, file) + each for each in parts[1:])
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text, encoding='utf-8')
 
@@ -310,6 +310,11 @@ def _put_aside(folder: Path) -> Path | None:
     kept = folder.with_name(f'{folder.name}.before')
     shutil.rmtree(kept, ignore_errors=True)
     return folder.rename(kept)
+
+
+def _line_before(part: str, file: Path) -> str:
+    is_top = file.suffix == '.py' and re.match(r'(async )?def |class |@', part)
+    return '\n\n' if is_top else '\n'
 
 
 def _state(install: Path) -> list[int]:

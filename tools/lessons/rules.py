@@ -302,8 +302,11 @@ def tasks_are_checked(lesson: Lesson) -> Iterator[str]:
     """The check finds the starter wanting and the solution right."""
     inside = 0
     for count, (name, cells) in enumerate(tasks(lesson).items(), 1):
-        if not re.match(rf'Task {count}: \S', name):
-            yield f'{name!r} must be called "### ✎ Task {count}: ...".'
+        if not re.match(rf'Task {count}( ★)?: \S', name):
+            yield (
+                f'{name!r} must be called "### ✎ Task {count}: ...", or "Task {count} ★: ..." if '
+                'it is beyond the core.'
+            )
         own = [cell for cell in cells if tags(cell) & set(TASK)]
         inside += len(own)
         kinds = ''.join(tag[0] for cell in own for tag in TASK if tag in tags(cell))
