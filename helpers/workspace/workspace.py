@@ -26,6 +26,7 @@ CMAKE_MODULES = Path(__file__).with_name('cmake')
 # What colcon prints in a terminal and differs from run to run: 'Finished <<< my_package [1.06s]',
 # and that the prefix of the wheels, which need not be one, is no colcon workspace.
 MOVING = r'(?<=\w) \[-?[\d.]+s(, .*)?\]$|^\[-?[\d.]+s\] WARNING.*any .local_setup\..*\n'
+MOVING += r'|^\[-?[\d.]+s\] (?=WARNING:|ERROR:)'
 # A package in C++ for lessons: copy it into `src`.
 SMALL_RCLCPP = Path(__file__).with_name('small_rclcpp')
 # A script for a terminal: the repository of somebody else, on a server.
@@ -102,7 +103,8 @@ class Workspace:
         """Write a file of the workspace, and the folders above it.
 
         With `part`, 1 or more, only this part of the file is written anew. An empty line separates
-        the parts, two are before a class or a function of Python. Raises ValueError if the part before it was not written.
+        the parts, two are before a class or a function of Python. Raises ValueError if the part
+        before it was not written.
         """
         file = self.file(relative_path)
         with uninterrupted():  # a file of which one half is written would be lost
