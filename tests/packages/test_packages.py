@@ -320,8 +320,14 @@ def start(
                 stdin=subprocess.DEVNULL,
                 start_new_session=True,
             )
+
+        def are_there() -> bool:
+            """Return whether the nodes of all programs are there: of one, or of those of a launch."""
+            programs = output.read_text(errors='replace').count('process started with pid')
+            return len(ear.nodes()) >= max(1, programs)
+
         try:
-            ear.wait(lambda: process.poll() is not None or ear.nodes(), START_LIMIT_S)
+            ear.wait(lambda: process.poll() is not None or are_there(), START_LIMIT_S)
             if process.poll() is None:
                 drives = ear.wait(ear.hears_driver, 2)
                 ear.wait(lambda: process.poll() is not None, 1)
@@ -364,7 +370,8 @@ class Ear:
         self.speeds.append(twist.linear.x or twist.angular.z)
 
     def nodes(self) -> list[str]:
-        return [name for name in self.node.get_node_names() if name != 'ear']
+        names = self.node.get_node_names_and_namespaces()
+        return [f'{space}/{name}' for name, space in names if name != 'ear']
 
     def hears_driver(self) -> bool:
         """Return whether a program says how fast to drive, and this one hears it."""
