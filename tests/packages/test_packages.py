@@ -322,7 +322,7 @@ def start(
             )
 
         def are_there() -> bool:
-            """Return whether the nodes of all programs are there: of one, or of those of a launch."""
+            """Return whether the nodes of all programs are there; a launch has several."""
             programs = output.read_text(errors='replace').count('process started with pid')
             return len(ear.nodes()) >= max(1, programs)
 
@@ -348,7 +348,7 @@ def start(
     if errors or 'Traceback' in said or 'process has died' in said:
         return f'fails: {errors[-1] if errors else said[-300:]}'
     allowed = {0} if len(command) == 1 else {0, 1, -signal.SIGINT}  # ros2 launch has its own codes
-    if process.returncode not in allowed:
+    if process.returncode not in allowed and not said.startswith('usage:'):
         return f'ends with code {process.returncode}: {said[-300:].strip() or "it says nothing"}'
     return ''
 
