@@ -370,8 +370,8 @@ class Ear:
         self.speeds.append(twist.linear.x or twist.angular.z)
 
     def nodes(self) -> list[str]:
-        names = self.node.get_node_names_and_namespaces()
-        return [f'{space}/{name}' for name, space in names if name != 'ear']
+        names = {f'{space}/{name}' for name, space in self.node.get_node_names_and_namespaces()}
+        return [name for name in names if not re.search(r'/(ear|launch_ros_\d+)$', name)]
 
     def hears_driver(self) -> bool:
         """Return whether a program says how fast to drive, and this one hears it."""
