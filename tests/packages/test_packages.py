@@ -49,7 +49,8 @@ WITHOUT_WHEEL = {'ament_copyright', 'ament_lint_auto', 'ament_lint_common'}
 ITS_TEST = 'test/test_copyright.py'
 # In these lessons a check runs the learner's commands, or builds what the next cells use.
 WITH_CHECKS = {'bring_in_a_package', 'use_a_message_in_your_own_interface'}
-BUILD_LIMIT_S, START_LIMIT_S, END_LIMIT_S = 200, 40, 15
+BUILD_LIMIT_S, START_LIMIT_S, DRIVER_LIMIT_S, END_LIMIT_S = 200, 40, 6, 15
+CODE = {'.py', '.cpp', '.hpp'}
 EVENTS = ['--event-handlers', 'console_direct+', 'desktop_notification-', 'status-']
 
 
@@ -236,9 +237,11 @@ class Computer:
         if not programs and not launches:
             return
         variables = self._terminal(name, 'exec')
+        code = [path for path in (self.top / name / 'src').rglob('*') if path.suffix in CODE]
+        may_drive = any('cmd_vel' in path.read_text() for path in code)
         for program in programs:
             for sent in (signal.SIGINT, signal.SIGTERM):
-                problem = start(program.name, [str(program)], variables, self.top / name, sent)
+                problem = start([str(program)], variables, self.top / name, sent, may_drive)
                 if problem:
                     yield f'{name}: {program.name} {problem}'
                     break
@@ -247,7 +250,7 @@ class Computer:
                 yield f'{name} installs {file.name}, and does not name ros2launch.'
                 return
             words = ['ros2', 'launch', name, file.name, *arguments_of(file)]
-            problem = start(file.name, words, variables, self.top / name, signal.SIGINT)
+            problem = start(words, variables, self.top / name, signal.SIGINT, False)
             if problem:
                 yield f'{name}: {file.name} {problem}'
 
@@ -301,7 +304,11 @@ class Computer:
 
 
 def start(
-    name: str, command: list[str], variables: dict[str, str], folder: Path, sent: signal.Signals
+    command: list[str],
+    variables: dict[str, str],
+    folder: Path,
+    sent: signal.Signals,
+    may_drive: bool,
 ) -> str:
     """Start a program, wait for its node, and end it. Return what is wrong, or nothing.
 
@@ -329,7 +336,7 @@ def start(
         try:
             ear.wait(lambda: process.poll() is not None or are_there(), START_LIMIT_S)
             if process.poll() is None:
-                drives = ear.wait(ear.hears_driver, 2)
+                drives = may_drive and ear.wait(ear.hears_driver, DRIVER_LIMIT_S)
                 ear.wait(lambda: process.poll() is not None, 1)
                 process.send_signal(sent)
                 ended = ear.wait(lambda: process.poll() is not None, END_LIMIT_S)
