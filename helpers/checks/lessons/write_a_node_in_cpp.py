@@ -19,6 +19,7 @@ tasks = Tasks()
 check = tasks.check
 
 BUILD_S = 90  # for a point that builds
+FIRST_SCANS = 10  # at most, until a program is known to answer
 START_S = 8  # for a program to start and be known to the others
 CALLS_MY_SPIN = 'brake.cpp calls spin, not my_spin: run the cell above this task again'
 
@@ -136,6 +137,13 @@ def answers_to(workspace, program, kind, topic, *distances, pause_s=0.0):
             return scans.get_subscription_count() and tester.count_publishers(topic)
 
         bench.wait(lambda: not process.running or is_known(), START_S)
+        # The program may not know yet who listens to it: its first answers would be lost.
+        for _ in range(FIRST_SCANS):
+            if not answers and process.running:
+                scans.publish(LaserScan(range_min=0.1, range_max=3.5, ranges=[3.5]))
+                bench.wait(lambda: answers, 0.3)
+        bench.quiet()
+        answers.clear()
         for number, distance in enumerate(distances):
             if not process.running:
                 last = ' / '.join(process.lines[-2:]) or 'it printed nothing'
