@@ -142,7 +142,10 @@ def answers_to(workspace, program, kind, topic, *distances, pause_s=0.0):
             if not answers and process.running:
                 scans.publish(LaserScan(range_min=0.1, range_max=3.5, ranges=[3.5]))
                 bench.wait(lambda: answers, 0.3)
-        bench.quiet()
+        count = -1
+        while count < len(answers):  # an answer to an earlier one may be on its way
+            count = len(answers)
+            bench.wait(lambda seen=count: len(answers) > seen, 0.5)
         answers.clear()
         for number, distance in enumerate(distances):
             if not process.running:
