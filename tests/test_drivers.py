@@ -16,7 +16,7 @@ from support.waits import wait_for
 from helpers.robot import CORRIDOR, EMPTY, KIND, TURTLEBOT3, Robot
 from helpers.robot.robot import command_type
 from helpers.robot.view.picture import fan
-from helpers.ros import ros_session
+from helpers.ros import ros_session, yaw_of
 
 
 class Listener:
@@ -189,3 +189,14 @@ def test_an_unknown_habit_is_one_sentence():
         KIND.but(laser='lds')
     with ros_session(), pytest.raises(TypeError, match='KIND or TURTLEBOT3'):
         Robot(driver='turtlebot3')
+
+
+def test_a_simulator_tells_the_true_pose():
+    with ros_session() as session:
+        robot = Robot(CORRIDOR, sim_time=True, driver=KIND.but(ground_truth=True))
+        listener = Listener(session, ('ground_truth', Odometry))
+        robot.command(0.5, 0.2)
+        robot.run(0.5, listener.executor)
+        pose = listener.received['ground_truth'][-1].pose.pose
+    assert (pose.position.x, pose.position.y) == (robot.pose.x, robot.pose.y)
+    assert yaw_of(pose.orientation) == pytest.approx(robot.pose.yaw)

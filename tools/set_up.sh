@@ -33,7 +33,7 @@ done
 wanted() {
     version=$(.venv/bin/python -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null) || return 0
     printf '%s\n' "Python $version" "$(pwd -P)" \
-        "$(cat $locks pyproject.toml ros2/pyproject.toml tools/set_up.sh tools/jupyter/* | cksum)"
+        "$(cat $locks pyproject.toml ros2/pyproject.toml tools/set_up.sh tools/jupyter/* helpers/robot/prefix/*/*/* 2> /dev/null | cksum)"
 }
 stamp=.venv/set_up.stamp
 have=$(wanted)

@@ -32,9 +32,6 @@ function put(id, state, draw) {
   find(id).replaceChildren(...state.map(draw));
 }
 
-// The first one is shown of what differs in capitals only.
-const same = (one, other) => one.toLowerCase() === other?.toLowerCase();
-
 function guess({ question, answered, shown: open, bars = [], measured = [], by }, seats) {
   const box = element('article');
   const count = element('p', `${answered} of ${seats} have answered `, { className: 'count' });
@@ -42,12 +39,17 @@ function guess({ question, answered, shown: open, bars = [], measured = [], by }
   box.append(element('h2', question), count);
   if (!open) return box;
   const list = element('ol', '', { className: 'bars' });
-  for (const { label, count } of bars) {
-    const right = same(label, measured[0]);
+  for (const { label, count, right } of bars) {
     const row = element('li', '', { className: right ? 'right' : '' });
     const bar = element('span', count, { className: 'bar' });
     bar.style.setProperty('--share', count / answered);
     row.append(element('span', `${right ? '✓ ' : ''}${label}`, { className: 'label' }), bar);
+    if (count && !right && label !== 'other') {
+      const remove = button('×', 'remove', { question, answer: label });
+      remove.title = `Take ${label} out of sight`;
+      remove.className = 'remove';
+      row.append(remove);
+    }
     list.append(row);
   }
   box.append(list);

@@ -5,8 +5,10 @@ counts once: its id and its seat are its key. Of guesses, the last one of a seat
 order in which the events came: no clock of a student's computer is asked.
 """
 
+import contextlib
 import hashlib
 import json
+import math
 import secrets
 import sqlite3
 from collections import Counter
@@ -19,6 +21,8 @@ WORDS = Path(__file__).with_name('words.txt').read_text().split()
 CODE_WORDS = 3  # of 256: 24 bits
 SEATS = 500
 BARS = 8
+MEASURED = 3  # different results of one question, at most
+OTHER = 'other'
 TABLES = """
 PRAGMA journal_mode = WAL;
 CREATE TABLE IF NOT EXISTS class (code TEXT, secret TEXT);
@@ -61,6 +65,7 @@ class ClassStore:
         self.code, self.secret = self._db.execute('SELECT code, secret FROM class').fetchone()
         self.went_on = self._db.execute('SELECT 1 FROM events').fetchone() is not None
         self.shown: set[tuple[str, str]] = set()  # lesson and question
+        self.removed: dict[tuple[str, str], set[str]] = {}  # of a question: answers out of sight
 
     # Seats
 
@@ -103,6 +108,10 @@ class ClassStore:
         with self._db:
             self._db.executemany(INSERT, rows)
         return refused
+
+    def remove(self, lesson: str, question: str, answer: str) -> None:
+        """Take an answer that the page shows out of sight, whoever has given it."""
+        self.removed.setdefault((lesson, question), set()).add(_key(_plain(answer)))
 
     def lower(self, seat: int) -> None:
         """Take the hand of a seat down. Raises ValueError if it has raised none."""
@@ -170,7 +179,12 @@ class ClassStore:
         }
 
     def _guesses(self, lesson: str, question: str, guess: Guess) -> dict:
-        answers = [value for *_, value in self._latest('guess', lesson, question)]
+        removed = self.removed.get((lesson, question), set())
+        answers = [
+            value
+            for *_, value in self._latest('guess', lesson, question)
+            if _key(_plain(value)) not in removed
+        ]
         cells = [guess.asked, guess.compared]
         found = {'question': question, 'cells': cells, 'answered': len(answers)}
         if (lesson, question) not in self.shown:  # what is hidden does not leave the server
@@ -178,8 +192,8 @@ class ClassStore:
         measured = [value for *_, value in self._latest('outcome', lesson, question)]
         return found | {
             'shown': True,
-            'bars': bars(answers),
-            'measured': [label(value) for value, _ in _counted(measured)][:3],
+            'bars': bars(answers, [value for value, _ in _counted(measured)][:MEASURED]),
+            'measured': [label(value) for value, _ in _counted(measured)][:MEASURED],
             'by': len(measured),
         }
 
@@ -203,6 +217,7 @@ class ClassStore:
         self._db.execute('VACUUM')  # what is deleted is in no page of the file,
         self._db.execute('PRAGMA wal_checkpoint(TRUNCATE)')  # nor in its log
         self.shown.clear()
+        self.removed.clear()
 
     def close(self) -> None:
         """Let go of the file."""
@@ -215,23 +230,58 @@ class ClassStore:
             Path(f'{self.file}{suffix}').unlink(missing_ok=True)
 
 
-def bars(answers: list) -> list[dict]:
-    """Return what a picture shows of answers: numbers in order, others by how many gave them."""
-    numbers = [a for a in answers if isinstance(a, int | float) and not isinstance(a, bool)]
-    if answers and len(numbers) == len(answers) and len(set(numbers)) > BARS:
-        low, high = min(numbers), max(numbers)
-        width = (high - low) / BARS
-        counts = Counter(min(int((one - low) / width), BARS - 1) for one in numbers)
-        return [
-            {'label': f'{low + i * width:.4g} to {low + (i + 1) * width:.4g}', 'count': counts[i]}
-            for i in range(BARS)
-        ]
-    counted = _counted(answers)
-    if len(numbers) == len(answers):
-        return [{'label': label(value), 'count': count} for value, count in sorted(counted)]
-    found = [{'label': label(value), 'count': count} for value, count in counted[:BARS]]
-    others = sum(count for _, count in counted[BARS:])
-    return found + ([{'label': 'other', 'count': others}] if others else [])
+def bars(answers: list, measured: list = ()) -> list[dict]:
+    """Return what a picture shows of answers: the most frequent ones, and all others as one bar.
+
+    What was measured always has its bar, with `right`, also if nobody has guessed it. Numbers stand
+    in their order; a text that is one, `'41'` or `'11,5'`, counts as one. Where most answers are
+    numbers, the texts are among the others, and of equally frequent numbers so are those that are
+    farthest from the middle of all.
+    """
+    answers = [_plain(answer) for answer in answers]
+    right = {_key(_plain(value)): _plain(value) for value in measured}
+    numbers = sorted(answer for answer in answers if _is_number(answer))
+    of_numbers = 2 * len(numbers) > len(answers)
+    middle = numbers[len(numbers) // 2] if numbers else 0
+    first = {_key(answer): answer for answer in reversed(answers)} | right
+    counts = Counter(map(_key, answers))
+    keys = [key for key in first if key in right or not of_numbers or _is_number(first[key])]
+    keys.sort(
+        key=lambda key: (
+            key not in right,
+            -counts[key],
+            abs(first[key] - middle) if _is_number(first[key]) else 0,
+        )
+    )
+    keys = keys[: max(BARS - 1, len(right))]
+    if all(_is_number(first[key]) for key in keys):
+        keys.sort(key=first.get)
+    else:
+        keys.sort(key=lambda key: -counts[key])
+    found = [
+        {'label': label(first[key]), 'count': counts[key], 'right': key in right} for key in keys
+    ]
+    others = len(answers) - sum(bar['count'] for bar in found)
+    return found + ([{'label': OTHER, 'count': others, 'right': False}] if others else [])
+
+
+def _plain(answer: object) -> object:
+    """Return an answer, a number if it is the text of one. A comma is a decimal point, too."""
+    if isinstance(answer, str):
+        with contextlib.suppress(ValueError):
+            number = float(answer.strip().replace(',', '.'))
+            if math.isfinite(number):
+                return int(number) if number == int(number) else number
+    return answer
+
+
+def _is_number(answer: object) -> bool:
+    return isinstance(answer, int | float) and not isinstance(answer, bool)
+
+
+def _key(answer: object) -> str:
+    """Return what equal answers have in common: their text, in whatever case."""
+    return label(answer).strip().casefold()
 
 
 def label(value: object) -> str:
@@ -245,8 +295,8 @@ def _counted(answers) -> list[tuple]:
     """Return the different answers and how often each came, the most frequent first."""
     first: dict[str, object] = {}
     for answer in answers:
-        first.setdefault(label(answer).strip().casefold(), answer)
-    counts = Counter(label(answer).strip().casefold() for answer in answers)
+        first.setdefault(_key(answer), answer)
+    counts = Counter(map(_key, answers))
     return [(first[text], count) for text, count in counts.most_common()]
 
 

@@ -3,7 +3,7 @@
     POST join, events, leave   of students: helpers/checks/classroom.py documents them
     GET  SECRET/               the instructor's page, its files, and `live`, its changes
     POST SECRET/slide          of the deck, when it goes on: events.SLIDE is what it tells
-    POST SECRET/show, hide, go, lower, forget, end     the buttons of the page
+    POST SECRET/show, hide, remove, go, lower, ...      the buttons of the page
 
 The instructor's page is below a secret. It asks for nothing again and again: the server sends it
 each change as a server-sent event, at most four times a second.
@@ -204,6 +204,9 @@ class Instructor(Handler):
                 case 'show' | 'hide':
                     change = store.shown.add if name == 'show' else store.shown.discard
                     change((self.room.present[0], str(wanted['question'])))
+                case 'remove':
+                    lesson, question = self.room.present[0], str(wanted['question'])
+                    store.remove(lesson, question, str(wanted['answer']))
                 case 'go':
                     self.room.go_to(wanted['lesson'], int(wanted['step']))
                 case 'slide':

@@ -152,11 +152,47 @@ def test_a_seat_that_leaves_is_forgotten(opened):
     assert opened.post('events', {'events': [event()]}, ada)[0] == 403
 
 
-@given(st.lists(st.integers() | st.floats(allow_nan=False, allow_infinity=False)))
-def test_bars_count_each_number_once_and_are_few(answers):
-    shown = bars([answer for answer in answers if abs(answer) <= 2**53])
-    assert sum(bar['count'] for bar in shown) == sum(abs(answer) <= 2**53 for answer in answers)
+ANSWERS = st.integers(-(2**53), 2**53) | st.floats(-(2**53), 2**53) | st.text(max_size=9)
+
+
+@given(
+    st.lists(ANSWERS | st.sampled_from(['41', '11,5', 'None', '🤖'])), st.lists(ANSWERS, max_size=1)
+)
+def test_bars_count_each_answer_once_and_are_few(answers, measured):
+    shown = bars(answers, measured)
+    assert sum(bar['count'] for bar in shown) == len(answers)
     assert len(shown) <= BARS
+    assert [bar['right'] for bar in shown].count(True) == len(measured)
+
+
+def test_bars_of_forty_students_show_what_most_have_said():
+    answers = [41] * 9 + ['41', '41 '] + [14] * 6 + [10] * 5 + [40] * 3 + [12, 13, 15, 18, 20]
+    answers += [41_000_000, '11,5', '11.5', 'None', 'I do not know', '🤖', '', 7, 8, 9]
+    shown = [(bar['label'], bar['count'], bar['right']) for bar in bars(answers, [14])]
+    assert shown == [
+        ('10', 5, False),
+        ('11.5', 2, False),
+        ('13', 1, False),
+        ('14', 6, True),
+        ('15', 1, False),
+        ('40', 3, False),
+        ('41', 11, False),
+        ('other', 11, False),
+    ]
+    texts = ['reliable'] * 3 + ['Reliable', 'best effort', 'both', 7]
+    assert [(bar['label'], bar['count']) for bar in bars(texts)][0] == ('reliable', 4)
+    assert bars([1, 2], [14])[-1] == {'label': '14', 'count': 0, 'right': True}
+
+
+def test_an_answer_can_be_taken_out_of_sight(opened):
+    ada, bob = opened.join(), opened.join()
+    opened.tell(ada, event(value=41))
+    opened.tell(bob, event(value='something rude'))
+    opened.go(1)
+    assert opened.bars() == {'41': 1, 'something rude': 1}
+    assert opened.do('remove', question=QUESTION, answer='Something rude') == 200
+    assert opened.bars() == {'41': 1}
+    assert opened.do('remove', question=QUESTION) == 400
 
 
 # --- What is refused -----------------------------------------------------------------------------

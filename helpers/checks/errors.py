@@ -79,8 +79,8 @@ def sentence(error: BaseException) -> str:
     text = re.sub(r' at 0x[0-9a-fA-F]+', '', text)
     text = re.sub(r'(?:\w+\.<locals>\.)+', '', text)  # of a function in a function: its name only
     name = type(error).__name__
+    frames = traceback.extract_tb(error.__traceback__)
     if isinstance(error, TypeError) and not text:
-        frames = traceback.extract_tb(error.__traceback__)
         text = WITHOUT_TEXT.get(frames[-1].name, '') if frames else ''
     if isinstance(error, SyntaxError):
         place = f'Line {error.lineno}: {(error.text or "").strip()}' if error.lineno else place

@@ -82,11 +82,13 @@ def run_tests(
     versions: dict[str, str],
     only: bool = False,
     most_failures: int = 1,
+    sourced: bool = False,
 ) -> dict[str, TestRun]:
     """Run a file of tests with each version of a module: its source, '' for the student's own.
 
     `package` is the folder of the package in the workspace, `tests` a file in it. With `only`, the
     name of each version chooses the tests that it is for. A run ends after `most_failures`.
+    With `sourced` the tests find what the workspace has installed; the package's own source first.
     """
     arguments = [f'--maxfail={most_failures}', f'{package}/{tests}']
     task = {
@@ -102,6 +104,8 @@ def run_tests(
     for file in (workspace.path / package).rglob('*.py'):
         linecache.checkcache(str(file))
     command = f'PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 python -B {RUNNER} .versions.json'
+    if sourced:
+        command = f'source install/setup.bash\n{command}'
     printed = workspace.terminal(command)
     try:
         results = json.loads(printed.splitlines()[-1])

@@ -3,6 +3,7 @@
 `EkfNode` and `NavSatNode` read the parameters of `ekf_node` and `navsat_transform_node`, with the
 same names and meanings, and do with them what those do for a robot on a floor. Not read: all other
 parameters. Not done: what `helpers.fusion.filter` says, and the place of a sensor (only its yaw).
+Here the filter is always two-dimensional; that of the package needs `two_d_mode: true`.
 """
 
 from __future__ import annotations
@@ -27,20 +28,26 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 
 from helpers.fusion.filter import STATE, ExtendedKalmanFilter
 from helpers.fusion.messages import from_odometry, table_of
-from helpers.robot import EMPTY, ON_THE_FLOOR, Pose, Robot, odometry_message, trip
+from helpers.robot import EMPTY, KIND, ON_THE_FLOOR, Pose, Robot, odometry_message, trip
 from helpers.ros import quaternion, ros_session, seconds_of, stamp_of, yaw_of
 
 # The 15 numbers of each `..._config` and covariance, in their order.
 PARTS = ('x', 'y', 'z', 'roll', 'pitch', 'yaw', 'vx', 'vy', 'vz', 'vroll', 'vpitch', 'vyaw')
 PARTS += ('ax', 'ay', 'az')
 DEPTH = 100
+# What robot_localization takes in place of a variance that is smaller, such as 0: src/ekf.cpp.
+LEAST_VARIANCE = 1e-9
 
 
 class _Configured(Node):
     """A node whose parameters are those of YAML files: a later one replaces an earlier one."""
 
-    def __init__(self, name: str, *files: str | os.PathLike) -> None:
+    def __init__(
+        self, name: str, *files: str | os.PathLike, remap: Mapping[str, str] | None = None
+    ) -> None:
         arguments = ['--ros-args', *chain(*(('--params-file', str(file)) for file in files))]
+        for topic, other in (remap or {}).items():
+            arguments += ['--remap', f'{topic}:={other}']
         super().__init__(
             name, cli_args=arguments, automatically_declare_parameters_from_overrides=True
         )
@@ -57,29 +64,34 @@ class EkfNode(_Configured):
     """The filter node, with the parameters of `ekf_node` in a YAML file.
 
     It hears `odomN` (Odometry) and `imuN` (Imu), of which `odomN_config` and `imuN_config` say what
-    is used, and `odomN_pose_rejection_threshold` the gate. It turns what an IMU says by the yaw of
-    its frame in `base_link_frame`, which it hears on /tf_static; without it, it leaves the message
-    out. It publishes its estimate on `<name>/odometry` with each message of `odom0`, and on /tf the
-    transform from `world_frame` to what is below it.
+    is used, and `odomN_pose_rejection_threshold` the gate. A variance of 0 in a message becomes
+    1e-9. It turns what an IMU says by the yaw of its frame in `base_link_frame`, which it hears on
+    /tf_static; without it, it leaves the message out. With messages of `odom0`, `frequency` times a
+    second (30), it publishes its estimate on `odometry/filtered`, and on /tf the transform from
+    `world_frame` to what is below it.
 
-    By the names of the inputs, such as `odom0`: `parts` are those of the state that it may use,
-    `used` counts the measurements that were used, and `first_used_s` is when the first one was.
-    `initial` are the variances that the files give it at the start.
+    By the names of the inputs, such as `odom0`: `parts` are those of the state that it may use, and
+    `used` counts the measurements that were used. `two_d` is whether the files ask for a filter of
+    two dimensions.
     """
 
-    def __init__(self, name: str, *files: str | os.PathLike) -> None:
+    def __init__(
+        self, name: str, *files: str | os.PathLike, remap: Mapping[str, str] | None = None
+    ) -> None:
         from tf2_msgs.msg import TFMessage  # there only after provide_tf2_msgs
 
-        super().__init__(name, *files)
+        super().__init__(name, *files, remap=remap)
         given = self.given
+        self.two_d = given.get('two_d_mode', False)
+        self._period_s = 1 / given.get('frequency', 30.0)
+        self._due_s = -math.inf  # when the next estimate is due
         self.world = given.get('world_frame', 'odom')
         self.base = given.get('base_link_frame', 'base_link')
-        self.initial = self._variances('initial_estimate_covariance')
+        initial = self._variances('initial_estimate_covariance')
         noise = self._variances('process_noise_covariance')
-        self.ekf = ExtendedKalmanFilter(noise, self.initial)
+        self.ekf = ExtendedKalmanFilter(noise, initial)
         self.parts: dict[str, list[str]] = {}
         self.used: dict[str, int] = {}
-        self.first_used_s: dict[str, float] = {}
         self._parents: dict[str, tuple[str, float]] = {}  # each frame's parent, and its yaw in it
         self._in_odom = 0.0, 0.0, 0.0
         latched = QoSProfile(depth=DEPTH, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -87,7 +99,7 @@ class EkfNode(_Configured):
         if self.world == 'map':
             self.hear(TFMessage, '/tf', self._on_tf)
         self._tf = self.create_publisher(TFMessage, '/tf', DEPTH)
-        self._odometry = self.create_publisher(Odometry, f'{name}/odometry', DEPTH)
+        self._odometry = self.create_publisher(Odometry, 'odometry/filtered', DEPTH)
         for key in sorted(given, key=lambda key: (not key.startswith('odom'), key)):
             if re.fullmatch(r'odom\d+', key):
                 self._listen(key, Odometry, self._on_odometry)
@@ -130,7 +142,9 @@ class EkfNode(_Configured):
                 matrix[np.ix_(kept, kept)],
                 limit,
             )
-        if key == 'odom0' and self.ekf.t is not None:
+        if key == 'odom0' and self.ekf.t is not None and self.ekf.t >= self._due_s - 1e-6:
+            next_s = self._due_s + self._period_s
+            self._due_s = next_s if next_s > self.ekf.t else self.ekf.t + self._period_s
             self._publish()
 
     def _on_imu(self, key: str, parts: list[str], gate: float | None, message: Imu) -> None:
@@ -153,10 +167,12 @@ class EkfNode(_Configured):
     def _process(self, key, message, names, values, covariance, gate) -> None:
         if names:
             t = seconds_of(message.header.stamp)
+            covariance = np.array(covariance, float)
+            covariance = np.diag(covariance) if covariance.ndim == 1 else covariance.copy()
+            np.fill_diagonal(covariance, covariance.diagonal().clip(LEAST_VARIANCE))
             innovation = self.ekf.process(t, names, values, covariance, gate)
             if innovation is None or innovation.accepted:
                 self.used[key] += 1
-                self.first_used_s.setdefault(key, t)
 
     def _yaw_in_base(self, frame: str) -> float | None:
         """Return by how much a frame is turned in the robot's, or None if nobody says so."""
@@ -203,12 +219,17 @@ class EkfNode(_Configured):
 
 
 class NavSatNode(_Configured):
-    """The node that turns each fix into a position in `map`, on `odometry/gps`, from `datum`."""
+    """The node that turns each fix into a position in `map`, on `odometry/gps`, from `datum`.
+
+    Without `wait_for_datum: true` the datum of the files does not count: it is the first fix.
+    """
 
     def __init__(self, name: str, *files: str | os.PathLike) -> None:
         super().__init__(name, *files)
-        degrees_north, degrees_east, _ = self.given['datum']
-        self.datum = degrees_north, degrees_east, 0.0
+        self.datum: tuple[float, float, float] | None = None
+        if self.given.get('wait_for_datum', False):
+            degrees_north, degrees_east, _ = self.given['datum']
+            self.datum = degrees_north, degrees_east, 0.0
         self.publisher = self.create_publisher(Odometry, 'odometry/gps', DEPTH)
         self.hear(NavSatFix, 'gps/fix', self._on_fix)
 
@@ -216,6 +237,7 @@ class NavSatNode(_Configured):
         if fix.status.status < NavSatStatus.STATUS_FIX:
             return
         place = fix.latitude, fix.longitude, fix.altitude
+        self.datum = self.datum or place
         east, north, _ = pymap3d.geodetic2enu(*place, *self.datum)
         covariance = np.eye(3)
         covariance[:2, :2] = np.reshape(fix.position_covariance, (3, 3))[:2, :2]
@@ -265,14 +287,12 @@ class Localized(NamedTuple):
     frames: pd.DataFrame
     parts: dict[str, dict[str, list[str]]]
     used: dict[str, dict[str, int]]
-    first_used_s: dict[str, dict[str, float]]
-    initial: dict[str, dict[str, float]]
+    two_d: dict[str, bool]
 
 
 def localize(
     files: Sequence[str | os.PathLike],
     make_broadcaster: Callable[[], Node],
-    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     seconds: float = 25.0,
     mounting: Mapping[str, float] | None = None,
 ) -> Localized:
@@ -292,8 +312,13 @@ def localize(
         )
 
     with ros_session():
-        robot = Robot(EMPTY, start=Pose(*start), seed=1, sim_time=True, mounting=mounting)
-        filters = [EkfNode(name, *files) for name in heard]
+        driver = KIND.but(publish_tf=False)  # a filter publishes it
+        robot = Robot(
+            EMPTY, start=Pose(0, 0, 0), seed=1, sim_time=True, mounting=mounting, driver=driver
+        )
+        filters = [
+            EkfNode(name, *files, remap={'odometry/filtered': f'{name}/odometry'}) for name in heard
+        ]
         listener, executor = Node('listener'), SingleThreadedExecutor()
         navsat = NavSatNode('navsat_transform', *files)
         for node in (*filters, navsat, make_broadcaster(), listener):

@@ -28,17 +28,26 @@ def main() -> None:
         metavar='NAME=VALUE',
         help='another habit of its drivers, such as command_timeout_s=null (the value is JSON)',
     )
+    parser.add_argument(
+        '--mounting',
+        action='append',
+        default=[],
+        metavar='FRAME=YAW',
+        help='a sensor that is turned on the robot, such as imu_link=0.35 (rad, to the left)',
+    )
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
     try:
         habits = dict(habit.split('=', 1) for habit in options.habit)
         habits = {name: json.loads(value) for name, value in habits.items()}
         driver = DRIVERS[options.driver].but(**habits)
+        mounting = dict(turned.split('=', 1) for turned in options.mounting)
+        mounting = {frame: float(yaw) for frame, yaw in mounting.items()}
         floor = FLOORS.get(options.floor) or Floor.from_text(Path(options.floor).read_text())
     except (OSError, ValueError) as error:
         parser.error(str(error))
     rclpy.init(args=sys.argv)
     try:
-        robot = Robot(floor, seed=options.seed, driver=driver, spin=False)
+        robot = Robot(floor, seed=options.seed, mounting=mounting, driver=driver, spin=False)
         print(f'The robot drives on the floor {floor.name}.', flush=True)
         rclpy.spin(robot)
     except ValueError as error:

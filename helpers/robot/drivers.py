@@ -60,6 +60,11 @@ class Driver:
     battery_percent: bool = False
     # So often (Hz) wheels, IMU and /tf speak (NODE: a timer of 50 ms).
     rate_hz: int = 50
+    # It says on /tf itself where the robot is in `odom` (BRINGUP: odometry.publish_tf). A filter
+    # that says so, too, needs it off: a frame has one parent, and one who publishes it.
+    publish_tf: bool = True
+    # `ground_truth` has the true pose on the floor, which a simulator knows, and no robot.
+    ground_truth: bool = False
 
     gps: bool = True
     bumper: bool = True

@@ -32,6 +32,7 @@ from helpers.robot.sensors import Sensors
 from helpers.ros import START_NS, current_session, quaternion
 
 GPS, CAMERA, BUMPER = 'gps/fix', 'camera/image_raw', 'bumper'
+TRUTH = 'ground_truth'
 SCAN_EVERY, PICTURE_EVERY = RATE_HZ // 10, RATE_HZ // 5  # steps
 CAMERA_FRAME = 'camera_optical_frame'
 
@@ -133,6 +134,8 @@ class Robot(Node):
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:  # the wheels lack it: see provide_tf2_msgs of helpers.workspace
+            return
+        if not self.driver.publish_tf:
             return
         # Where its parts are on it, a robot_state_publisher knows from the URDF.
         self._topics['/tf'] = self._publisher(TFMessage, '/tf')
@@ -305,6 +308,7 @@ class Robot(Node):
                 driver.imu_topic, lambda: messages.imu(self._header('imu_link'), readings, driver)
             )
             self._say('/tf', self._moving_frame)
+            self._say(TRUTH, self._truth)
         if number % SCAN_EVERY == 0:
             ranges, first, step = self._sensors.scan(body)
             if self.blind:
@@ -339,6 +343,14 @@ class Robot(Node):
         place.translation.x, place.translation.y, place.rotation = x, y, quaternion(0, 0, yaw)
         return self._topics['/tf'].msg_type(transforms=[stamped])
 
+    def _truth(self) -> Odometry:
+        body = self._body
+        state = *body.pose, body.v, 0.0, body.w
+        exact = np.zeros((3, 3))
+        message = messages.odometry_message(0.0, 'map', state, exact, exact)
+        message.header = self._header('map')
+        return message
+
     # --- Small things
 
     def _header(self, frame: str) -> Header:
@@ -358,7 +370,7 @@ def topics_of(driver: Driver) -> dict[str, type]:
     topics = {'odom': Odometry, driver.imu_topic: Imu, 'scan': LaserScan}
     topics['battery_state'] = BatteryState
     choices = [(driver.gps, GPS, NavSatFix), (driver.camera, CAMERA, Image)]
-    choices += [(driver.bumper, BUMPER, Bool)]
+    choices += [(driver.bumper, BUMPER, Bool), (driver.ground_truth, TRUTH, Odometry)]
     return topics | {topic: kind for has, topic, kind in choices if has}
 
 

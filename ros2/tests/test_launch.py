@@ -215,6 +215,7 @@ def test_substitutions_and_conditions(output_of, prefix, tmp_path, monkeypatch):
         '$(eval \'0 or "a" * 2\')': 'aa',
         "$(eval '[1, 2.5] + [-7 // 2, 2 ** 0.5 > 1]')": '[1, 2.5, -4, True]',
         "$(eval 'None is not None and 1 / 0')": 'False',
+        "$(command 'echo -n $(var n)  4')": '3 4',
     }
     actions = [
         {'let': {'name': 'n', 'value': '3'}},
@@ -316,6 +317,7 @@ def test_nothing_outlives_the_launcher(number, prefix, tmp_path):
     wait_for(lambda: not list((tmp_path / 'tmp').iterdir()))
 
 
+PARAM = '<param name="a" value="1" type="bool"/>'
 EVAL = '<let name="b" value="$(eval \'{}\')"/>'
 
 
@@ -334,6 +336,9 @@ EVAL = '<let name="b" value="$(eval \'{}\')"/>'
         (f'<launch>\n {EVAL.format("1 &lt;&lt; 9**9")}</launch>', 2, 'by at most 10000 bits'),
         (f'<launch>\n {EVAL.format("9**9 * [0]")}</launch>', 2, 'at most 100000 characters'),
         (f'<launch>\n {EVAL.format("1 / 0")}</launch>', 2, 'has no value: division by zero'),
+        ('<launch>\n <let name="a" value="$(command \'ls /no\')"/></launch>', 2, 'No such file'),
+        ('<launch>\n <let name="a" value="$(command \'/no\')"/></launch>', 2, 'be executed'),
+        (f'<launch>\n <node exec="a">\n {PARAM}</node></launch>', 3, "'bool' is not a type"),
         ('<launch>\n <executable cmd=""/></launch>', 2, 'there is no command'),
         ('<launch>\n <executable cmd="a" output="no"/></launch>', 2, "no output is called 'no'"),
         ('<launch>\n <node exec="a" if="maybe"/></launch>', 2, 'neither true nor false'),

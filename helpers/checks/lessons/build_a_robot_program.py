@@ -4,28 +4,36 @@ The first part is what the lesson uses, too: it drives a simulated robot with th
 in simulated time and in this process, or as it is launched.
 """
 
+import contextlib
 import importlib
 import math
+import os
+import re
+import signal
 import sys
 import time
 
 import numpy as np
+import yaml
+from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import GetParameters
 from rclpy.action import ActionClient
+from rclpy.clock import ClockType
+from rclpy.exceptions import InvalidParameterValueException
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.time import Time
 from sensor_msgs.msg import BatteryState, LaserScan
-from test_msgs.action import Fibonacci
 
-from helpers.checks.bench import STATUS, Bench
+from helpers.checks.bench import STATUS, Bench, must_define, must_have
 from helpers.checks.builds import build, builds
 from helpers.checks.planted import planted, run_tests
 from helpers.checks.programs import DIED, error_of_launch, started
 from helpers.checks.tasks import Tasks, once
-from helpers.robot import CORRIDOR, EMPTY, ROOMS, Floor, Pose, Robot
+from helpers.robot import CORRIDOR, EMPTY, KIND, ROOMS, TURTLEBOT3, Floor, Pose, Robot, watch
 from helpers.ros import ros_session
 from helpers.workspace import without_folders
 
@@ -34,6 +42,8 @@ check = tasks.check
 
 PACKAGE = 'src/patrol_pkg'
 SIM = [Parameter('use_sim_time', value=True)]
+# A watchdog has a steady clock. Where simulated time passes, a scan may take long to come.
+PATIENT = Parameter('timeout_s', value=60.0)
 
 # --- Driving a robot with the program
 
@@ -57,11 +67,22 @@ def spun(*nodes):
     return executor
 
 
-def drive(floor, make_node, seconds, start=None):
+def action():
+    """Return the student's own action."""
+    from patrol_interfaces.action import Patrol
+
+    return Patrol
+
+
+def drive(floor, make_node, seconds, start=None, driver=KIND, blind_after_s=math.inf):
     """Drive a robot with a node in simulated time, and return the robot."""
     with ros_session():
-        robot = Robot(floor, start=start, sim_time=True)
-        robot.run(seconds, spun(make_node(parameter_overrides=SIM)))
+        robot = Robot(floor, start=start, driver=driver, sim_time=True)
+        executor = spun(make_node(parameter_overrides=SIM))
+        robot.run(min(seconds, blind_after_s), executor)
+        if blind_after_s < seconds:
+            robot.blind = True
+            robot.run(seconds - blind_after_s, executor)
     return robot
 
 
@@ -152,11 +173,13 @@ class Tour:
 
     def __init__(self, workspace, *options, floor=ROOMS, route=(3.5, 0.0, 6.5, 0.0), arguments=()):
         values = [*SIM, *options] + ([Parameter('route', value=list(route))] if route else [])
+        if 'timeout_s' not in [option.name for option in options]:
+            values.append(PATIENT)
         self.robot, self.cable, self.ear = Robot(floor, sim_time=True), Cable(), Ear()
         arguments = [*CUT, *arguments]
         patrol = module(workspace, 'patrol').Patrol
         self.node = patrol(parameter_overrides=values, cli_args=arguments)
-        self.client, self.result = ActionClient(self.ear, Fibonacci, 'patrol'), None
+        self.client, self.result = ActionClient(self.ear, action(), 'patrol'), None
         self.executor = spun(self.node, self.cable, self.ear)
         self.run(1.0)
 
@@ -164,11 +187,11 @@ class Tour:
         """Let simulated time go on."""
         return self.robot.run(seconds, self.executor, until=until)
 
-    def send(self, order):
+    def send(self, places):
         """Send a goal. Return whether it was accepted."""
         if not self.client.server_is_ready():
             raise RuntimeError('there is no action server')
-        sent = self.client.send_goal_async(Fibonacci.Goal(order=order))
+        sent = self.client.send_goal_async(action().Goal(places=places))
         self.run(0.1)
         if not sent.done():
             raise RuntimeError('a goal gets no answer')
@@ -191,11 +214,11 @@ class Tour:
         return [(command.v, command.w) for command in commands if command.t_s > since_s]
 
 
-def round_tour(workspace):
-    """Drive the route of config/rooms.yaml. Return the tour and the number of its places."""
-    file = str(workspace.file(f'{PACKAGE}/config/rooms.yaml'))
+def round_tour(workspace, floor=ROOMS, file='rooms'):
+    """Drive the route of a file in config. Return the tour and the number of its places."""
+    path = str(workspace.file(f'{PACKAGE}/config/{file}.yaml'))
     with ros_session():
-        tour = Tour(workspace, route=None, arguments=['--params-file', file])
+        tour = Tour(workspace, floor=floor, route=None, arguments=['--params-file', path])
         places = len(tour.node.job.places) if hasattr(tour.node, 'job') else 0
         tour.send(places)
         tour.run(90, until=lambda: tour.ended() or tour.robot.bumps)
@@ -203,43 +226,68 @@ def round_tour(workspace):
     return tour, places
 
 
-LAUNCH = 'source install/setup.bash\nexec ros2 launch patrol_pkg patrol.launch.xml '
+LAUNCH = 'source install/setup.bash\nexec ros2 launch patrol_pkg '
+BEATS = 12  # scans before a goal: in this time the battery says how full it is
 
 
-def launched(workspace, arguments, floor, order, seconds, seed=0):
+def launched(
+    workspace,
+    arguments,
+    floor,
+    places,
+    seconds,
+    seed=0,
+    driver=KIND,
+    file='patrol.launch.xml',
+):
     """Launch the program beside a robot in simulated time, one scan and one command at a time.
 
     Return the robot, and how the job ended or why it did not begin.
     """
     with ros_session() as session:
-        robot, client = Robot(floor, sim_time=True, seed=seed), Node('client')
-        action = ActionClient(client, Fibonacci, 'patrol')
+        robot, client = Robot(floor, sim_time=True, seed=seed, driver=driver), Node('client')
+        server = ActionClient(client, action(), 'patrol')
         session.spin(spun(client))
-        with workspace.start(LAUNCH + arguments, 'program') as program:
-            if problem := _begun(workspace, program, action, robot):
+        with workspace.start(f'{LAUNCH}{file} {arguments}', 'program') as program:
+
+            def beat(limit_s=10.0):
+                """Let the robot go on by a scan. Return whether its command came."""
+                before = len(robot.record.commands)
+                robot.run(0.1)
+                limit = time.monotonic() + limit_s
+                while len(robot.record.commands) == before and time.monotonic() < limit:
+                    time.sleep(0.004)
+                    robot.run(0)
+                return len(robot.record.commands) > before
+
+            if problem := _begun(workspace, program, server, robot):
                 return robot, problem
-            sent = action.send_goal_async(Fibonacci.Goal(order=order))
+            # The first scans are lost, as long as the program does not receive them yet.
+            beats, limit = 0, time.monotonic() + 30
+            while beats < BEATS and time.monotonic() < limit:
+                beats += beat(0.5)
+            if beats < BEATS:
+                return robot, f'a scan had no command. {printed(workspace, program.lines)}'
+            sent = server.send_goal_async(action().Goal(places=places))
             session.wait_until(sent.done)
             if not sent.result().accepted:
                 return robot, 'the goal is refused'
             ended = sent.result().get_result_async()
             while robot.t_s < seconds and not ended.done() and not robot.bumps:
-                before = len(robot.record.commands)
-                robot.run(0.1)  # one scan, and then its command
-                limit = time.monotonic() + 10
-                while len(robot.record.commands) == before and time.monotonic() < limit:
-                    time.sleep(0.004)
-                    robot.run(0)
-                if len(robot.record.commands) == before:
+                if not beat():
                     return robot, f'a scan had no command. {printed(workspace, program.lines)}'
     return robot, STATUS[ended.result().status] if ended.done() else 'not ended'
 
 
-def _begun(workspace, program, action, robot):
+def _begun(workspace, program, server, robot):
     """Wait until the launched node is there. Return why it is not, or nothing."""
 
     def is_ready():
-        return action.server_is_ready() and robot.count_subscribers('scan')
+        return (
+            server.server_is_ready()
+            and robot.count_subscribers('scan')
+            and robot.count_publishers('cmd_vel')
+        )
 
     limit, begun_s = time.monotonic() + 30, math.inf
     while not is_ready() and program.running and time.monotonic() < limit:
@@ -250,8 +298,10 @@ def _begun(workspace, program, action, robot):
         without = '[patrol-' not in text and time.monotonic() > begun_s + 10
         if DIED in text or without:
             break
-    if not is_ready():
+    if not server.server_is_ready():
         return f'no node patrol with an action came. {printed(workspace, program.lines)}'
+    if not is_ready():
+        return f'nobody drives the robot. {printed(workspace, program.lines)}'
     if '[robot-' in ' '.join(program.lines):
         return 'with robot:=false it starts a robot'
     limit = time.monotonic() + 20
@@ -267,6 +317,93 @@ def printed(workspace, lines):
     text = without_folders('\n'.join(lines), workspace.path)
     last = ['nothing', *(line for line in text.splitlines() if line.strip())][-1]
     return f'ros2 launch printed: {error_of_launch(text) or last}'
+
+
+# --- What stops the robot
+
+ENDS = 'Ctrl+C', 'patrol crashes', 'the laser is blind', 'the guard crashes'
+QUIET = ['--ros-args', '--disable-rosout-logs']  # which line comes first is an accident
+ON_A_TURTLEBOT = [
+    *(*QUIET, '-r', 'imu/data:=imu', '-r', 'cmd_vel:=cmd_vel_wanted'),
+    *('-p', 'route:=[3.0, 0.0]', '-p', 'speed:=0.2', '-p', 'full_battery:=100.0'),
+]
+LIMIT_S = 20.0
+
+
+def ended_by(workspace, end):
+    """Drive a TurtleBot 3 with patrol and guard, end something, and return the robot.
+
+    `end` is one of `ENDS`. What drives on is watched for two seconds. Raises RuntimeError if the
+    robot does not come to drive.
+    """
+    with ros_session() as session, contextlib.ExitStack() as programs:
+        robot, client = Robot(CORRIDOR, driver=TURTLEBOT3), Node('client')
+        server = ActionClient(client, action(), 'patrol')
+        session.spin(spun(client))
+        guard = programs.enter_context(workspace.run('patrol_pkg', 'guard', *QUIET))
+        patrol = programs.enter_context(workspace.run('patrol_pkg', 'patrol', *ON_A_TURTLEBOT))
+
+        def drives():
+            if server.server_is_ready() and robot.pose.x == CORRIDOR.start.x:
+                sent = server.send_goal_async(action().Goal(places=1))
+                session.wait_until(sent.done)  # refused, as long as nothing is known of the battery
+            return robot.record.poses[-1].v > 0.15
+
+        limit_s = robot.t_s + LIMIT_S
+        while not drives():
+            if robot.t_s > limit_s or not (guard.running and patrol.running):
+                lines = [*guard.lines, *patrol.lines, 'nothing'][-1]
+                raise RuntimeError(f'The robot does not drive. The programs printed: {lines}')
+            robot.run(0.2)
+        if end == 'the laser is blind':
+            robot.blind = True
+        elif end == 'the guard crashes':
+            os.kill(guard.pid, signal.SIGKILL)
+        else:
+            os.kill(patrol.pid, signal.SIGINT if end == 'Ctrl+C' else signal.SIGKILL)
+        if end == 'the guard crashes':
+            robot.run(2.0)
+        else:
+            robot.run(LIMIT_S, until=lambda: robot.stopped)
+    return robot
+
+
+def driven_live(workspace, file):
+    """Build, and drive a robot on the student's floor with the launched program, in real time.
+
+    `file` is the floor, in the package; its route has the same name. Return the robot.
+    """
+    path = workspace.file(f'{PACKAGE}/{file}')
+    floor = Floor.from_text(path.read_text(encoding='utf-8'), name=path.stem)
+    build(workspace, 'patrol_pkg')
+    with ros_session() as session:
+        robot, client = Robot(floor), Node('client')
+        watch(robot)
+        server = ActionClient(client, action(), 'patrol')
+        session.spin(spun(client))
+        arguments = f'patrol.launch.xml floor:={path.stem} robot:=false'
+        with workspace.start(LAUNCH + arguments, 'program') as program:
+            robot.run(LIMIT_S, until=lambda: server.server_is_ready() or not program.running)
+            robot.run(2.0)  # until the battery has spoken
+            if not server.server_is_ready():
+                print(printed(workspace, program.lines))
+                return robot
+            places = len(route_of(path.with_suffix('.yaml')))
+            sent = server.send_goal_async(action().Goal(places=places))
+            session.wait_until(sent.done)
+            ended = sent.result().get_result_async()
+            robot.run(120, until=lambda: ended.done() or robot.bumps)
+            robot.run(1.0)
+    print(STATUS[ended.result().status] if ended.done() else 'not ended', 'bumps:', robot.bumps)
+    return robot
+
+
+def route_of(path):
+    """Return the places of a parameter file: x, y (m, from the start)."""
+    parameters = yaml.safe_load(path.read_text(encoding='utf-8'))
+    (node,) = parameters.values()
+    route = node['ros__parameters']['route']
+    return list(zip(route[::2], route[1::2], strict=True))
 
 
 CELLAR = Floor.from_text(
@@ -320,20 +457,31 @@ def a_node_that_drives(workspace):
     def one_for_each_scan():
         return one_command_a_scan(drive(EMPTY, module(workspace, 'patrol').Patrol, 2))
 
-    def has_command():
+    def has_methods():
         with ros_session():
             robot = Robot(EMPTY, sim_time=True)
             node = module(workspace, 'patrol').Patrol(parameter_overrides=SIM)
             robot.run(0.1)
             node.command(0.1, 0.5)
             robot.run(0.1)
+            node.stop()
+            robot.run(0.1)
             commands = [(command.v, command.w) for command in robot.record.commands]
-        return commands == [(0.1, 0.5)] or f'command(0.1, 0.5) published {commands or "nothing"}'
+        right = [(0.1, 0.5), (0.0, 0.0)]
+        return commands == right or (
+            f'command(0.1, 0.5) and stop() published {commands or "nothing"}'
+        )
+
+    def hears_any_laser():
+        driver = KIND.but(laser='ld08')
+        robot = drive(CORRIDOR, module(workspace, 'patrol').Patrol, 1, driver=driver)
+        return bool(robot.record.commands) or 'it receives nothing from a laser that is BEST_EFFORT'
 
     return [
         ('the robot drives at 0.3 m/s', moves, 'on_scan(self, scan): self.command(0.3, 0.0)'),
         ('one command for each scan', one_for_each_scan, 'Publish in the callback of the scan.'),
-        ('command(v, w)', has_command, 'twist.linear.x and twist.angular.z'),
+        ('command(v, w), stop()', has_methods, 'twist.linear.x and twist.angular.z'),
+        ('the scans of a BEST_EFFORT laser', hears_any_laser, 'create_subscription(..., LASER)'),
     ]
 
 
@@ -343,33 +491,101 @@ def one_command_a_scan(robot):
     return scans - 2 <= commands <= scans or f'{commands} commands for {scans} scans'
 
 
-@tasks.add(2)
+FAILS = """import rclpy
+from patrol_pkg import main, patrol
+
+
+class Fails(patrol.Patrol):
+    scans = 0
+
+    def on_scan(self, scan):
+        super().on_scan(scan)
+        self.scans += 1
+        if self.scans > 15:
+            raise RuntimeError('planted')
+
+
+main.run(Fails)
+"""
+WITH_INTERFACES = '[ -f install/setup.bash ] && source install/setup.bash\n'
+
+
+MAIN_ENDS = {'interrupted': signal.SIGINT, 'terminated': signal.SIGTERM, 'failed': None}
+
+
+def how_it_ended(robot, drove, program, by_itself):
+    """Return what the program printed if the robot stands after it, or else what is wrong."""
+    lines = program.lines
+    if not drove:
+        return f'the robot stands, and main() says: {(lines or ["nothing"])[-1]}'
+    if by_itself:
+        return 'it ends by itself'
+    if program.running:
+        return 'it does not end'
+    if not robot.stopped:
+        last = robot.record.commands[-1]
+        return f'it ends, and the robot drives on: the last command is {last.v:g} m/s'
+    return lines
+
+
+@tasks.add(2, limit_s=120, cpu_s=20)
 def a_program(workspace):
     @once
-    def run_main():
-        """Run main() in a process of its own, beside a robot."""
+    def run_all():
+        """Run main() three times, each beside a base that keeps its last command, and end it."""
         workspace.write('.start.py', 'from patrol_pkg.main import main\nmain()\n')
-        with ros_session():
-            robot = Robot(EMPTY)
-            start = 'PYTHONPATH=src/patrol_pkg exec python -B .start.py'
-            with workspace.start(start, 'main') as process:
-                robot.run(10, until=lambda: robot.pose.x > 5.4 or not process.running)
-        return robot.pose.x > 5.4, process.lines
+        workspace.write('.fails.py', FAILS)
+        start = WITH_INTERFACES + 'PYTHONPATH=src/patrol_pkg:$PYTHONPATH exec python -B '
+        robots, programs = {}, {}
+        with ros_session() as session, contextlib.ExitStack() as stack:
+            for end in MAIN_ENDS:
+                driver = KIND.but(command_timeout_s=None)
+                robots[end] = Robot(EMPTY, namespace=end, driver=driver)
+                file = '.start.py' if MAIN_ENDS[end] else '.fails.py'
+                command = f'{start}{file} --ros-args -r __ns:=/{end}'
+                programs[end] = stack.enter_context(workspace.start(command, end))
 
-    def drives():
-        driven, lines = run_main()
-        return driven or f'the robot stands, and main() says: {(lines or ["nothing"])[-1]}'
+            def drives(end):
+                return robots[end].pose.x > EMPTY.start.x + 0.05
+
+            def each(condition, limit_s):
+                with contextlib.suppress(TimeoutError):
+                    session.wait_until(lambda: all(condition(end) for end in MAIN_ENDS), limit_s)
+
+            each(lambda end: drives(end) or not programs[end].running, 30)
+            ended = {end: not program.running for end, program in programs.items()}
+            for end, number in MAIN_ENDS.items():
+                if number is not None and drives(end) and not ended[end]:
+                    os.kill(programs[end].pid, number)
+            each(lambda end: not drives(end) or not programs[end].running, 30)
+            each(lambda end: not drives(end) or robots[end].stopped, 1)
+            return {
+                end: how_it_ended(
+                    robots[end], drives(end), programs[end], by_itself=ended[end] and number
+                )
+                for end, number in MAIN_ENDS.items()
+            }
+
+    def stands(end):
+        return lambda: True if isinstance(run_all()[end], list) else run_all()[end]
 
     def ends_quietly():
-        driven, lines = run_main()
-        if not driven:
-            return 'not judged: it does not drive'
+        lines = run_all()['interrupted']
+        if not isinstance(lines, list):
+            return f'not judged: {lines}'
         return not lines or f'it ends with {lines[-1]}'
 
-    caught = 'except (KeyboardInterrupt, ...): pass'
+    stop = 'In finally: node.stop(), before rclpy.try_shutdown().'
+    handlers = 'rclpy.init(signal_handler_options=SignalHandlerOptions.NO)'
     return [
-        ('the program drives the robot', drives, 'rclpy.spin(Patrol())'),
-        ('Ctrl+C ends it, without a traceback', ends_quietly, caught),
+        ('after Ctrl+C the robot stands', stands('interrupted'), handlers),
+        ('without a traceback', ends_quietly, 'except KeyboardInterrupt: pass'),
+        (
+            'after SIGTERM it stands',
+            stands('terminated'),
+            'signal.signal(signal.SIGTERM, signal.default_int_handler)',
+        ),
+        ('after an error in a callback it stands', stands('failed'), stop),
     ]
 
 
@@ -383,6 +599,8 @@ def scanned(**seen):
 
 def scene(seen):
     """Say what `scanned` is given: 1.5 m at 10 degrees to the left."""
+    if len(seen) > 6:
+        return 'nan from 12 degrees on the right to 12 on the left'
     sides = {'l': 'left', 'r': 'right'}
     beams = [
         f'{metres:g} m at {int(beam[1:])} degrees to the {sides[beam[0]]}'
@@ -420,7 +638,8 @@ def reach_and_speed(workspace):
         return test
 
     strip = 'along[(along >= 0) & (abs(across) < HALF_M)], and its min(..., default=FAR_M)'
-    broken = 'np.nan_to_num(ranges, nan=0.0, posinf=FAR_M, neginf=0.0), first of all.'
+    unknown = 'known = ~np.isnan(ranges), and then ranges[known], angles[known]'
+    share = 'np.mean(known[toward]) is the share of known beams: below 0.5, return 0.0.'
     ahead = [({'l0': 2.0, 'r1': 1.5}, 0, 1.5), ({'l45': 0.5}, 0, 99)]
     ahead += [({'r45': 0.5, 'l9': 2.0}, 0, 99)]
     along = [({'l10': 0.5}, 0, 0.492), ({'l17': 0.5}, 0, 0.478)]
@@ -430,13 +649,39 @@ def reach_and_speed(workspace):
         ({'l85': 0.3}, -85, 99),
         ({'r90': 0.4, 'l80': 1.0}, 85, 0.996),
     ]
-    odd = [({'l3': math.nan}, 0, 0), ({'r70': -math.inf}, 30, 0), ({}, 0, 99)]
+    odd = [({'r70': -math.inf}, 10, 0), ({}, 0, 99)]
+    few = [({'l3': math.nan}, 0, 99), ({'l0': math.nan, 'r1': 1.5, 'l2': math.nan}, 0, 1.5)]
+    blind = {f'{side}{degrees}': math.nan for side in 'lr' for degrees in range(13)}
+    many = [(blind, 0, 0), (blind, 60, 99), (blind | {'l0': 2.0}, 0, 0), ({}, 180, 0)]
+
+    def all_around():
+        function = module(workspace, 'logic').reach
+        angles = np.radians(np.arange(360.0))
+        ranges = np.full(360, 3.0)
+        ranges[315] = 0.5
+        ranges[100:260] = math.nan
+        for degrees, right in ((-45, 0.5), (0, 3.0), (170, 0.0)):
+            metres = function(ranges, angles, math.radians(degrees))
+            if not abs(metres - right) < 0.01:
+                return (
+                    'with angles from 0 to 2 pi, 0.5 m at 315 degrees and nan from 100 to 259, the '
+                    f'reach at {degrees} degrees is {metres:.2f}, not {right:.2f}'
+                )
+        return True
+
     return [
         ('straight on: the nearest in the strip', reaches(*ahead), strip),
         ('measured along the strip, not to the beam', reaches(*along), 'min(along[...])'),
         ('another direction', reaches(*turned), 'cos(angles - heading), sin(angles - heading)'),
         ('what is behind does not count', reaches(*behind), 'along >= 0'),
-        ('too near, broken, nothing', reaches(*odd), broken),
+        ('too near, nothing', reaches(*odd), 'np.nan_to_num(..., posinf=FAR_M, neginf=0.0)'),
+        ('single unknown beams do not count', reaches(*few), unknown),
+        ('too many unknown beams: 0', reaches(*many), share),
+        (
+            'a laser that looks all around',
+            all_around,
+            'np.cos(angles - heading) > math.cos(AROUND)',
+        ),
         ('near: 0', speeds_are((0.25, 0.5, 0), (0.1, 0.5, 0)), 'max(0.0, ...)'),
         ('far: full speed', speeds_are((1.0, 0.5, 0.5), (99.0, 0.2, 0.2)), 'min(1.0, ...)'),
         (
@@ -447,6 +692,7 @@ def reach_and_speed(workspace):
     ]
 
 
+TURTLEBOT3_LASER = KIND.but(laser='ld08')
 HALL = Floor.from_text(
     """
 ############
@@ -475,9 +721,18 @@ def stop_before_a_wall(workspace):
 
         return test
 
-    hint = (
-        'reach(np.array(scan.ranges), angles, 0.0), with angles = angle_min + angle_increment * ...'
-    )
+    def stops_blind():
+        patrol = module(workspace, 'patrol').Patrol
+        robot = drive(CORRIDOR, patrol, 4, blind_after_s=2)
+        if not robot.stopped:
+            return 'all beams are nan, and it drives on'
+        robot = drive(CORRIDOR, patrol, 12, driver=TURTLEBOT3_LASER)
+        ahead = CORRIDOR.ranges(*robot.pose[:2], np.array([robot.pose.yaw]))[0][0]
+        return (not robot.bumps and ahead < 0.5) or (
+            f'with the laser of a TurtleBot 3 it stands {ahead:.1f} m before the wall'
+        )
+
+    hint = 'reach(*beams(scan), 0.0), then safe_speed(..., 0.5)'
     near = stops_at(CORRIDOR, Pose(3.0, 1.25, 1.0), 0.5)
     return [
         ('it stops before the wall', stops_at(CORRIDOR, None, 0.35), hint),
@@ -487,6 +742,7 @@ def stop_before_a_wall(workspace):
             hint,
         ),
         ('it also stops if it starts near a wall', near, hint),
+        ('a blind laser, and that of a TurtleBot 3', stops_blind, hint),
     ]
 
 
@@ -632,6 +888,30 @@ def steer_to_a_place(workspace):
     ]
 
 
+@tasks.add(8, limit_s=90, cpu_s=60)
+def an_action(workspace):
+    show = 'source install/setup.bash\nros2 interface show patrol_interfaces/action/Patrol'
+    shown = once(lambda: workspace.terminal(show))
+    it_builds = once(lambda: builds(workspace, 'patrol_interfaces'))
+
+    def has(number, name, right):
+        def test():
+            if it_builds() is not True:
+                return 'not judged: it does not build'
+            parts = re.split(r'^---$', shown(), flags=re.MULTILINE)
+            found = ' '.join(parts[number].split()) if number < len(parts) else ''
+            return found == right or f'the {name} has {found or "nothing"}'
+
+        return test
+
+    return [
+        ('it builds', it_builds, 'Three parts, with a line --- between them.'),
+        ('the goal', has(0, 'goal', 'int32 places'), 'int32 places'),
+        ('the result', has(1, 'result', 'int32[] visited'), 'A list is int32[].'),
+        ('the feedback', has(2, 'feedback', 'int32[] visited'), 'A list is int32[].'),
+    ]
+
+
 class Asked:
     """A job in a node, a client, and what the client is told. Make it in a session."""
 
@@ -640,13 +920,13 @@ class Asked:
         self.robot, self.allowed = Robot(EMPTY, sim_time=True), True
         node, client = Node('tested', parameter_overrides=[*SIM, route]), Node('client')
         self.job = module(workspace, 'job').Job(node, lambda: self.allowed)
-        self.client, self.executor = ActionClient(client, Fibonacci, 'patrol'), spun(node, client)
+        self.client, self.executor = ActionClient(client, action(), 'patrol'), spun(node, client)
         self.robot.run(0.5, self.executor, until=self.client.server_is_ready)
 
-    def ask(self, order):
+    def ask(self, places):
         """Send a goal. Return whether it was accepted."""
         self.heard, self.ended = [], None
-        sent = self.client.send_goal_async(Fibonacci.Goal(order=order), self.hear)
+        sent = self.client.send_goal_async(action().Goal(places=places), self.hear)
         self.robot.run(0.2, self.executor)
         if not sent.done():
             return 'no answer'
@@ -657,7 +937,7 @@ class Asked:
 
     def hear(self, message):
         """Keep feedback."""
-        self.heard.append(list(message.feedback.sequence))
+        self.heard.append(list(message.feedback.visited))
 
     def result(self):
         """Return how the job ended, and the places of its result."""
@@ -665,10 +945,10 @@ class Asked:
         if self.ended is None or not self.ended.done():
             return 'no result'
         answer = self.ended.result()
-        return STATUS[answer.status], list(answer.result.sequence)
+        return STATUS[answer.status], list(answer.result.visited)
 
 
-@tasks.add(8)
+@tasks.add(9)
 def the_job(workspace):
     def told(story):
         """Return a test: each step of the story says what came, what is right, and of what."""
@@ -734,7 +1014,7 @@ def the_job(workspace):
     ]
 
 
-@tasks.add(9)
+@tasks.add(10)
 def the_battery(workspace):
     def battery_says(percentages, *options):
         """Send percentages. Return when it was low, and what was logged."""
@@ -764,77 +1044,105 @@ def the_battery(workspace):
         return records == right or f'it logged {records}'
 
     least, nan = Parameter('least_battery', value=0.5), math.nan
+    full = Parameter('full_battery', value=100.0)
     text = "f'{100 * percentage:.0f} %', and compare it with the last text"
     return [
         (
             'low',
-            low([0.9, 0.19, 0.2], [False, False, True, False]),
+            low([0.9, 0.19, 0.2], [True, False, True, False]),
             'battery.percentage < self.least',
         ),
-        ('least_battery', low([0.9, 0.4], [False, False, True], least), 'node.declare_parameter'),
+        ('least_battery', low([0.9, 0.4], [True, False, True], least), 'node.declare_parameter'),
         (
             'no number',
-            low([nan, 0.9], [False, True, False]),
+            low([nan, 0.9], [True, True, False]),
             'not battery.percentage >= self.least',
+        ),
+        (
+            'a battery that is full at 100',
+            low([90.0, 19.0, 20.0], [True, False, True, False], full),
+            'battery.percentage / self.full',
         ),
         ('it says so, once, and warns if it is low', logs, text),
     ]
 
 
-@tasks.add(10)
+@tasks.add(11)
 def the_watchdog(workspace):
-    def watched(*options):
-        """1 s with scans, 1.5 s without, 1 s with, 1.5 s without."""
-        with ros_session():
-            robot, ear = Robot(EMPTY, sim_time=True), Ear()
-            node, stops = Node('tested', parameter_overrides=[*SIM, *options]), []
-            dog = module(workspace, 'watchdog').Watchdog(node, lambda: stops.append(robot.t_s))
-            executor = spun(node, ear)
-            robot.run(1, executor)
-            early = list(stops)
-            for _ in range(2):
-                for _ in range(10):
+    def made(node, stop):
+        dog = module(workspace, 'watchdog').Watchdog(node, stop, 'scan')
+        must_define(type(dog), 'now_s', 'seen', 'look')
+        return dog
+
+    def told(times, *options):
+        """Tell it the time at each look. Return when it stopped, and what was logged."""
+        with Bench() as bench:
+            now_s, stops = [0.0], []
+            node = Node('tested', parameter_overrides=[*options])
+            dog = made(node, lambda: stops.append(now_s[0]))
+            for timer in node.timers:
+                timer.cancel()
+            dog.now_s = lambda: now_s[0]
+            for at_s, seen in times:
+                now_s[0] = at_s
+                if seen:
                     dog.seen()
-                    last_s = robot.t_s
-                    robot.run(0.1, executor)
-                robot.run(1.4, executor)
-        return early, stops, last_s, ear.heard
+                dog.look()
+            bench.wait(lambda: len(bench.log('tested')) >= len(stops))
+            return stops, bench.log('tested')
 
-    usual = once(watched)
-    longer = once(lambda: watched(Parameter('scan_timeout_s', value=0.8)))
+    # Of each time: when, and whether something comes then.
+    twice = [(1.0, False), (2.0, True), (2.2, False), (2.4, False), (9.0, False)]
+    twice += [(20.0, True), (20.25, True), (20.5, False), (20.6, False), (30.0, False)]
 
-    def stops_once():
-        early, stops, _, _ = usual()
-        if early:
-            return 'it stops before the first scan'
-        return len(stops) == 2 or f'the scans stop twice, and it calls stop() {len(stops)} times'
-
-    def in_time(timeout_s, drive):
+    def stops_at(times, right, *options):
         def test():
-            _, stops, last_s, _ = drive()
-            if len(stops) < 2:
-                return 'stop() is not called'
-            age = stops[-1] - last_s
-            return timeout_s < age < timeout_s + 0.12 or f'{age:.2f} s after the last scan'
+            stops, _ = told(times, *options)
+            came = ', '.join(f'{at:g}' for at, seen in times if seen)
+            stopped = ', '.join(f'{at:g} s' for at in stops) or 'no time'
+            wanted = ', '.join(f'{at:g} s' for at in right)
+            return stops == right or (
+                f'scans come at {came} s, and it stops at {stopped}, not at {wanted}'
+            )
 
         return test
 
     def says_so():
-        records = usual()[-1]
-        return records == [('error', 'No scan comes: I stop')] * 2 or f'it logged {records}'
+        _, records = told(twice)
+        right = ['[ERROR] [tested]: No scan comes: I stop'] * 2
+        return records == right or f'it logged {records}'
 
-    clock = 'node.get_clock().now().nanoseconds / 1e9'
-    forget = 'After stop(), set the time of the last scan to None.'
-    declare = 'node.declare_parameter(...)'
+    def with_a_stopped_clock():
+        with Bench() as bench:
+            node, stops = Node('tested', parameter_overrides=SIM), []
+            dog = made(node, lambda: stops.append(1))
+            bench.spin(node)
+            begin = dog.now_s()
+            if not bench.wait(lambda: dog.now_s() != begin):
+                return 'now_s() stands still: no /clock comes'
+            if bench.wait(lambda: stops, 0.5):
+                return 'it stops before the first seen()'
+            dog.seen()
+            if bench.wait(lambda: stops, 10):
+                return True
+            kinds = {timer.clock.clock_type for timer in node.timers}
+            if kinds != {ClockType.STEADY_TIME}:
+                return 'its timer does not fire: no /clock comes'
+            return 'it does not stop, 10 s after the last scan'
+
+    forget = 'After stop(), set the time of the last seen() to None.'
+    steady = 'create_timer(..., clock=self.clock), with Clock(clock_type=ClockType.STEADY_TIME)'
+    longer = Parameter('timeout_s', value=0.8)
+    late = [(1.0, True), (1.7, False), (1.85, False), (3.0, False)]
     return [
-        ('stop() once, when the scans stop', stops_once, forget),
-        ('after 0.3 s', in_time(0.3, usual), clock),
-        ('after 0.8 s, if the parameter says so', in_time(0.8, longer), declare),
+        ('once, when nothing comes for 0.3 s', stops_at(twice, [2.4, 20.6]), forget),
+        ('after 0.8 s, if the parameter says so', stops_at(late, [1.85], longer), 'timeout_s'),
         ('it says so', says_so, 'node.get_logger().error(...)'),
+        ('also if no /clock comes', with_a_stopped_clock, steady),
     ]
 
 
-@tasks.add(11, cpu_s=20)
+@tasks.add(12, cpu_s=20)
 def the_whole_node(workspace):
     def toured(story, *options):
         def test():
@@ -896,16 +1204,41 @@ def the_whole_node(workspace):
     def no_scan(tour):
         tour.send(2)
         tour.run(2)
-        tour.cable.plugged, now_s = False, tour.robot.t_s
-        tour.run(1)
-        stops, still = tour.speeds(now_s + 0.1), tour.robot.pose.x
-        if not stops or not tour.robot.stopped:
+        tour.cable.plugged = False
+        tour.run(0.1)
+        commands = tour.robot.record.commands
+        before, limit = len(commands), time.monotonic() + 10
+        while len(commands) == before and time.monotonic() < limit:
+            time.sleep(0.02)  # the watchdog has a clock of its own
+            tour.run(0.02)
+        if len(commands) == before or any(commands[before][1:]):
             return 'it does not stop'
         if ('error', 'No scan comes: I stop') not in tour.ear.heard:
             return 'it does not say so'
-        tour.cable.plugged = True
+        tour.cable.plugged, now_s = True, tour.robot.t_s
         tour.run(1)
-        return tour.robot.pose.x > still + 0.2 or 'it does not go on when the scans are back'
+        fastest = max((v for v, _ in tour.speeds(now_s)), default=0.0)
+        return fastest > 0.1 or 'it does not go on when the scans are back'
+
+    def wrong_stamps(tour):
+        tour.send(2)
+        for ahead_s in (3.0, -0.8):
+            tour.robot.clock_ahead_s = 0.0
+            tour.run(1)
+            tour.robot.clock_ahead_s, now_s = ahead_s, tour.robot.t_s
+            tour.run(1)
+            if any(v or w for v, w in tour.speeds(now_s + 0.2)):
+                when = '3 s in the future' if ahead_s > 0 else '0.8 s old'
+                return f'the scans are {when}, and it drives on'
+        return tour.robot.pose.x > ROOMS.start.x + 0.2 or 'it does not drive'
+
+    def wrong_at_the_start():
+        with ros_session():
+            try:
+                Tour(workspace, Parameter('speed', value=5.0))
+            except InvalidParameterValueException:
+                return True
+        return 'it starts with the speed 5.0'
 
     empty = Parameter('least_battery', value=0.9998)
     rule = 'add_on_set_parameters_callback; get_parameter'
@@ -918,12 +1251,22 @@ def the_whole_node(workspace):
         ('it visits two places', toured(two_places), 'self.command(*steer(...))'),
         ('a cancel stops it', toured(cancel), 'job.place() is None then.'),
         ('its speed is a parameter', toured(speed), rule),
+        ('also at the start', wrong_at_the_start, 'First the callback, then declare_parameter.'),
         ('a low battery ends the job', toured(low_battery, empty), 'self.job.end()'),
-        ('without scans it stops, and says so', toured(no_scan), 'self.watchdog.seen()'),
+        (
+            'without scans it stops, and says so',
+            toured(no_scan, Parameter('timeout_s', value=0.3)),
+            'self.watchdog.seen()',
+        ),
+        (
+            'it stands if scans are old, or of the future',
+            toured(wrong_stamps),
+            'self.get_clock().now() - Time.from_msg(scan.header.stamp)',
+        ),
     ]
 
 
-@tasks.add(12, cpu_s=60, limit_s=90)
+@tasks.add(13, cpu_s=60, limit_s=90)
 def the_route(workspace):
     tour = once(lambda: round_tour(workspace))
 
@@ -955,7 +1298,7 @@ def the_route(workspace):
     ]
 
 
-@tasks.add(13, limit_s=90)
+@tasks.add(14, limit_s=90)
 def install_it(workspace):
     it_builds = once(lambda: builds(workspace, 'patrol_pkg'))
 
@@ -967,7 +1310,7 @@ def install_it(workspace):
             'source install/setup.bash\nros2 pkg executables patrol_pkg'
         ).splitlines()
         programs = sorted(line.split()[-1] for line in lines if line.startswith('patrol_pkg '))
-        return programs == ['patrol', 'robot'] or f'its programs: {", ".join(programs) or "none"}'
+        return 'patrol' in programs or f'its programs: {", ".join(programs) or "none"}'
 
     def has_files():
         # The launch file is the next task: here any file in its folder must be installed.
@@ -987,6 +1330,17 @@ def install_it(workspace):
             missing += ['launch/planted.launch.xml, which the check has put into launch']
         return not missing or f'share/patrol_pkg has no {", no ".join(missing)}'
 
+    def survives_pycache():
+        folders = [workspace.file(f'{PACKAGE}/{name}/__pycache__') for name in ('launch', 'config')]
+        new = [folder for folder in folders if not folder.exists()]
+        for folder in new:
+            folder.mkdir(parents=True)
+        try:
+            return builds(workspace, 'patrol_pkg')
+        finally:
+            for folder in new:
+                folder.rmdir()
+
     def wants_pytest():
         code = 'import setuptools; setuptools.setup = lambda **given: print(given)\n'
         code += "exec(open('setup.py').read())"
@@ -994,16 +1348,17 @@ def install_it(workspace):
         given = workspace.terminal(f'cd {PACKAGE}; python -B .given.py; rm .given.py')
         return 'pytest' in given.partition('extras_require')[2] or 'extras_require has no pytest'
 
-    files = "('share/' + name + '/config', glob('config/*')), and the same for launch"
+    files = "glob('launch/*launch.[pxy][yma]*') and glob('config/*.yaml')"
     return [
         ('it builds', it_builds, "entry_points={'console_scripts': [...]}"),
-        ('two programs', after_build(has_programs), "'patrol = patrol_pkg.main:main'"),
+        ('the program', after_build(has_programs), "'patrol = patrol_pkg.main:main'"),
         ('its files', after_build(has_files), files),
+        ('beside a __pycache__', after_build(survives_pycache), files),
         ('pytest', after_build(wants_pytest), "extras_require={'test': ['pytest']}"),
     ]
 
 
-@tasks.add(14, limit_s=90, cpu_s=20)
+@tasks.add(15, limit_s=90, cpu_s=20)
 def one_file_starts_it(workspace):
     def drives_in_step():
         build(workspace, 'patrol_pkg')
@@ -1011,7 +1366,7 @@ def one_file_starts_it(workspace):
         for floor in ('short', 'corridor'):
             text = 'patrol:\n  ros__parameters:\n    route: [1.0, 0.0]\n'
             workspace.write(f'{share}{floor}.yaml', text)
-        arguments = 'floor:=short robot:=false sim:=true'
+        arguments = 'floor:=short robot:=false sim:=true timeout:=60.0'
         robot, end = launched(workspace, arguments, ROOMS, 1, 8)
         way = robot.pose.x - ROOMS.start.x
         if end != 'SUCCEEDED':
@@ -1019,9 +1374,12 @@ def one_file_starts_it(workspace):
         return 0.7 < way < 1.1 or f'its route is 1 m long in short.yaml, and it drove {way:.0f} m'
 
     def starts_both():
-        for arguments, floor in (('', 'rooms'), ('floor:=corridor', 'corridor')):
+        for arguments, floor, wait_s in (
+            ('', 'rooms', 0.3),
+            ('floor:=corridor timeout:=0.7', 'corridor', 0.7),
+        ):
             named = f'with {arguments or "no argument"}'
-            text, sim = launched_with_robot(workspace, arguments)
+            text, sim, timeout_s = launched_with_robot(workspace, arguments)
             if DRIVES not in text:
                 return f'{named} no robot drives. {printed(workspace, text.splitlines())}'
             if started(text) != ['patrol', 'robot']:
@@ -1033,6 +1391,8 @@ def one_file_starts_it(workspace):
                 return f'{named} the robot drives on the floor {driven}'
             if sim is not False:
                 return f'{named} the parameter use_sim_time of the node patrol is {sim}'
+            if timeout_s != wait_s:
+                return f'{named} the parameter timeout_s of the node patrol is {timeout_s}'
         return True
 
     hint = '<param from="$(dirname)/../config/$(var floor).yaml"/>'
@@ -1047,21 +1407,25 @@ DRIVES = 'drives on the floor '
 
 
 def launched_with_robot(workspace, arguments):
-    """Launch the program and its own robot. Return what it prints, and patrol's use_sim_time.
+    """Launch the program and its own robot. Return what it prints, and two parameters of patrol.
 
-    This is None if a program is missing or has died.
+    These, use_sim_time and timeout_s, are None if a program is missing or has died.
     """
-    with Bench() as bench, workspace.start(LAUNCH + arguments, 'both') as both:
+    command = f'{LAUNCH}patrol.launch.xml {arguments}'
+    with Bench() as bench, workspace.start(command, 'both') as both:
 
         def text():
             return '\n'.join(both.lines)
 
         bench.wait(lambda: DRIVES in text() or DIED in text() or not both.running, 20)
         if started(text()) != ['patrol', 'robot'] or DIED in text():
-            return text(), None
-        request = GetParameters.Request(names=['use_sim_time'])
+            return text(), None, None
+        request = GetParameters.Request(names=['use_sim_time', 'timeout_s'])
         answer = bench.call('/patrol/get_parameters', GetParameters, request, limit_s=10)
-        return text(), answer and answer.values[0].bool_value
+        if answer is None:
+            return text(), None, None
+        sim, timeout = answer.values
+        return text(), sim.bool_value, timeout.double_value
 
 
 # --- Tests, and what they test: right programs, and wrong ones
@@ -1073,12 +1437,24 @@ import numpy as np
 
 HALF_M = 0.16  # the robot's radius is 0.11 m
 STOP_M, SLOW_M, FAR_M = 0.25, 1.0, 99.0
+AROUND = math.radians(20)
+
+
+def beams(scan):
+    ranges = np.array(scan.ranges)
+    outside = (ranges < scan.range_min) | (ranges > scan.range_max) | (ranges == 0)
+    ranges[outside & np.isfinite(ranges)] = math.nan
+    return ranges, scan.angle_min + scan.angle_increment * np.arange(len(ranges))
 
 
 def reach(ranges, angles, heading):
-    near = np.nan_to_num(ranges, nan=0.0, posinf=FAR_M, neginf=0.0)
-    along = near * np.cos(angles - heading)
-    across = near * np.sin(angles - heading)
+    toward = np.cos(angles - heading) > math.cos(AROUND)
+    known = ~np.isnan(ranges)
+    if not toward.any() or np.mean(known[toward]) < 0.5:
+        return 0.0
+    metres = np.nan_to_num(ranges[known], posinf=FAR_M, neginf=0.0)
+    along = metres * np.cos(angles[known] - heading)
+    across = metres * np.sin(angles[known] - heading)
     return float(min(along[(along >= 0) & (np.abs(across) < HALF_M)], default=FAR_M))
 
 
@@ -1108,7 +1484,10 @@ def steer(ranges, angles, wanted, distance_m, full_mps):
 """
 WRONG_LOGICS = {
     'is as wide as a street': planted(LOGIC, 'HALF_M = 0.16', 'HALF_M = 1.6'),
-    'treats a broken beam as free': planted(LOGIC, 'nan=0.0', 'nan=FAR_M'),
+    'drives if all beams are unknown': planted(
+        LOGIC, '0.5:\n        return 0.0', '0.5:\n        return FAR_M'
+    ),
+    'stops at one unknown beam': planted(LOGIC, 'np.mean(known[toward]) < 0.5', 'not known.all()'),
     'never stops': planted(LOGIC, 'max(0.0, (', 'max(0.1, ('),
     'turns the long way round': planted(LOGIC, 'math.remainder(angle, math.tau)', 'angle'),
     'takes the first free direction': planted(LOGIC, 'abs(heading - wanted)', 'heading'),
@@ -1117,17 +1496,19 @@ WRONG_LOGICS = {
 
 NODE = """import math
 
-import numpy as np
 from geometry_msgs.msg import Twist
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.node import Node
-from sensor_msgs.msg import LaserScan
-
 from patrol_pkg.battery import Battery
 from patrol_pkg.job import Job
-from patrol_pkg.logic import direction, steer
+from patrol_pkg.logic import beams, direction, steer
 from patrol_pkg.watchdog import Watchdog
 from patrol_pkg.where import Where
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+from sensor_msgs.msg import LaserScan
+
+LASER = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 class Patrol(Node):
@@ -1138,8 +1519,8 @@ class Patrol(Node):
         self.publisher = self.create_publisher(Twist, 'cmd_vel', 1)
         self.where, self.battery = Where(self), Battery(self)
         self.job = Job(self, lambda: not self.battery.low)
-        self.watchdog = Watchdog(self, lambda: self.command(0.0, 0.0))
-        self.create_subscription(LaserScan, 'scan', self.on_scan, 1)
+        self.watchdog = Watchdog(self, self.stop, 'scan')
+        self.create_subscription(LaserScan, 'scan', self.on_scan, LASER)
 
     def on_parameters(self, parameters):
         for parameter in parameters:
@@ -1152,6 +1533,13 @@ class Patrol(Node):
         twist.linear.x, twist.angular.z = v, w
         self.publisher.publish(twist)
 
+    def stop(self):
+        self.command(0.0, 0.0)
+
+    def is_fresh(self, scan):
+        age = self.get_clock().now() - Time.from_msg(scan.header.stamp)
+        return -0.2 < age.nanoseconds / 1e9 < 0.5
+
     def on_scan(self, scan):
         self.watchdog.seen()
         if self.battery.low:
@@ -1161,21 +1549,20 @@ class Patrol(Node):
         if place is not None and math.dist((x, y), place) < 0.2:
             self.job.arrived()
             place = self.job.place()
-        if place is None:
-            self.command(0.0, 0.0)
+        if place is None or not self.is_fresh(scan):
+            self.stop()
             return
-        ranges = np.array(scan.ranges)
-        angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
         wanted, distance = direction(x, y, yaw, place), math.dist((x, y), place)
         speed = self.get_parameter('speed').value
-        self.command(*steer(ranges, angles, wanted, distance, speed))
+        self.command(*steer(*beams(scan), wanted, distance, speed))
 """
 WRONG_NODES = {
-    'drives without a goal': planted(NODE, 'place is None:', 'False:').replace(
+    'drives without a goal': planted(NODE, 'place is None or', 'False or').replace(
         'place = self.job.place()', 'place = self.job.place() or (9.0, 0.0)'
     ),
-    'does not look': planted(NODE, 'np.array(scan.ranges)', 'np.full(101, 9.0)'),
+    'does not look': planted(NODE, '*beams(scan)', '[9.0] * 101, [0.0] * 101'),
     'takes any speed': planted(NODE, 'not 0 < parameter.value <= 1', 'False'),
+    'trusts an old scan': planted(NODE, ' or not self.is_fresh(scan)', ''),
     'keeps its first speed': planted(NODE, "self.get_parameter('speed').value", '0.5'),
 }
 
@@ -1184,7 +1571,12 @@ def judged_tests(workspace, tests, name, right, wrong, hint):
     """Return the points of tests: they pass for right versions, and fail for each wrong one."""
     runs = once(
         lambda: run_tests(
-            workspace, PACKAGE, tests, f'patrol_pkg.{name}', {'yours': '', 'ours': right, **wrong}
+            workspace,
+            PACKAGE,
+            tests,
+            f'patrol_pkg.{name}',
+            {'yours': '', 'ours': right, **wrong},
+            sourced=True,
         )
     )
 
@@ -1211,24 +1603,230 @@ def judged_tests(workspace, tests, name, right, wrong, hint):
 
 WHAT_TO_TEST = {
     'is as wide as a street': 'Something 0.5 m beside the strip: reach is far.',
-    'treats a broken beam as free': 'A beam that is nan: reach is 0.',
+    'drives if all beams are unknown': 'All beams are nan: reach is 0.',
+    'stops at one unknown beam': 'One beam is nan, and nothing is in sight: reach is far.',
     'never stops': 'safe_speed of a reach below STOP_M is 0.',
     'turns the long way round': 'direction with a yaw of 3: the angle is between -pi and pi.',
     'takes the first free direction': 'free_heading with nothing in sight is the one wanted.',
     'drives without a goal': 'Without a goal, see(9.0) is answered by (0.0, 0.0).',
     'does not look': 'With a goal, see(0.2) is answered by a speed of 0.0.',
+    'trusts an old scan': 'With a goal, see(9.0, age_s=2.0) is answered by a speed of 0.0.',
     'takes any speed': 'bench.patrol.set_parameters with speed -0.1 is not successful.',
     'keeps its first speed': 'Set speed to 0.2: see(9.0) is answered by 0.2.',
 }
 
 
-@tasks.add(15, limit_s=90)
+@tasks.add(16, limit_s=90)
 def test_the_logic(workspace, tests):
     return judged_tests(
         workspace, tests, 'logic', LOGIC, WRONG_LOGICS, 'Is each line what task 3 says?'
     )
 
 
-@tasks.add(16, limit_s=90)
+@tasks.add(17, limit_s=90)
 def test_the_node(workspace, tests):
     return judged_tests(workspace, tests, 'patrol', NODE, WRONG_NODES, 'What does task 11 say?')
+
+
+# --- A TurtleBot 3
+
+
+@tasks.add(18)
+def the_guard(workspace):
+    def guarded(story, *options):
+        def test():
+            with Bench() as bench:
+                guard = module(workspace, 'guard').Guard(parameter_overrides=[*options])
+                bench.spin(guard)
+                return story(bench, bench.hear('cmd_vel', TwistStamped))
+
+        return test
+
+    def wanted(v, w):
+        twist = Twist()
+        twist.linear.x, twist.angular.z = v, w
+        return twist
+
+    def speeds(stamped):
+        return [(one.twist.linear.x, one.twist.angular.z) for one in stamped]
+
+    def hands_on(bench, heard):
+        before = bench.tester.get_clock().now()
+        bench.say('cmd_vel_wanted', wanted(0.2, 0.0), wanted(0.1, -0.5))
+        after = bench.tester.get_clock().now()
+        if speeds(heard)[:2] != [(0.2, 0.0), (0.1, -0.5)]:
+            said = ', '.join(f'{v:g} m/s and {w:g} rad/s' for v, w in speeds(heard))
+            return f'of two commands it published {said or "nothing"}'
+        for one in heard[:2]:
+            if not before <= Time.from_msg(one.header.stamp) <= after:
+                return f'a stamp is {one.header.stamp.sec} s: not the time at which it was sent'
+        return True
+
+    def stops(bench, heard):
+        if bench.wait(lambda: heard, 0.6):
+            return 'it publishes before the first command'
+        begin = time.monotonic()
+        bench.say('cmd_vel_wanted', wanted(0.2, 0.0))
+        if not bench.wait(lambda: heard):
+            return 'it publishes nothing for a command'
+        if not bench.wait(lambda: (0.0, 0.0) in speeds(heard), 10):
+            return 'no command comes any more, and it does not stop the robot'
+        waited_s = time.monotonic() - begin
+        if waited_s < 0.3:
+            return f'it stops {waited_s:.2f} s after the last command: timeout_s is 0.3'
+        right = '[ERROR] [guard]: No command comes: I stop'
+        if not bench.wait(lambda: right in bench.log('guard')):
+            return f'it logged {bench.log("guard") or "nothing"}'
+        bench.wait(lambda: len(heard) > 2, 0.6)
+        return len(heard) == 2 or 'it stops the robot again and again'
+
+    def stops_without_clock(bench, heard):
+        bench.say('cmd_vel_wanted', wanted(0.2, 0.0))
+        if not bench.wait(lambda: heard):
+            return 'it publishes nothing for a command'
+        stopped = bench.wait(lambda: (0.0, 0.0) in speeds(heard), 10)
+        return stopped or 'with use_sim_time and without /clock it does not stop the robot'
+
+    def can_be_run(bench, heard):
+        guard = module(workspace, 'guard')
+        if not callable(getattr(guard, 'main', None)):
+            return 'there is no main() in guard.py'
+        node = guard.Guard()
+        must_have(node, 'publisher', 'stop')
+        node.stop()
+        bench.wait(lambda: heard)
+        return speeds(heard) == [(0.0, 0.0)] or f'stop() publishes {speeds(heard) or "nothing"}'
+
+    send = 'TwistStamped(twist=twist), and header.stamp = self.get_clock().now().to_msg()'
+    dog = "Watchdog(self, self.stop, 'command'), and its seen() for each command"
+    return [
+        ('it stamps each command', guarded(hands_on), send),
+        ('it stops the robot, once', guarded(stops), dog),
+        ('also without /clock', guarded(stops_without_clock, *SIM), dog),
+        ('stop() and publisher, for run', guarded(can_be_run), 'self.publisher, stop(), main()'),
+    ]
+
+
+SMALL = Floor.from_text(
+    """
+##########
+#        #
+# >   o  #
+#        #
+##########
+""",
+    name='small',
+)
+
+
+@tasks.add(19, limit_s=120, cpu_s=30)
+def a_turtlebot(workspace):
+    def drives_on_a_new_floor():
+        build(workspace, 'patrol_pkg')
+        path = 'install/patrol_pkg/share/patrol_pkg/config/small.yaml'
+        workspace.write(path, 'patrol:\n  ros__parameters:\n    route: [2.0, 0.5]\n')
+        arguments = 'floor:=small robot:=false sim:=true timeout:=60.0'
+        robot, end = launched(
+            workspace,
+            arguments,
+            SMALL,
+            1,
+            40,
+            driver=TURTLEBOT3,
+            file='turtlebot3.launch.xml',
+        )
+        fastest = max((command.v for command in robot.record.commands), default=0.0)
+        if robot.bumps:
+            return 'it hits something'
+        if end != 'SUCCEEDED':
+            return end
+        return fastest < 0.2001 or f'it is told to drive {fastest:.2g} m/s'
+
+    def starts_all():
+        command = f'{LAUNCH}turtlebot3.launch.xml timeout:=0.7'
+        with Bench() as bench, workspace.start(command, 'all') as program:
+
+            def text():
+                return '\n'.join(program.lines)
+
+            bench.wait(lambda: DRIVES in text() or DIED in text() or not program.running, 20)
+            if started(text()) != ['guard', 'patrol', 'robot']:
+                programs = ' and '.join(started(text())) or 'nothing'
+                return f'it starts {programs}. {printed(workspace, program.lines)}'
+            for node in ('patrol', 'guard'):
+                request = GetParameters.Request(names=['timeout_s'])
+                service = f'/{node}/get_parameters'
+                answer = bench.call(service, GetParameters, request, limit_s=10)
+                if answer is None:
+                    return f'the node {node} does not answer. {printed(workspace, program.lines)}'
+                timeout_s = answer.values[0].double_value
+                if timeout_s != 0.7:
+                    return f'with timeout:=0.7 the parameter timeout_s of {node} is {timeout_s}'
+        return True
+
+    remap = '<remap from="cmd_vel" to="cmd_vel_wanted"/>, in the node patrol'
+    both = '<param name="timeout_s" value="$(var timeout)"/>, in both nodes'
+    return [
+        ('it drives a TurtleBot 3 on a new floor', drives_on_a_new_floor, remap),
+        ('it starts robot, guard and patrol', starts_all, both),
+    ]
+
+
+@tasks.add(20, limit_s=120, cpu_s=60)
+def a_floor_of_your_own(workspace, file):
+    path = workspace.file(f'{PACKAGE}/{file}')
+
+    @once
+    def floor():
+        return Floor.from_text(path.read_text(encoding='utf-8'), name=path.stem)
+
+    toured = once(lambda: round_tour(workspace, floor(), path.stem))
+
+    def hits_nothing():
+        tour, _ = toured()
+        x, y, _ = tour.robot.pose
+        return not tour.robot.bumps or f'it hits something at {x:.1f}, {y:.1f}'
+
+    def comes_everywhere():
+        tour, _ = toured()
+        poses = tour.robot.record.poses
+        missed = [
+            name
+            for name, place in sorted(floor().places.items())
+            if min(math.dist((pose.x, pose.y), place) for pose in poses) > 0.5
+        ]
+        if not floor().places:
+            return 'the floor has no place with a letter'
+        return not missed or f'it does not come to {", ".join(missed)}'
+
+    def interrupted(by):
+        def test():
+            route = route_of(path.with_suffix('.yaml'))
+            with ros_session():
+                numbers = [float(number) for place in route for number in place]
+                tour = Tour(workspace, floor=floor(), route=numbers)
+                tour.run(1)
+                if any(v or w for v, w in tour.speeds(0.2)):
+                    return 'without a goal it drives'
+                tour.send(len(route))
+                tour.run(1)
+                if by == 'a cancel':
+                    tour.handle.cancel_goal_async()
+                else:
+                    tour.robot.blind = True
+                tour.run(1.5)
+                return tour.robot.record.poses[-1].v == 0 or f'after {by} it drives on'
+
+        return test
+
+    hint = 'More places on the route, or a floor with more space.'
+    return [
+        ('it hits nothing', hits_nothing, hint),
+        ('it comes to each place with a letter', comes_everywhere, 'x and y from the start'),
+        ('it stands without a goal, and after a cancel', interrupted('a cancel'), 'job.place()'),
+        (
+            'it stands if the laser is blind',
+            interrupted('a blind laser'),
+            'steer(*beams(scan), ...)',
+        ),
+    ]

@@ -8,6 +8,7 @@ import time
 
 import ipywidgets as widgets
 import matplotlib.pyplot as plt
+import psutil
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
@@ -53,14 +54,14 @@ def a_gate(GatedSubscriber):
         if bool(handlers) == (events is QUIET):
             return 'event_callbacks=events is not passed on'
         if len(ended) < messages:
-            return f'of {messages} messages {len(ended)} were heard after the gate was opened'
+            return f'of {messages} messages {len(ended)} were received after the gate was opened'
         return held == messages or 'a callback ended before the gate was opened'
 
     wait = 'self.gate.wait(timeout=60) in the callback.'
     call = 'create_subscription(type, topic, callback, depth, callback_group=, event_callbacks=)'
     exclusive, reentrant = MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
     return [
-        ('four messages are held, then heard', lambda: holds(4, 10, reentrant(), QUIET), wait),
+        ('four messages are held, then received', lambda: holds(4, 10, reentrant(), QUIET), wait),
         (
             'one, with another depth, group and events',
             lambda: holds(1, 3, exclusive(), None),
@@ -79,7 +80,7 @@ def the_law(heard_after_burst):
         answer = heard_after_burst(in_flight, depth, more)
         heard = hear_burst(threads, group(), in_flight, depth, more)
         case = f'in flight {in_flight}, depth {depth}, {more} more'
-        return answer == heard or f'{case}: {heard} were heard, and your function says {answer}'
+        return answer == heard or f'{case}: {heard} were received, and your function says {answer}'
 
     hint = 'The queue keeps at most depth messages, and not more than come.'
     exclusive, reentrant = MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
@@ -92,7 +93,7 @@ def the_law(heard_after_burst):
 
 
 def hear_burst(threads, group, in_flight, depth, more):
-    """Fill the threads, publish `more` messages, open the gate. Return how many were heard."""
+    """Fill the threads, publish `more` messages, open the gate. Return how many were received."""
     gate, heard = threading.Event(), []
 
     def hold(message):
@@ -128,7 +129,7 @@ def deep_enough_for_a_burst(depth_for_burst):
             return hear_burst(threads, ReentrantCallbackGroup(), in_flight, depth, more)
 
         if (count := heard(depth)) < messages:
-            return f'{case}: {count} were heard'
+            return f'{case}: {count} were received'
         return depth == 1 or heard(depth - 1) < messages or f'{case}, but {depth - 1} would do'
 
     hint = 'A message that a thread takes at once needs no place.'
@@ -154,7 +155,7 @@ def publish_numbers(NumberPublisher):
             bench.wait(lambda: len(heard) > messages, 6 * period_s)
         found = [message.data for message in heard]
         if found[:messages] != [*range(messages)]:
-            return f'of {messages} messages these were heard: {found[:messages]}'
+            return f'of {messages} messages these were received: {found[:messages]}'
         if len(found) > messages:
             return f'more than {messages} messages were published'
         return periods in ([], [period_s]) or f'the period is {periods[0]} s, not {period_s}'
@@ -305,7 +306,7 @@ def spin_it_yourself(spin_until):
             executor.shutdown()
         if not asked:
             return 'done() was never called'
-        return len(heard) == messages or f'it ended when {len(heard)} of {messages} were heard'
+        return len(heard) == messages or f'it ended when {len(heard)} of {messages} were received'
 
     def stops_at_once():
         asked = []
@@ -331,28 +332,36 @@ def spin_it_yourself(spin_until):
 # --- What cells of the lesson show
 
 PROGRAM = """
-import rclpy, signal
+import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 rclpy.init()
-node, executor = rclpy.create_node('ticking'), {executor}()
-node.create_timer(0.01, lambda: print('a callback ran', flush=True))
+node, executor = rclpy.create_node('resting'), {executor}()
 executor.add_node(node)
-signal.alarm(3)
+print('it spins', flush=True)
 executor.spin()
 """
-# It needs no other process, and would leave its shared memory behind when the alarm kills it.
+# It needs no other process, and would leave its shared memory behind when it is killed.
 ALONE = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF', 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
+SPIN_S = 2.0
 
 
-def runs_a_callback(executor):
-    """Return whether an executor, by its name, runs a callback in three seconds of `spin()`.
+def cpu_of_spin(executor):
+    """Return the CPU time (s) of two seconds of `spin()` in which nothing happens.
 
-    It spins in a program of its own, which an alarm kills.
+    The executor, by its name, spins in a program of its own, which is killed.
     """
     command = [sys.executable, '-c', PROGRAM.format(executor=executor)]
-    ended = subprocess.run(command, env=os.environ | ALONE, capture_output=True, timeout=60)
-    return b'a callback ran' in ended.stdout
+    with subprocess.Popen(command, env=os.environ | ALONE, stdout=subprocess.PIPE) as program:
+        try:
+            program.stdout.readline()
+            process = psutil.Process(program.pid)
+            before = process.cpu_times()
+            time.sleep(SPIN_S)
+            after = process.cpu_times()
+        finally:
+            program.kill()
+    return after.user + after.system - before.user - before.system
 
 
 def model_with_sliders():

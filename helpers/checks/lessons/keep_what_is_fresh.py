@@ -1,14 +1,17 @@
 """What the tasks of the lesson "Keep what is fresh" are judged by."""
 
+import math
 import threading
 import time
 from contextlib import suppress
 
 from geometry_msgs.msg import Twist
+from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.executors import Executor, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Empty, Int32
@@ -23,6 +26,105 @@ check = tasks.check
 
 
 @tasks.add(1)
+def say_none_if_you_do_not_know(distance_ahead):
+    def says(right, *beams, others=9.0, behind=False, limits=(0.12, 8.0)):
+        """Ask for a scan with these ranges straight ahead, and with `others` elsewhere."""
+        scan = scan_ahead(beams, others, behind, limits)
+        found = distance_ahead(scan)
+        is_right = found is None if right is None else is_near(found, right)
+        unlike = ', counted from 0 to 2 pi' if behind else ''
+        ahead = f'ahead are {", ".join(f"{beam:g}" for beam in beams)}{unlike}'
+        return is_right or f'{ahead}: it returns {found!r}, not {right}'
+
+    def all_of(*trials):
+        for trial in trials:
+            if (found := trial()) is not True:
+                return found
+        return True
+
+    none = 'Count the known ones: fewer than half of len(ahead), or none at all, is None.'
+    return [
+        (
+            'the least of the ranges ahead, whatever is at the sides',
+            lambda: all_of(
+                lambda: says(2.0, 2.5, 2.0, 3.0, others=0.3),
+                lambda: says(0.4, 0.4, 5.0, 5.0),
+                lambda: says(1.5, 1.5, 4.0, 3.0, others=0.3, behind=True),
+            ),
+            'Of the known ranges in `ahead`, the least.',
+        ),
+        (
+            'what is unknown does not count: NaN, 0.0, too near, too far',
+            lambda: all_of(
+                lambda: says(2.0, NAN, 2.0, 3.0),
+                lambda: says(2.0, 2.0, 3.0, NAN),
+                lambda: says(3.0, 0.0, 3.0, 4.0),
+                lambda: says(3.0, 0.0, 3.0, 4.0, limits=(0.0, 100.0)),
+                lambda: says(3.0, 0.05, 3.0, 4.0),
+                lambda: says(1.0, 1.0, 9.5, 9.5, 4.0),
+            ),
+            'scan.range_min <= r <= scan.range_max and r > 0 is False for each of these.',
+        ),
+        (
+            'inf is range_max, -inf is 0.0',
+            lambda: all_of(
+                lambda: says(8.0, math.inf, math.inf, math.inf),
+                lambda: says(3.5, math.inf, math.inf, limits=(0.12, 3.5)),
+                lambda: says(2.0, math.inf, 2.0, math.inf),
+                lambda: says(0.0, 2.0, -math.inf, 2.0),
+            ),
+            'Compare with math.inf and -math.inf first.',
+        ),
+        (
+            'None if fewer than half are known, or if there is no beam',
+            lambda: all_of(
+                lambda: says(None, NAN, NAN, NAN),
+                lambda: says(None, NAN, 2.0, NAN),
+                lambda: says(2.0, NAN, 2.0, NAN, 3.0),
+                lambda: says(None, 0.0, 0.0, 0.0, 2.0),
+                lambda: says(None),
+            ),
+            none,
+        ),
+    ]
+
+
+NAN = math.nan
+
+
+def scan_ahead(beams, others, behind, limits):
+    """Return a scan all around: just these beams are within 10 degrees of straight ahead.
+
+    It counts from about -160 degrees, or from 0 if `behind`, so that the beams are at both ends.
+    Without beams it looks to the left only.
+    """
+    least, most = limits
+    count = len(beams)
+    if not count:
+        return LaserScan(
+            angle_min=0.5,
+            angle_increment=0.1,
+            ranges=[others] * 20,
+            range_min=least,
+            range_max=most,
+        )
+    step = math.radians(20 / count)
+    around = [*beams, *[others] * (17 * count)]  # to the left, from the first beam on
+    begin = count // 2 if behind else -8 * count
+    return LaserScan(
+        angle_min=(begin - (count - 1) / 2) * step,
+        angle_increment=step,
+        ranges=around[begin:] + around[:begin],
+        range_min=least,
+        range_max=most,
+    )
+
+
+def is_near(found, right):
+    return isinstance(found, int | float) and abs(found - right) < 1e-3
+
+
+@tasks.add(2)
 def brake_before_the_wall(Brake):
     def brakes(distances, right, speed):
         scans = [(metres, 0) for metres in distances]
@@ -35,6 +137,11 @@ def brake_before_the_wall(Brake):
             'it drives where the way is free, and stops where a wall is near',
             lambda: brakes([2.0, 0.7, 0.5, 0.2, 3.0], [0.5, 0.5, 0.0, 0.0, 0.5], 0.5),
             compare,
+        ),
+        (
+            'it stops where the scan does not say it: None',
+            lambda: brakes([2.0, None, None, 3.0], [0.5, 0.0, 0.0, 0.5], 0.5),
+            'if distance is None or distance < LIMIT_M',
         ),
         (
             'the same at 0.25 m/s',
@@ -77,30 +184,6 @@ def scan_with(bench, number, age_s=0):
 
 def number_of(scan):
     return round(scan.ranges[90])
-
-
-@tasks.add(2)
-def a_thread_for_a_node(spin):
-    def spins(count):
-        heard = []
-        with Bench() as bench:
-            node = Node('listener')
-            node.create_subscription(Int32, 'number', lambda m: heard.append(m.data), 10)
-            executor = spin(bench.session, node)
-            bench.say('number', *(Int32(data=number) for number in range(count)), at_once=True)
-            bench.wait(lambda: len(heard) == count)
-            if heard != [*range(count)]:
-                return f'its node heard {len(heard)} of {count} messages'
-            if not isinstance(executor, Executor):
-                return f'it returns {executor!r}, and no executor'
-            nodes = [node.get_name() for node in executor.get_nodes()]
-        return nodes == ['listener'] or f'the executor that it returns has these nodes: {nodes}'
-
-    hint = 'Make an executor, add_node, session.spin(executor), and return it.'
-    return [
-        ('one message is heard', lambda: spins(1), hint),
-        ('three messages are heard', lambda: spins(3), hint),
-    ]
 
 
 @tasks.add(3)
@@ -173,10 +256,11 @@ def stop_if_you_do_not_know(CarefulBrake):
         ages = [age_s for _, age_s in scans]
         if speeds != right:
             return f'most_s={most_s}, scans of {ages} s: it commands {speeds}, not {right}'
-        fresh = [number for number, age_s in enumerate(ages) if age_s < most_s]
+        fresh = [number for number, age_s in enumerate(ages) if -0.1 < age_s < most_s]
         return looked_at == fresh or f'it looked at these scans: {looked_at}, not {fresh}'
 
-    hint = 'The age is that of task 3. Duration(seconds=...) can be compared with it.'
+    hint = 'The age is that of task 3. Compare its nanoseconds / 1e9 with self.most_s.'
+    both = 'A stamp from the future has an age below 0. Below -FUTURE_S it is unknown: stop.'
     return [
         (
             'at most 5 s: the old ones stop it',
@@ -188,6 +272,11 @@ def stop_if_you_do_not_know(CarefulBrake):
             lambda: is_careful(60, [(2.0, 6), (2.0, 3600), (2.0, 30)], [0.5, 0.0, 0.5]),
             hint,
         ),
+        (
+            'a scan from the future stops it, one that is 0.05 s ahead does not',
+            lambda: is_careful(60, [(2.0, -1), (2.0, -0.05), (2.0, -3600)], [0.0, 0.5, 0.0]),
+            both,
+        ),
     ]
 
 
@@ -195,12 +284,12 @@ def stop_if_you_do_not_know(CarefulBrake):
 def the_red_button(StopBrake):
     def after(*topics):
         """Send scans and stops, and return the speeds that it commands."""
-        kinds = {'scan': LaserScan, 'stop': Empty}
         with Bench() as bench:
             commands = bench.hear('cmd_vel', Twist)
-            bench.spin(StopBrake(9, look=lambda scan: 9.0))
+            bench.spin(StopBrake(9, most_s=60, look=lambda scan: 9.0))
             for topic in topics:
-                say_and_wait(bench, topic, kinds[topic](), commands)
+                message = scan_with(bench, 0) if topic == 'scan' else Empty()
+                say_and_wait(bench, topic, message, commands)
             bench.quiet()
         return [twist.linear.x for twist in commands]
 
@@ -292,6 +381,15 @@ def a_worker(NewestBrake):
         speeds = speeds_after(make, [(metres, 0) for metres in distances], depth=1)
         return speeds == right or f'at {distances} m it commands {speeds}'
 
+    def tests_the_age():
+        scans = [(2.0, 0), (2.0, 30), (2.0, -30), (2.0, 0)]
+        speeds = speeds_after(make, scans, depth=1, most_s=5)
+        ages = [age_s for _, age_s in scans]
+        right = [0.5, 0.0, 0.0, 0.5]
+        return (
+            speeds == right or f'of scans that are {ages} s old it commands {speeds}, not {right}'
+        )
+
     def worker_ends():
         errors = []
         threading.excepthook = lambda error: errors.append(error.exc_value)
@@ -301,15 +399,16 @@ def a_worker(NewestBrake):
             return f'it ended with {sentence(errors[0])}'
         return not brake.worker.is_alive() or 'it has not ended 5 s after None'
 
-    looks = 'A Brake has a method that looks and commands: super().scan_callback(scan).'
+    looks = 'super().scan_callback(scan) tests, looks and commands.'
     return [
-        ('stop is heard while it looks', stop_is_heard, 'Slow work does not belong there.'),
+        ('stop is received while it looks', stop_is_heard, 'Slow work does not belong there.'),
         (
             'it looks at 0 and at the newest',
             newest_are_looked_at,
             'A loop: take, and look at that.',
         ),
         ('it brakes as before', lambda: commands([0.5, 0.0, 0.5], [2.0, 0.4, 0.9]), looks),
+        ('it stops for a scan that is old, or from the future', tests_the_age, looks),
         ('its worker ends', worker_ends, 'Test for None first: None ends the loop.'),
     ]
 
@@ -326,7 +425,7 @@ def stop_while_looking(make_brake):
         return 9.0 if gate.wait(timeout=20) else 0.0
 
     with suppress(TimeoutError), ros_session() as session:
-        tester, brake = Node('tester'), make_brake(1, look=look)
+        tester, brake = Node('tester'), make_brake(1, most_s=60, look=look)
         scans = tester.create_publisher(LaserScan, 'scan', 10)
         stop = tester.create_publisher(Empty, 'stop', 10)
         executor = SingleThreadedExecutor()
@@ -334,7 +433,9 @@ def stop_while_looking(make_brake):
         session.spin(executor)
         try:
             for number in range(21):
-                scans.publish(LaserScan(ranges=[float(number)] * 181))
+                scan = LaserScan(ranges=[float(number)] * 181)
+                scan.header.stamp = tester.get_clock().now().to_msg()
+                scans.publish(scan)
                 session.wait_until(lambda: looked_at, timeout_s=3)
             stop.publish(Empty())
             session.wait_until_quiet(executor)
@@ -443,12 +544,27 @@ def a_watchdog(LaserWatchdog):
             bench.wait(lambda: stops, short_s + LATE_S)
         return bool(stops) or f'with most_s={short_s}, no stop came in {short_s + LATE_S} s'
 
+    def needs_no_clock():
+        with Bench() as bench:
+            stops = hear_stops(bench)
+            watchdog = LaserWatchdog(short_s)
+            watchdog.set_parameters([Parameter('use_sim_time', value=True)])
+            bench.spin(watchdog)
+            bench.wait(lambda: stops, short_s + LATE_S)
+            clocks = {timer.clock.clock_type for timer in watchdog.timers}
+        waited_s = short_s + LATE_S
+        if ClockType.SYSTEM_TIME in clocks:
+            return 'its timer is on the system clock, which jumps when somebody sets it'
+        return bool(stops) or f'with use_sim_time and no /clock, no stop came in {waited_s} s'
+
+    steady = 'create_timer(0.1, self.timer_callback, clock=Clock(clock_type=ClockType.STEADY_TIME))'
     since = 'Note time.monotonic() at the start and in each callback of a scan. How long ago is it?'
     return [
         ('a laser that never sends: it stops, again and again', stops_without_a_scan, since),
         ('one scan, then silence: it stops', stops_after_a_scan, since),
         ('it does not stop while a scan is fresh', is_quiet_after_a_scan, since),
         ('it waits for most_s seconds, however long', waits_for_most_s, 'Compare with most_s.'),
+        ('it stops without /clock, too', needs_no_clock, steady),
     ]
 
 
@@ -508,7 +624,7 @@ def choose_the_qos(laser_qos, map_qos):
 
     def newest():
         heard, _ = hear_laser()
-        return heard == [4] or f'of scans 0 to 4 your node heard {heard or "none"}'
+        return heard == [4] or f'of scans 0 to 4 your node received {heard or "none"}'
 
     def silence():
         _, told = hear_laser()
@@ -542,14 +658,14 @@ def choose_the_qos(laser_qos, map_qos):
         if refused:
             names = ', '.join(map(policy_of, refused))
             return f'the map server and your node are not connected: {names}'
-        return heard == [3, 4] or f'your node heard {heard}, not [3, 4]'
+        return heard == [3, 4] or f'your node received {heard}, not [3, 4]'
 
     hint = 'Ask for no more than is offered. Then: how many places does the queue have?'
     late = 'A deadline of at most 2 s, and at least what the laser promises.'
     return [
         ('only the newest scan', newest, hint),
         ('silence is noticed', silence, late),
-        ('the map is heard', the_map, 'Which two things must be right on both sides?'),
+        ('the map is received', the_map, 'Which two things must be right on both sides?'),
     ]
 
 

@@ -35,7 +35,7 @@ def publish_numbers(MinimalPublisher, PERIOD_S):
             bench.wait(lambda: len(heard) > messages, 6 * PERIOD_S)
         texts = [message.data for message in heard]
         if texts[:messages] != [f'Hello World: {number}' for number in range(messages)]:
-            return f'with messages={messages}, these were heard: {texts[:messages]}'
+            return f'with messages={messages}, these were received: {texts[:messages]}'
         return len(texts) == messages or f'more than {messages} messages were published'
 
     def one_each_period():
@@ -80,7 +80,7 @@ def a_slow_subscriber(SlowSubscriber):
             log = bench.log('slow_subscriber')
         if not times_s:
             raise Failed(
-                f'a message on topic did not come: it hears {node.subscription.topic_name}'
+                f'a message on topic did not come: it receives {node.subscription.topic_name}'
             )
         return log, times_s[0]
 
@@ -312,7 +312,7 @@ def a_program_of_its_own(workspace, file):
         if heard == right:
             return True
         numbers = [text.removeprefix('Hello World: ') for text in heard]
-        return f'with depth {depth}, these were heard: {", ".join(numbers) or "none"}'
+        return f'with depth {depth}, these were received: {", ".join(numbers) or "none"}'
 
     last_ten = once(lambda: last_ones(10))
 

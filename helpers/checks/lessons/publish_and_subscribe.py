@@ -1,7 +1,10 @@
 """What the tasks of the lesson "Publish and subscribe" are judged by."""
 
 import math
+import os
+import signal
 import sys
+import time
 
 from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
@@ -10,6 +13,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from helpers.checks.bench import Bench
+from helpers.checks.programs import TRACEBACK, error_in, wait_until
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import EMPTY, Robot
 from helpers.ros import ros_session
@@ -207,7 +211,7 @@ def hear_the_laser(asked):
             node.create_subscription(String, 'topic', heard.append, asked)
             bench.spin(node)
             bench.say('topic', *(String(data=str(number)) for number in range(4)), qos=offered)
-        return len(heard) == 4 or f'of four messages, {len(heard)} were heard'
+        return len(heard) == 4 or f'of four messages, {len(heard)} were received'
 
     def has_depth():
         with ros_session():
@@ -218,8 +222,8 @@ def hear_the_laser(asked):
 
     hint = 'Above, a QoSProfile has a depth and a reliability. Ask for less.'
     return [
-        ('it hears BEST_EFFORT', lambda: hears(ReliabilityPolicy.BEST_EFFORT), hint),
-        ('it hears RELIABLE', lambda: hears(ReliabilityPolicy.RELIABLE), hint),
+        ('it receives BEST_EFFORT', lambda: hears(ReliabilityPolicy.BEST_EFFORT), hint),
+        ('it receives RELIABLE', lambda: hears(ReliabilityPolicy.RELIABLE), hint),
         ('its depth is 10', has_depth, 'QoSProfile(depth=10, ...)'),
     ]
 
@@ -237,15 +241,78 @@ def a_program_of_its_own(workspace, file):
         if not went_on:
             return f'the program ended by itself. {(["It printed nothing", *process.lines])[-1]}'
         if teams != {team}:
-            return f'team {team}: the listener heard {", ".join(teams) or "nothing"}'
+            return f'team {team}: the listener received {", ".join(teams) or "nothing"}'
         if not any(f'[talker]: {team} talks' in line for line in process.lines):
             return f'its log has no line "[talker]: {team} talks"'
         ends = not any('Traceback' in line for line in process.lines)
         return ends or 'Ctrl+C ends it with a traceback'
 
-    hint = 'rclpy.init(), then in a try: rclpy.spin(Talker()). The class is like MinimalPublisher.'
+    def can_be_imported():
+        command = f'{sys.executable} -c "import {file.removesuffix(".py")}"'
+        with workspace.start(f'exec {command}', 'import') as process:
+            ended = wait_until(lambda: not process.running, 8)
+        if not ended:
+            return 'who imports it is not done after 8 s: it starts to talk'
+        return process.wait() == 0 or f'who imports it gets an error: {error_in(process.lines)}'
+
+    hint = 'main(): rclpy.init(), then in a try: rclpy.spin(Talker(sys.argv[1])).'
     caught = 'except (KeyboardInterrupt, ExternalShutdownException): pass'
+    guarded = "Below the class only main(), and if __name__ == '__main__': main()."
     return [
         ('red talks, until Ctrl+C ends it', lambda: is_program('red'), hint),
         ('blue talks, until Ctrl+C ends it', lambda: is_program('blue'), caught),
+        ('who imports it gets the class, and nothing starts', can_be_imported, guarded),
+    ]
+
+
+@tasks.add(9, limit_s=60)
+def leave_a_robot_that_stands(workspace, file):
+    def leaves_it_standing(sent):
+        """Let the program drive, send it a signal, and look at what it has commanded."""
+        with Bench() as bench:
+            commands = bench.hear('cmd_vel', Twist)
+            start = f'exec {sys.executable} {file} --ros-args --disable-external-lib-logs'
+            with workspace.start(start, 'driver') as process:
+                drove = bench.wait(lambda: len(commands) >= 3 or not process.running, 15)
+                if not drove or not process.running:
+                    return f'it does not drive: {error_in(process.lines)}'
+                os.kill(process.pid, sent)
+                ended = bench.wait(lambda: not process.running, 3)
+            bench.quiet()
+        if not ended:
+            return f'3 s after {sent.name} it has not ended'
+        if any(TRACEBACK in line for line in process.lines):
+            return f'{sent.name} ends it with an error: {error_in(process.lines)}'
+        speed = commands[-1].linear.x
+        return speed == 0 or f'{sent.name} ends it, and its last command is {speed:g} m/s'
+
+    def without_messages():
+        """Let the same main() spin a node to which nothing happens."""
+        name = file.removesuffix('.py')
+        idle = (
+            f'import {name} as own; '
+            'own.Driver.timer_callback = lambda self: (self.timer.cancel(), print(self.timer)); '
+            'own.main()'
+        )
+        with workspace.start(f'exec {sys.executable} -c "{idle}"', 'idle') as process:
+            if not wait_until(lambda: process.lines or not process.running, 15):
+                return 'its timer never fired'
+            if not process.running:
+                return f'it ends by itself: {error_in(process.lines)}'
+            time.sleep(0.3)  # now it waits
+            os.kill(process.pid, signal.SIGINT)
+            ended = wait_until(lambda: not process.running, 3)
+        return ended or 'while no callback is due, Ctrl+C does not end it'
+
+    no_handler = 'SignalHandlerOptions.NO, and node.stop() in finally, before try_shutdown().'
+    term = 'signal.signal(signal.SIGTERM, signal.default_int_handler)'
+    once_more = 'while rclpy.ok(): rclpy.spin_once(node, timeout_sec=0.1)'
+    return [
+        (
+            'after Ctrl+C (SIGINT) the robot stands',
+            lambda: leaves_it_standing(signal.SIGINT),
+            no_handler,
+        ),
+        ('after SIGTERM, too', lambda: leaves_it_standing(signal.SIGTERM), term),
+        ('Ctrl+C also ends it while no callback is due', without_messages, once_more),
     ]

@@ -3,30 +3,36 @@
 import contextlib
 import io
 import math
+import time
 from collections import Counter
 from difflib import get_close_matches
+from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 import yaml
-from geometry_msgs.msg import TransformStamped, Vector3
+from geometry_msgs.msg import Transform, TransformStamped, Vector3
+from nav_msgs.msg import Odometry
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import LaserScan
 from urdf_parser_py.urdf import URDF
 
 from helpers.checks.bench import Bench
-from helpers.checks.builds import build, data_files_of
+from helpers.checks.builds import build
 from helpers.checks.errors import Failed
+from helpers.checks.programs import DIED, end_launch, error_of_launch, started
 from helpers.checks.tasks import Tasks, once
-from helpers.fusion import localize, simulate
-from helpers.ros import quaternion
+from helpers.fusion import VARIANCES, localize
+from helpers.ros import quaternion, seconds_of, stamp_of, yaw_of
+from helpers.workspace import without_folders
 
 tasks = Tasks()
 check = tasks.check
 
 DESCRIPTION = 'src/small_robot/urdf/small_robot.urdf'
 MOUNTING = {'base_scan': math.radians(-30), 'imu_link': math.radians(20)}  # as it is described
-CROOKED_DEG = 30.0  # by which the IMU of the other robot is turned
+SETTLED_S = 8.0  # so long after their start programs may take to say something
+# The frames that have a parent when the robot and its filters run.
+CHILDREN = {'odom', 'base_footprint', 'base_link', 'gps_link', 'base_scan', 'imu_link'}
 # What is said on the topics of the robot. A subscription of another type hears nothing.
 TYPES = {'odom': 'Odometry', 'imu/data': 'Imu', 'gps/fix': 'NavSatFix', 'odometry/gps': 'Odometry'}
 
@@ -38,11 +44,6 @@ ARM = """<robot name="arm">
 <origin xyz="0 -1 0" rpy="0.1 0.2 0.3"/></joint>
 <joint name="turning" type="continuous"><parent link="a"/><child link="wheel"/>
 <origin xyz="0 0 0" rpy="0 0 0"/></joint></robot>"""
-
-
-def crooked_drive():
-    """Return the table of a drive of a robot whose IMU is mounted at an angle."""
-    return simulate(seed=4, seconds=40, imu_mounting=math.radians(CROOKED_DEG)).measurements
 
 
 @tasks.add(1)
@@ -191,136 +192,37 @@ def once_is_enough(workspace, StaticBroadcaster):
 
 
 @tasks.add(4)
-def where_the_beams_end(points):
-    def ends_at(x, y, yaw):
-        ranges = (1.0, 2.0, 4.0)
-        scan = LaserScan(angle_min=-0.5, angle_max=0.5, angle_increment=0.5, ranges=ranges)
+def from_a_frame_to_its_parent(to_parent):
+    def leads(x, y, yaw):
+        points = np.array([1.0, 2.0, 0.5]), np.array([0.0, -1.0, 2.0])
         transform = TransformStamped().transform
         transform.translation, transform.rotation = Vector3(x=x, y=y), quaternion(0, 0, yaw)
-        found = np.array(points(scan, transform), float)
+        found = np.array(to_parent(*points, transform), float)
         if found.shape != (2, 3):
-            return f'of three beams it returns numbers of the shape {found.shape}'
-        turned = np.array([-0.5, 0.0, 0.5]) + yaw
-        right = [x + ranges * np.cos(turned), y + ranges * np.sin(turned)]
-        ahead = found[:, 1].round(2).tolist()
-        return np.allclose(found, right, atol=1e-5) or f'the beam straight ahead ends at {ahead}'
-
-    return [
-        ('not turned', lambda: ends_at(0.0, 0.0, 0.0), 'The starter does this.'),
-        ('turned to the left', lambda: ends_at(0.0, 0.0, 1.0), 'angles + yaw_of(...)'),
-        (
-            'turned to the right, and shifted',
-            lambda: ends_at(0.5, -0.2, -0.5),
-            'translation.x',
-        ),
-    ]
-
-
-@tasks.add(5)
-def how_is_it_turned(turned_back, my_angle):
-    def turns_back(angle):
-        found = turned_back(pd.DataFrame({'imu_yaw': [0.0, 1.0], 'vx': [1.0, 1.0]}), angle)
-        right = np.array([0.0, 1.0]) - angle
-        same = np.allclose(np.remainder(found['imu_yaw'] - right + 1, math.tau), 1)
-        return same or f'with {angle} rad, yaws of 0 and 1 become {found["imu_yaw"].tolist()}'
-
-    def leaves_the_table():
-        table = pd.DataFrame({'imu_yaw': [0.0, 1.0], 'vx': [1.0, 1.0]})
-        turned_back(table, 0.3)
-        yaws = table['imu_yaw'].tolist()
-        return yaws == [0.0, 1.0] or (
-            f'the table that it was given has other yaws now, {yaws}: a second run turns them again'
+            return f'of three points it returns numbers of the shape {found.shape}'
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        right = np.array([[cos, -sin], [sin, cos]]) @ points + [[x], [y]]
+        if np.allclose(found, right, atol=1e-5):
+            return True
+        one = ', '.join(f'{value:.2f}' for value in found[:, 1])
+        return (
+            f'with a yaw of {yaw} rad and a shift of {x:g}, {y:g} m, the point 2, -1 becomes '
+            f'{one}, not {right[0, 1]:.2f}, {right[1, 1]:.2f}'
         )
 
-    def lies_on_the_fixes():
-        if abs(my_angle - CROOKED_DEG) <= 4:
-            return True
-        side = 'to the left' if my_angle < CROOKED_DEG else 'to the right'
-        return f'with {my_angle:g} degrees the path still bends {side}'
-
     return [
-        ('an IMU that is turned to the left', lambda: turns_back(0.3), 'angle, not my_angle.'),
+        ('not turned, not shifted', lambda: leads(0.0, 0.0, 0.0), 'The starter does this.'),
+        ('shifted', lambda: leads(1.5, -0.5, 0.0), 'translation.x is added to each x.'),
+        ('turned to the left', lambda: leads(0.0, 0.0, 1.0), 'x cos a - y sin a'),
         (
-            'an IMU that is turned to the right',
-            lambda: turns_back(-1.0),
-            "table['imu_yaw'] - angle",
-        ),
-        (
-            'the table that it is given stays as it is',
-            leaves_the_table,
-            'table.assign(imu_yaw=...) makes a new table.',
-        ),
-        (
-            'the path lies on the fixes',
-            lies_on_the_fixes,
-            'It bends to the left: a larger angle. To the right: a smaller one.',
+            'turned to the right, then shifted',
+            lambda: leads(0.5, -0.2, -0.5),
+            'The shift is not turned: add it last.',
         ),
     ]
 
 
-@tasks.add(6, limit_s=90)
-def data_files(workspace):
-    pairs = once(lambda: data_files_of(workspace, 'small_robot'))
-
-    @once
-    def installed():
-        complete_the_package(workspace)
-        pairs()  # what is wrong with them is said better than by the build
-        build(workspace, 'small_robot', anew=True)
-        return workspace.file('install/small_robot/share')
-
-    def is_named(file, folder):
-        """Test the pairs, because colcon adds what a package of ROS cannot do without."""
-        folders = [place.rstrip('/') for place, files in pairs() if file in files]
-        if folder in folders:
-            return installed().is_dir()
-        return f'{file} goes into {folders[0]}' if folders else f'no pair has the file {file}'
-
-    def is_installed(file):
-        name, share = file.split('/')[-1], installed() / 'small_robot'
-        if (share / file).is_file():
-            return True
-        places = sorted(path.relative_to(share).as_posix() for path in share.rglob(name))
-        if places:
-            return f'{places[0]} is there, not {file}'
-        return f'no {file} in the share folder'
-
-    markers = 'share/ament_index/resource_index/packages'
-    return [
-        ('the URDF', lambda: is_installed('urdf/small_robot.urdf'), 'A folder and a list.'),
-        (
-            'the YAML',
-            lambda: is_installed('config/localization.yaml'),
-            'The paths begin at setup.py.',
-        ),
-        (
-            'package.xml',
-            lambda: is_named('package.xml', 'share/small_robot'),
-            "('share/small_robot', ['package.xml'])",
-        ),
-        (
-            'the marker',
-            lambda: is_named('resource/small_robot', markers),
-            'ROS finds the package by it.',
-        ),
-    ]
-
-
-def complete_the_package(workspace):
-    """Write the files of the package that the lesson does not speak of, if they are not there."""
-    scripts = '$base/lib/small_robot'
-    files = {
-        'resource/small_robot': '',
-        'small_robot/__init__.py': '',
-        'setup.cfg': f'[develop]\nscript_dir={scripts}\n[install]\ninstall_scripts={scripts}\n',
-        'config/localization.yaml': '{}\n',
-    }
-    for name, text in files.items():
-        if not workspace.file(f'src/small_robot/{name}').exists():
-            workspace.write(f'src/small_robot/{name}', text)
-
-
-@tasks.add(7, limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
+@tasks.add(5, limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
 def fix_three_faults(workspace, settings, StaticBroadcaster):
     drive = once(lambda: drive_by(workspace, StaticBroadcaster, settings, seconds=6))
 
@@ -335,6 +237,15 @@ def fix_three_faults(workspace, settings, StaticBroadcaster):
     def both_use(sensor, *parts):
         found = [uses(name, sensor, *parts) for name in ('ekf_odom', 'ekf_map')]
         return next((result for result in found if result is not True), True)
+
+    def holds_on_a_robot():
+        flat = [name for name, is_flat in drive().two_d.items() if is_flat is not True]
+        if flat:
+            return f'two_d_mode is not true for {", ".join(flat)}'
+        given = yaml.safe_load(workspace.file(settings).read_text(encoding='utf-8'))
+        section = given.get('navsat_transform') or given.get('/navsat_transform') or {}
+        waits = (section.get('ros__parameters') or {}).get('wait_for_datum')
+        return waits is True or 'navsat_transform has no wait_for_datum: true'
 
     def is_parent(parent, child):
         found = drive().frames.set_index('child')['parent'].get(child)
@@ -368,6 +279,11 @@ def fix_three_faults(workspace, settings, StaticBroadcaster):
             'base_link_frame',
         ),
         ('map → odom', lambda: is_parent('map', 'odom'), 'world_frame of ekf_map'),
+        (
+            'what a robot needs',
+            holds_on_a_robot,
+            'two_d_mode and wait_for_datum were right.',
+        ),
     ]
 
 
@@ -406,30 +322,388 @@ def compare_types(file):
                 )
 
 
-@tasks.add(8, limit_s=90, cpu_s=20)
-def let_it_doubt(workspace, settings, start, StaticBroadcaster):
-    def drive(**options):
-        return drive_by(workspace, StaticBroadcaster, settings, start, **options)
+@tasks.add(6)
+def between_two_transforms(between):
+    def goes(old, new, part, right):
+        found = between(transform_of(*old), transform_of(*new), part)
+        if not isinstance(found, Transform):
+            return f'it returns {type(found).__name__}, not a Transform'
+        x, y, yaw = found.translation.x, found.translation.y, yaw_of(found.rotation)
+        same = math.isclose(math.remainder(yaw - right[2], math.tau), 0, abs_tol=1e-6)
+        if same and np.allclose((x, y), right[:2], atol=1e-6):
+            return True
+        way = f'{part:g} of the way from x, y, yaw = {old} to {new}'
+        return f'{way} is {x:.2f}, {y:.2f}, {yaw:.2f}, not {right[0]:g}, {right[1]:g}, {right[2]:g}'
 
-    def starts_at(x, y):
-        first_s = drive(start=(x, y, 0.0), seconds=3).first_used_s['ekf_map'].get('odom1', math.inf)
-        away = f'{math.hypot(x, y):g} m away'
-        return first_s < 2 or f'the fix of the first second is kept out, {away}'
+    def leaves_both():
+        old, new = transform_of(1.0, 2.0, 0.1), transform_of(3.0, 4.0, 0.3)
+        between(old, new, 0.5)
+        kept = (old, new) == (transform_of(1.0, 2.0, 0.1), transform_of(3.0, 4.0, 0.3))
+        return kept or 'it changes the transforms that it gets'
 
-    def stays_sure():
-        variances = drive(seconds=1).initial['ekf_map']
-        if not variances:
-            return 'the filter of map has no initial_estimate_covariance'
-        doubts = [name for name, value in variances.items() if value > 1e-3]
-        others = sorted({*doubts} - {'x', 'y'})
-        return not others or f'it also doubts {", ".join(others)}'
+    short = 'math.remainder(turn, math.tau), before you take a part of it.'
+    return [
+        (
+            'half of the way',
+            lambda: goes((1.0, 2.0, 0.0), (2.0, 4.0, 0.4), 0.5, (1.5, 3.0, 0.2)),
+            'start.x + part * (end.x - start.x)',
+        ),
+        (
+            'a quarter, back and to the right',
+            lambda: goes((2.0, 0.0, 0.6), (-2.0, 1.0, -1.4), 0.25, (1.0, 0.25, 0.1)),
+            'part * turn, as well.',
+        ),
+        (
+            'over pi, to the left',
+            lambda: goes((0.0, 0.0, 3.0), (0.0, 0.0, 3.2 - math.tau), 0.5, (0.0, 0.0, 3.1)),
+            short,
+        ),
+        (
+            'over pi, to the right',
+            lambda: goes((0.0, 0.0, -3.1), (0.0, 0.0, 3.1), 0.0, (0.0, 0.0, -3.1)),
+            short,
+        ),
+        ('both stay as they are', leaves_both, 'Make a new Vector3.'),
+    ]
+
+
+def transform_of(x, y, yaw):
+    return Transform(translation=Vector3(x=x, y=y), rotation=quaternion(0, 0, yaw))
+
+
+def stamped_at(t, x, y, yaw, child='base_footprint', parent='odom'):
+    stamped = TransformStamped(child_frame_id=child, transform=transform_of(x, y, yaw))
+    stamped.header.frame_id, stamped.header.stamp = parent, stamp_of(t)
+    return stamped
+
+
+@tasks.add(7)
+def look_it_up(Buffer):
+    KEPT = (0.5, 1.0, 0.0, 0.0), (0.75, 2.0, 0.0, 0.4), (1.25, 4.0, 1.0, 0.0)
+
+    def filled():
+        buffer = Buffer()
+        for kept in KEPT:
+            buffer.add(stamped_at(*kept))
+            buffer.add(stamped_at(*kept[:1], 7.0, 7.0, 0.7, child='wheel'))
+        return buffer
+
+    def finds(t, *right, child='base_footprint'):
+        found = filled().lookup(child, t)
+        if not isinstance(found, Transform):
+            return f'at {t:g} s it returns {type(found).__name__}, not a Transform'
+        values = found.translation.x, found.translation.y, yaw_of(found.rotation)
+        if np.allclose(values, right, atol=1e-6):
+            return True
+        shown = ', '.join(f'{value:.2f}' for value in values)
+        return f'of {child} at {t:g} s it returns x, y, yaw = {shown}, not {right}'
+
+    def refuses(t, where, other):
+        try:
+            filled().lookup('base_footprint', t)
+        except Exception as error:
+            if type(error).__name__ != 'ExtrapolationException':
+                raise
+            text = str(error)
+            if f'into the {where}' not in text:
+                return f'at {t:g} s it says: {text}'
+            wanted = f'{t:.6f}', f'{other:.6f}'
+            return all(number in text for number in wanted) or f'it names other times: {text}'
+        times = ', '.join(f'{kept[0]:g}' for kept in KEPT)
+        return f'transforms of {times} s, asked for {t:g} s: it raises nothing'
 
     return [
         (
-            '3 m to the east',
-            lambda: starts_at(3.0, 0.0),
-            '3 m squared are 9 m²; 1.0 is often enough.',
+            'at a stamp',
+            lambda: finds(0.75, 2.0, 0.0, 0.4),
+            'kept[bisect_left(times, t)].transform',
         ),
-        ('3 m to the south', lambda: starts_at(0.0, -3.0), 'The second number is y.'),
-        ('sure of all the rest', stays_sure, 'Change the first two numbers only.'),
+        ('at the newest', lambda: finds(1.25, 4.0, 1.0, 0.0), 'Only t > times[-1] is too late.'),
+        ('at the oldest', lambda: finds(0.5, 1.0, 0.0, 0.0), 'Only t < times[0] is too early.'),
+        (
+            'between the first two',
+            lambda: finds(0.55, 1.2, 0.0, 0.08),
+            'part is (t - before) / (after - before), in times.',
+        ),
+        ('between the last two', lambda: finds(1.0, 3.0, 0.5, 0.2), 'between(old, new, part)'),
+        ('another child', lambda: finds(1.0, 7.0, 7.0, 0.7, child='wheel'), 'transforms[child]'),
+        (
+            'in the future',
+            lambda: refuses(1.5, 'future', 1.25),
+            'raise ExtrapolationException(FUTURE.format(t, times[-1]))',
+        ),
+        (
+            'in the past',
+            lambda: refuses(0.25, 'past', 0.5),
+            'raise ExtrapolationException(PAST.format(t, times[0]))',
+        ),
+    ]
+
+
+@tasks.add(8)
+def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
+    def scan_at(t, length=1.0):
+        scan = LaserScan(angle_increment=0.1, range_min=0.1, range_max=8.0, ranges=[length])
+        scan.header.stamp = stamp_of(t)
+        return scan
+
+    def tf(mapper, t, x):
+        mapper.tf_callback(transforms([stamped_at(t, x, 0.0, 0.0)]))
+
+    def transforms(stamped):
+        from tf2_msgs.msg import TFMessage  # the lesson has built it
+
+        return TFMessage(transforms=stamped)
+
+    def found_by(steps):
+        with Bench() as bench:
+            mapper = bench.spin(PatientMapper())
+            counts = []
+            for step in steps:
+                step(mapper)
+                counts.append(len(mapper.found))
+        return mapper, counts
+
+    def counts_are(steps, right, said):
+        counts = found_by(steps)[1]
+        return counts == right or f'{said}: after each message it has placed {counts}, not {right}'
+
+    def at_once():
+        steps = [
+            lambda m: tf(m, 1.0, 0.0),
+            lambda m: tf(m, 2.0, 1.0),
+            lambda m: m.scan_callback(scan_at(1.5)),
+        ]
+        return counts_are(steps, [0, 0, 1], 'transforms of 1 and 2 s, a scan of 1.5 s')
+
+    def later():
+        steps = [
+            lambda m: tf(m, 1.0, 0.0),
+            lambda m: m.scan_callback(scan_at(1.5)),
+            lambda m: tf(m, 2.0, 1.0),
+            lambda m: tf(m, 3.0, 2.0),
+        ]
+        return counts_are(steps, [0, 0, 1, 1], 'transform of 1 s, scan of 1.5 s, transforms of 2 '
+                                               'and 3 s')  # fmt: skip
+
+    def at_its_place():
+        steps = [
+            lambda m: tf(m, 1.0, 0.0),
+            lambda m: m.scan_callback(scan_at(1.5)),
+            lambda m: tf(m, 2.0, 1.0),
+        ]
+        mapper, counts = found_by(steps)
+        if counts[-1] != 1:
+            return 'the scan is not placed'
+        x = float(np.ravel(mapper.found[0])[0])
+        right = 0.5 + float(np.ravel(in_robot(scan_at(1.5)))[0])
+        return abs(x - right) < 1e-6 or f'the scan is placed at x = {x:.2f}, not {right:.2f}'
+
+    def others_wait():
+        steps = [
+            lambda m: tf(m, 1.0, 0.0),
+            lambda m: m.scan_callback(scan_at(1.2)),
+            lambda m: m.scan_callback(scan_at(1.4)),
+            lambda m: m.scan_callback(scan_at(2.5)),
+            lambda m: tf(m, 2.0, 1.0),
+            lambda m: tf(m, 3.0, 2.0),
+        ]
+        said = 'scans of 1.2, 1.4 and 2.5 s wait, then come transforms of 2 and 3 s'
+        return counts_are(steps, [0, 0, 0, 0, 2, 3], said)
+
+    def not_for_ever():
+        steps = [lambda m: tf(m, 1.0, 0.0)]
+        for number in range(15):
+            steps.append(lambda m, t=2 + number / 10: m.scan_callback(scan_at(t)))
+        mapper, _ = found_by(steps)
+        stamps = [round(seconds_of(scan.header.stamp), 1) for scan in mapper.waiting]
+        right = [round(2 + number / 10, 1) for number in range(5, 15)]
+        if stamps == right:
+            return True
+        return f'of 15 scans without a transform, {len(stamps)} wait, those of {stamps} s'
+
+    return [
+        ('a scan whose transform is there', at_once, 'scan_callback calls try_again.'),
+        (
+            'a scan that is too early',
+            later,
+            'except ExtrapolationException: it goes into a new list.',
+        ),
+        ('it is placed where the robot was', at_its_place, 'self.place(scan)'),
+        ('the others go on waiting', others_wait, 'Each scan needs a try of its own.'),
+        ('at most ten wait, the newest', not_for_ever, 'self.waiting = too_early[-AT_MOST:]'),
+    ]
+
+
+@tasks.add(9, limit_s=150)
+def two_filters(workspace, file):
+    @once
+    def seen():
+        """Return who publishes and receives what, of which type of frame, when all runs."""
+        build(workspace, 'small_robot')
+        return watch_launch(workspace, file)
+
+    def has_started():
+        programs = seen().programs
+        right = ['ekf_node', 'ekf_node', 'navsat_transform_node', 'robot']
+        right += ['robot_state_publisher']
+        return programs == right or f'it starts {", ".join(programs) or "nothing"}'
+
+    def has_names():
+        filters = sorted(seen().filters)
+        return filters == ['ekf_map', 'ekf_odom'] or (
+            f'the filters are called {", ".join(filters) or "nothing"}'
+        )
+
+    def receives_imu():
+        names = seen().hear_imu & {'ekf_odom', 'ekf_map'}
+        missing = sorted({'ekf_odom', 'ekf_map'} - names)
+        return not missing or f'{", ".join(missing)} does not subscribe to /imu'
+
+    def publishes(topic, frame):
+        frames = sorted(seen().frames[topic])
+        if not frames:
+            return f'nobody publishes /{topic}'
+        return frames == [frame] or f'/{topic} has poses in {", ".join(frames)}'
+
+    def is_connected():
+        missing = sorted(CHILDREN - seen().children)
+        return not missing or f'nobody says where {", ".join(missing)} is'
+
+    return [
+        ('five programs', has_started, 'Two nodes with exec="ekf_node".'),
+        (
+            'two names',
+            has_names,
+            'name="ekf_odom", name="ekf_map": the YAML has a section for each.',
+        ),
+        ('both receive the IMU', receives_imu, '<remap from="imu/data" to="imu"/>, in both.'),
+        (
+            'ekf_odom says where it is in odom',
+            lambda: publishes('odometry/filtered', 'odom'),
+            'Its topic keeps its name, and it has its parameters.',
+        ),
+        (
+            'ekf_map says where it is in map',
+            lambda: publishes('odometry/map', 'map'),
+            '<remap from="odometry/filtered" to="odometry/map"/>, in ekf_map.',
+        ),
+        ('one tree', is_connected, '<param from="$(var settings)"/>, in both.'),
+    ]
+
+
+class Launched(NamedTuple):
+    """What a launch of the robot and its filters does."""
+
+    programs: list[str]  # that were started, sorted
+    filters: set[str]  # the names of nodes that publish a pose of a filter
+    hear_imu: set[str]  # the names of nodes
+    frames: dict[str, set[str]]  # by topic, of the poses
+    children: set[str]  # in /tf and /tf_static
+
+
+def watch_launch(workspace, file):
+    """Launch a file until all runs, and return what it does.
+
+    It waits 30 s at most, and SETTLED_S after the nodes of all programs have been discovered.
+
+    Raises Failed, with the first error that it prints, if it starts nothing.
+    """
+    from tf2_msgs.msg import TFMessage  # the lesson has built it
+
+    command = f'source install/setup.bash\nros2 launch {file}'
+    topics = 'odometry/filtered', 'odometry/map'
+    discovered_s: list[float] = []
+    children: set[str] = set()
+
+    def hear_frames(messages):
+        for message in messages:
+            children.update(one.child_frame_id for one in message.transforms)
+        messages.clear()
+
+    with contextlib.redirect_stdout(io.StringIO()), Bench() as bench:
+        late = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        transforms = bench.hear('/tf', TFMessage), bench.hear('/tf_static', TFMessage, qos=late)
+        poses = {topic: bench.hear(topic, Odometry) for topic in topics}
+        own_nodes = len(bench.tester.get_node_names())
+        with workspace.start(command, 'the launch') as process:
+
+            def names(infos):
+                return {info.node_name for info in infos}
+
+            def filters():
+                found = (bench.tester.get_publishers_info_by_topic(f'/{topic}') for topic in topics)
+                return set().union(*map(names, found))
+
+            def hear_imu():
+                return names(bench.tester.get_subscriptions_info_by_topic('/imu'))
+
+            def all_runs():
+                for messages in transforms:
+                    hear_frames(messages)
+                text = '\n'.join(process.lines)
+                if all(poses.values()) and children >= CHILDREN and len(hear_imu()) > 1:
+                    return True
+                nodes = len(bench.tester.get_node_names()) - own_nodes
+                if not discovered_s and 0 < len(started(text)) <= nodes:
+                    discovered_s.append(time.monotonic())
+                settled = discovered_s and time.monotonic() - discovered_s[0] > SETTLED_S
+                return settled or not process.running or DIED in text
+
+            bench.wait(all_runs, 30)
+            text = '\n'.join(process.lines)
+            launched = Launched(
+                started(text),
+                filters(),
+                hear_imu(),
+                {topic: {pose.header.frame_id for pose in heard} for topic, heard in poses.items()},
+                set(children),
+            )
+            end_launch(process)
+    if error := error_of_launch(without_folders(text, workspace.path)):
+        raise Failed(error)
+    return launched
+
+
+@tasks.add(10)
+def say_what_you_know(Covariances):
+    def relayed(speed):
+        message = Odometry(child_frame_id='base_footprint')
+        message.header.frame_id, message.header.stamp = 'odom', stamp_of(2.5)
+        message.twist.twist.linear.x = speed
+        message.pose.pose.position.x = 2 * speed
+        with Bench() as bench:
+            heard = bench.hear('odom/known', Odometry)
+            bench.spin(Covariances())
+            bench.say('odom', message)
+        return message, heard
+
+    def comes(speed):
+        message, heard = relayed(speed)
+        if len(heard) != 1:
+            return f'one message on odom, {len(heard)} on odom/known'
+        found = heard[0]
+        for name in ('header', 'child_frame_id', 'pose'):
+            if getattr(found, name) != getattr(message, name):
+                return f'{name} has changed'
+        return found.twist.twist == message.twist.twist or 'the speeds have changed'
+
+    def has_variances():
+        _, heard = relayed(0.5)
+        if not heard:
+            return 'nothing comes on odom/known'
+        covariance = heard[0].twist.covariance
+        right = np.zeros(36)
+        right[[0, 7, 35]] = VARIANCES['vx'], VARIANCES['vy'], VARIANCES['vyaw']
+        wrong = [
+            f'{place}: {covariance[place]:g}'
+            for place in range(36)
+            if not math.isclose(covariance[place], right[place], abs_tol=1e-12)
+        ]
+        return not wrong or f'of the 36 numbers these are wrong: {", ".join(wrong)}'
+
+    return [
+        ('each message comes', lambda: comes(0.5), 'self.publisher.publish(message)'),
+        ('another one', lambda: comes(-0.2), 'The message that it receives.'),
+        ('three variances', has_variances, "message.twist.covariance[0] = VARIANCES['vx']"),
     ]

@@ -1,14 +1,16 @@
 """What the tasks of the lesson "Record a bag" are judged by, and its picture of a bag."""
 
+import math
 import shutil
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import matplotlib.pyplot as plt
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, TwistStamped
 from mcap import records
 from mcap.stream_reader import StreamReader
+from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import serialize_message
@@ -55,7 +57,7 @@ def write_the_command_that_records(RECORD, workspace):
         topics = recorded_topics()
         return topics == sorted(TOPICS) or f'the bag has these topics: {", ".join(topics)}'
 
-    hint = 'After -o comes the folder, then the topics, with spaces between them.'
+    hint = 'After --topics come the topics, with spaces between them.'
     return [('it records the four topics into crash', records_all, hint)]
 
 
@@ -210,13 +212,19 @@ def fix_the_brake(FreshBrake):
             bench.quiet()
         return speeds == [0.0] or f'of three scans that waited, it acted on {len(speeds)}'
 
-    hint = 'self.get_clock().now() - Time.from_msg(scan.header.stamp) > Duration(seconds=0.5)'
+    hint = 'Look only if Duration(seconds=-0.1) <= age <= Duration(seconds=0.5).'
     fresh, old = [(99.9, 2), (100, 0.3)], [(59, 2), (59.8, 2)]
+    ahead_of_it = [(80.5, 2), (80.05, 2), (80, 0.3)]
     return [
         ('at 100 s, fresh scans', lambda: commands_well(fresh, 100, [0.5, 0.0]), hint),
         ('at 60 s, an old one', lambda: commands_well(old, 60, [0.0, 0.5]), hint),
         (
-            'of three scans that wait, it hears the newest',
+            'at 80 s, one that is ahead of the clock',
+            lambda: commands_well(ahead_of_it, 80, [0.0, 0.5, 0.0]),
+            hint,
+        ),
+        (
+            'of three scans that wait, it receives the newest',
             has_depth_1,
             'super().__init__(depth=1, ...)',
         ),
@@ -271,6 +279,11 @@ def write_the_judge(Judge):
         ('a command before any scan', lambda: notes(early[:1], [(None, 0.5)]), hint),
         ('two at 2 m', lambda: notes(early, [(None, 0.5), (2.0, 0.25), (2.0, 0.0)]), hint),
         ('the newest scan counts', lambda: notes(newest, [(0.5, 0.0)]), hint),
+        (
+            'a scan that does not say it',
+            lambda: notes([('scan', math.nan), ('cmd_vel', 0.0)], [(None, 0.0)]),
+            'distance_ahead(scan)',
+        ),
     ]
 
 
@@ -357,13 +370,49 @@ def hear_the_laser(LASER_QOS, workspace, scans):
             listener.create_subscription(LaserScan, 'scan', heard.append, LASER_QOS)
             bench.spin(listener)
             play(bench, workspace, 'ros2 bag play laser -r 10')
-        return bool(heard) or 'it hears no scan'
+        return bool(heard) or 'it receives no scan'
 
     def is_deep():
         return LASER_QOS.depth == 100 or f'its depth is {LASER_QOS.depth}'
 
     hint = 'reliability=ReliabilityPolicy.NAME, as that of the laser.'
-    return [('it hears scans', hears, hint), ('its depth is 100', is_deep, 'depth=100')]
+    return [('it receives scans', hears, hint), ('its depth is 100', is_deep, 'depth=100')]
+
+
+@tasks.add(12)
+def ask_the_bag_for_the_type(speeds):
+    def reads(*messages):
+        rows = [(number, '/cmd_vel', message) for number, message in enumerate(messages)]
+        rows.insert(1, (0, '/other/cmd_vel', forwards(9.0)))
+        right = [(getattr(message, 'twist', message)).linear.x for message in messages]
+        with bag_of(rows) as path:
+            found = speeds(path)
+        kind = type(messages[0]).__name__
+        return list(found) == right or f'of {kind} with {right} m/s it returns {found}'
+
+    def refuses():
+        for message in (Bool(data=True), Range(), Odometry()):
+            with bag_of([(1, '/cmd_vel', message)]) as path:
+                try:
+                    found = speeds(path)
+                except TypeError:
+                    continue
+            return f'of a /cmd_vel whose type is {type(message).__name__} it returns {found}'
+        return True
+
+    name = "connection.msgtype == 'geometry_msgs/msg/TwistStamped'"
+    return [
+        ('Twist', lambda: reads(forwards(0.5), forwards(-0.25)), 'Its class is Twist.'),
+        ('TwistStamped', lambda: reads(*map(with_stamp, (0.25, 0.5))), name),
+        ('TwistStamped of another time', lambda: reads(with_stamp(-0.5, 1e9)), name),
+        ('another type', refuses, 'raise TypeError(...)'),
+    ]
+
+
+def with_stamp(speed, stamp_s=1.7e9):
+    message = stamped(TwistStamped, stamp_s, twist=forwards(speed))
+    message.header.frame_id = 'base_link'
+    return message
 
 
 def best_effort():
@@ -401,7 +450,10 @@ def seconds_of(message):
 
 def ahead(metres, stamp_s=1.0):
     """Return a scan with something at this distance ahead."""
-    return stamped(LaserScan, stamp_s, ranges=[0.2] * 90 + [float(metres)] + [9.0] * 90)
+    scan = stamped(LaserScan, stamp_s, ranges=[0.2] * 80 + [float(metres)] * 21 + [7.0] * 80)
+    scan.angle_min, scan.angle_increment = -math.pi / 2, math.pi / 180
+    scan.range_min, scan.range_max = 0.1, 8.0
+    return scan
 
 
 def forwards(speed):

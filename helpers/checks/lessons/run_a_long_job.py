@@ -295,7 +295,7 @@ def a_group_of_its_own(options, ChargingPatroller):
                 gate.set()
             goal.ended()
         raise_first(errors)
-        return heard or 'the cancel was not heard while the service waited'
+        return heard or 'the cancel was not received while the service waited'
 
     def is_new():
         first, second = options(), options()
@@ -305,7 +305,7 @@ def a_group_of_its_own(options, ChargingPatroller):
 
     hint = "{'action_group': MutuallyExclusiveCallbackGroup()}"
     return [
-        ('the cancel is heard, with 3 threads', lambda: is_heard(3), hint),
+        ('the cancel is received, with 3 threads', lambda: is_heard(3), hint),
         ('and with 4 threads', lambda: is_heard(4), hint),
         ('a group of its own for each node', is_new, 'Make the group inside the function.'),
     ]
@@ -358,11 +358,27 @@ def one_patrol_at_a_time(PolitePatroller):
                 return f'{name}: {"accepted" if accepted else "rejected"}'
         return True
 
-    hint = 'busy = True in goal_callback, where it is accepted; busy = False in a finally.'
+    def forgets_who_has_gone():
+        """Accept a goal of a client that has gone: rclpy calls no callback after this one."""
+        with Bench() as bench:
+            node = PolitePatroller()
+            errors = keep_errors(node, lambda: None)
+            answer = node.goal_callback(Patrol.Goal(order=2))
+            if answer != GoalResponse.ACCEPT:
+                return f'a goal of 2 places gets {answer}'
+            bench.spin(node, threads=4)
+            goal = send(bench, 1)
+            goal.ended()
+        raise_first(errors)
+        return goal.accepted or 'its job never began, and the next goal was rejected'
+
+    hint = 'busy = True in handle_accepted_callback, before execute(); busy = False in a finally.'
+    gone = 'goal_callback only asks self.busy: it is set in handle_accepted_callback.'
     return [
         ('if the patrol succeeds', lambda: is_polite('succeeds'), hint),
         ('if it is cancelled', lambda: is_polite('is cancelled'), hint),
         ('if it fails', lambda: is_polite('fails'), 'try: return ... finally: ...'),
+        ('if its client has gone before it began', forgets_who_has_gone, gone),
     ]
 
 

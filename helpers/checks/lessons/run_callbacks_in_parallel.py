@@ -47,8 +47,8 @@ def a_subscriber_with_a_group(SlowSubscriber, DEPTH, CALLBACK_S):
     passed = 'Pass on the group that __init__ gets.'
     exclusive, reentrant = MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
     return [
-        ('it hears and sleeps, in an exclusive group', lambda: hears(exclusive()), made),
-        ('it hears and sleeps, in a reentrant group', lambda: hears(reentrant()), passed),
+        ('it receives and sleeps, in an exclusive group', lambda: hears(exclusive()), made),
+        ('it receives and sleeps, in a reentrant group', lambda: hears(reentrant()), passed),
     ]
 
 
@@ -149,7 +149,7 @@ def camera_and_battery(TwoTopics, make_my_executor):
 
     def battery_is_heard(*topics):
         heard, wanted = called(*topics).count('battery'), topics.count('battery')
-        return heard == wanted or f'meanwhile {heard} of {wanted} battery messages were heard'
+        return heard == wanted or f'meanwhile {heard} of {wanted} battery messages were received'
 
     def one_picture():
         pictures = called('camera', 'camera', 'camera').count('camera')
@@ -158,7 +158,7 @@ def camera_and_battery(TwoTopics, make_my_executor):
     hint = 'Which callback blocks which group? How many threads are still free?'
     return [
         (
-            'the battery is heard while the camera works',
+            'the battery is received while the camera works',
             lambda: battery_is_heard('camera', 'battery'),
             hint,
         ),

@@ -113,6 +113,29 @@ def slower_with_a_load(LoadedDriver):
         reason = together(True, 0.5).reason
         return reason == 'too fast with a load' or f'the reason is {reason!r}'
 
+    def begins(loaded, speed):
+        """Start it with these values. Return the ValueError that it raises, or None."""
+        words = ['-p', f'loaded:={str(loaded).lower()}', '-p', f'max_speed:={speed}']
+        with ros_session():
+            try:
+                LoadedDriver(cli_args=['--ros-args', *words])
+            except ValueError as error:
+                return error
+        return None
+
+    def begins_only_if_allowed():
+        for loaded, speed in ((True, 0.2), (True, 0.3), (False, 0.9)):
+            if error := begins(loaded, speed):
+                return f'started with loaded {loaded}, max_speed {speed} it raises {error!r}'
+        for speed in (0.9, 0.4):
+            error = begins(True, speed)
+            if error is None:
+                return f'it starts with loaded True, max_speed {speed}'
+            if str(error) != 'too fast with a load':
+                return f'the text of the ValueError is {str(error)!r}'
+        return True
+
+    at_start = 'At the end of __init__: self.refuse([]) looks at the values that are there.'
     return [
         (
             'a load at 0.5 m/s is refused',
@@ -132,6 +155,7 @@ def slower_with_a_load(LoadedDriver):
         ),
         ('without a load, 1.0 m/s', lambda: takes([True], ('max_speed', 1.0)), 'Accept the rest.'),
         ('the reason is given', has_reason, 'SetParametersResult(successful=False, reason=...)'),
+        ('it does not start loaded and too fast', begins_only_if_allowed, at_start),
     ]
 
 
@@ -294,18 +318,18 @@ def a_depth_by_parameter(NumberListener, SHALLOW):
             bench.spin(listener)
             bench.quiet()
         found = listener.heard
-        return found == right or f'of the numbers 0 to 19 it heard {found}'
+        return found == right or f'of the numbers 0 to 19 it received {found}'
 
     deep = '--ros-args -p qos_overrides./number.subscription.depth:=15'
     return [
         ('without arguments, the last 10', lambda: hears('', list(range(10, 20))), 'Depth 10.'),
         (
-            'with the depth 15, it hears the last 15',
+            'with the depth 15, it receives the last 15',
             lambda: hears(deep, list(range(5, 20))),
             'qos_overriding_options=BY_PARAMETER',
         ),
         (
-            'with SHALLOW, it hears the last 3',
+            'with SHALLOW, it receives the last 3',
             lambda: hears(SHALLOW, [17, 18, 19]),
             'qos_overrides./number.subscription. and then the policy.',
         ),
@@ -380,8 +404,8 @@ class ForeignDriver(Node):
 
     def __init__(self, **options):
         super().__init__('driver', **options)
-        self.publisher = self.create_publisher(Twist, '/cmd_vel', 10)
-        self.create_subscription(LaserScan, '/scan', self.scan_callback, 10)
+        self.publisher = self.create_publisher(Twist, '/cmd_vel', 1)
+        self.create_subscription(LaserScan, '/scan', self.scan_callback, 1)
         self.declare_parameter('max_speed', 0.5)
 
     def scan_callback(self, scan):

@@ -42,7 +42,7 @@ ACTIONS = {
     'set_env': PAIR,
 }
 PARTS = {
-    'param': Rule(optional=('name', 'value', 'from')),
+    'param': Rule(optional=('name', 'value', 'type', 'from')),
     'remap': Rule(required=('from', 'to')),
     'env': PAIR,
     'arg': PAIR,

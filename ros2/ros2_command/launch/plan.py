@@ -186,6 +186,10 @@ def _value(value: Any, param: Element, scope: Scope) -> Any:
     if not isinstance(value, str) or (has_type and '$(' not in value):
         return value
     text = scope.text(value)
+    if (kind := param.attributes.get('type')) == 'str':
+        return text
+    if kind is not None:
+        param.fail(f"'{kind}' is not a type that is read here: it can be str, or left out.")
     try:
         parsed = yaml.safe_load(text)
     except yaml.YAMLError:

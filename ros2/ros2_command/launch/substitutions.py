@@ -6,6 +6,7 @@ import ast
 import operator
 import re
 import shlex
+import subprocess
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -262,10 +263,26 @@ def _environment_variable(scope: Scope, name: str, *default: str) -> str:
     return _look_up('environment variable', scope.environment, name, *default)
 
 
+def _output_of_command(scope: Scope, command: str) -> str:
+    """Return what a command prints, as $(command) does if no second argument allows stderr."""
+    words = shlex.split(command)
+    try:
+        done = subprocess.run(
+            words, env=scope.environment, capture_output=True, text=True, check=False
+        )
+    except (OSError, IndexError) as error:
+        raise ValueError(f"the command '{command}' cannot be executed: {error}") from None
+    if done.returncode or done.stderr:
+        said = done.stderr.strip() or f'it returns {done.returncode}'
+        raise ValueError(f"the command '{command}' fails: {said}")
+    return done.stdout
+
+
 SUBSTITUTIONS: dict[str, Callable[..., str]] = {
     'var': _variable,
     'env': _environment_variable,
     'find-pkg-share': lambda scope, package: str(share_of(package)),
+    'command': _output_of_command,
     'dirname': lambda scope: str(Path(scope.file).absolute().parent),
     'eval': lambda scope, expression: evaluate(expression),
 }
