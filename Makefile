@@ -24,6 +24,9 @@ test-ros2: set_up ## the `ros2` command, a package of its own in ros2/
 test-tools: set_up ## the tools: an installation from nothing, a new lesson, two machines
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/tools $(PYTEST_ARGS)
 
+test-packages: set_up ## each package that a learner ends with, where only what it names is installed; LESSON="09 12"
+	@$(PYTHON) -m pytest -n 2 $(slow) tests/packages $(lesson) $(PYTEST_ARGS)
+
 test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour; LESSON=02 TASK=3
 	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(if $(TASK),-k "$(shell printf task_%02d $(TASK))") $(PYTEST_ARGS)
 
@@ -96,11 +99,11 @@ set_up:
 	@mkdir -p .jupyter && tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
-test test-ros2 test-tools test-answers test-browser test-classroom notebooks lesson soak bench lint: groups := test
+test test-ros2 test-tools test-packages test-answers test-browser test-classroom notebooks lesson soak bench lint: groups := test
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present class test test-ros2 test-tools test-answers test-browser test-classroom image lab-container hub handout update notebooks \
+.PHONY: help lab present class test test-ros2 test-tools test-packages test-answers test-browser test-classroom image lab-container hub handout update notebooks \
 	lesson site soak bench release lint lock licences clean set_up
 
 PYTHON := .venv/bin/python

@@ -590,6 +590,10 @@ def test_several_cells_write_one_file(shell, capsys):
         shell.run_cell(f'%%write src/a b.py part {part}\n{text}\n')
         assert capsys.readouterr().out == f'Wrote part {part} of src/a b.py\n'
     assert file.read_text(encoding='utf-8') == '# é\n\nlast = 2\n'
+    for part, text in ((1, 'import time'), (2, 'def main():\n    pass')):
+        shell.run_cell(f'%%write src/node.py part {part}\n{text}\n')
+    assert file.with_name('node.py').read_text() == 'import time\n\n\ndef main():\n    pass\n'
+    capsys.readouterr()
     shell.run_cell('%%write src/a b.py\nwhole = 1\n')
     shell.run_cell('%%write src/a b.py part 2\nlast = 3\n')
     assert file.read_text() == 'whole = 1\n'
@@ -601,6 +605,10 @@ def test_cells_are_terminals(shell, capsys):
     workspace = Workspace('test_workspace_other')
     shell.run_cell('%%terminal\necho one; ls')
     assert capsys.readouterr().out == 'one\nsrc\n'
+    # What is printed is there at once, and an Interrupt loses none of it.
+    shell.run_cell('import _thread, threading\nthreading.Timer(1, _thread.interrupt_main).start()')
+    shell.run_cell('%%terminal\necho early; sleep 60; echo late')
+    assert capsys.readouterr().out.startswith('early\n')
     shell.run_cell('%%terminal a_name\nsleep 60')
     assert workspace.terminals['a_name'].running
     workspace.close()

@@ -128,7 +128,7 @@ def main():
     with open(sys.argv[1]) as file:
         task = json.load(file)
     # Longer on a busy computer.
-    end = time.monotonic() + min(45, 12 + 15 * (time.monotonic() - START))
+    end = time.monotonic() + min(45, 9 + 12 * (time.monotonic() - START))
     fork = multiprocessing.get_context('fork')
     running = []
     for name, version in task['versions'].items():

@@ -26,7 +26,7 @@ def safe_speed(distance_m, speed):
 END
 
 cat > brake/brake/brake.py << 'END'
-from contextlib import suppress
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -35,8 +35,9 @@ import yaml
 from ament_index_python import get_package_share_directory
 from brake_tools.speed import nearest_ahead, safe_speed
 from geometry_msgs.msg import Twist
-from rclpy.executors import ExternalShutdownException
+from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import LaserScan
 
 
@@ -45,7 +46,7 @@ class Brake(Node):
         super().__init__('brake')
         file = Path(get_package_share_directory('brake'), 'config', 'brake.yaml')
         self.speed = yaml.safe_load(file.read_text())['speed']
-        self.publisher = self.create_publisher(Twist, 'cmd_vel', 10)
+        self.publisher = self.create_publisher(Twist, 'cmd_vel', 1)
         self.subscription = self.create_subscription(LaserScan, 'scan', self.listener_callback, 1)
 
     def listener_callback(self, scan):
@@ -54,12 +55,23 @@ class Brake(Node):
         message.linear.x = float(safe_speed(distance, self.speed))
         self.publisher.publish(message)
 
+    def stop(self):
+        self.publisher.publish(Twist())
+        self.publisher.wait_for_all_acked(Duration(seconds=1))
+
 
 def main():
-    rclpy.init()
-    with suppress(KeyboardInterrupt, ExternalShutdownException):
-        rclpy.spin(Brake())
-    rclpy.try_shutdown()
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    node = Brake()
+    try:
+        while rclpy.ok():
+            rclpy.spin_once(node, timeout_sec=0.1)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        node.stop()
+        rclpy.try_shutdown()
 END
 
 # The branch jazzy, and an older one, humble, which the server names first.

@@ -66,6 +66,8 @@ class Process:
             starter = [sys.executable, '-I', '-S', '-c', WITH_KERNEL, str(os.getpid()), window]
             command = [*starter, *command]
         self.name, self._environment = name, environment
+        self._complete: list[str] = []  # the lines that it has printed
+        self._begun = 0  # where the line begins that may not be complete
         # Not a pipe, which would need a thread that reads it.
         self._output = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115
         if 'IPython' in sys.modules and (shell := sys.modules['IPython'].get_ipython()):
@@ -97,11 +99,15 @@ class Process:
     def lines(self) -> list[str]:
         """What it has printed so far, stdout and stderr together, one string a line."""
         running, file = self.running, self._output.fileno()
-        # pread, because read() would move the position at which the process writes.
-        text = os.pread(file, os.fstat(file).st_size, 0).decode(errors='replace')
-        lines = text.split('\n')
+        # pread, because read() would move the position at which the process writes. What is in
+        # complete lines is read once: this is asked fifty times a second.
+        size = os.fstat(file).st_size
+        *complete, rest = os.pread(file, size - self._begun, self._begun).split(b'\n')
+        self._begun = size - len(rest)
+        self._complete += [line.decode(errors='replace') for line in complete]
         # The last line may not be complete yet.
-        return lines[:-1] if running or not lines[-1] else lines
+        last = [] if running or not rest else [rest.decode(errors='replace')]
+        return [*self._complete, *last]
 
     @property
     def running(self) -> bool:

@@ -8,7 +8,7 @@ import re
 import shutil
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path, PurePosixPath
 
 from ros2_command.api import CommandError, command_of
@@ -26,10 +26,12 @@ CMAKE_MODULES = Path(__file__).with_name('cmake')
 # What colcon prints in a terminal and differs from run to run: 'Finished <<< my_package [1.06s]',
 # and that the prefix of the wheels, which need not be one, is no colcon workspace.
 MOVING = r'(?<=\w) \[-?[\d.]+s(, .*)?\]$|^\[-?[\d.]+s\] WARNING.*any .local_setup\..*\n'
+MOVING += r'|^\[-?[\d.]+s\] (?=WARNING:|ERROR:)'
 # A package in C++ for lessons: copy it into `src`.
 SMALL_RCLCPP = Path(__file__).with_name('small_rclcpp')
 # A script for a terminal: the repository of somebody else, on a server.
 COLLEAGUE = Path(__file__).with_name('colleague.sh')
+TERMINAL_LIMIT_S = 60.0  # of the commands in a terminal that closes
 CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
 
 EMPTY_AGAIN = 'The workspace is empty again: run the cells below this one again, too. '
@@ -103,7 +105,8 @@ class Workspace:
         """Write a file of the workspace, and the folders above it.
 
         With `part`, 1 or more, only this part of the file is written anew. An empty line separates
-        the parts. Raises ValueError if the part before it was not written.
+        the parts, two are before a class or a function of Python. Raises ValueError if the part
+        before it was not written.
         """
         file = self.file(relative_path)
         with uninterrupted():  # a file of which one half is written would be lost
@@ -113,7 +116,7 @@ class Workspace:
                 if not 1 <= part <= len(parts) + 1:
                     raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
                 parts[part - 1 : part] = [text]
-                text = '\n'.join(parts)
+                text = parts[0] + ''.join(_line_before(each, file) + each for each in parts[1:])
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(text, encoding='utf-8')
 
@@ -240,25 +243,44 @@ class Workspace:
             process.wait()
         return process
 
-    def terminal(self, commands: str) -> str:
+    def terminal(self, commands: str, show: Callable[[str], object] | None = None) -> str:
         """Run commands in a new terminal, a bash in the folder of this workspace.
 
         Nothing of the workspace is sourced in it. It is in the domain of the open session, or of
         this kernel's next one. Its user is `you`. The user's settings of git do not count, and git
         sees no repository above the workspace.
         Return what the commands print, without this machine's folders and the times of colcon.
+        `show` gets each line when it is there, so that an Interrupt loses none.
 
         Raises TimeoutError if they take longer than 60 s.
         """
+        shown = 0
+
+        def show_new() -> None:
+            nonlocal shown
+            lines = shell.lines
+            for line in lines[shown:]:
+                if text := self._plain(f'{line}\n'):
+                    show(text)
+            shown = len(lines)
+
         with self._bash('terminal', commands) as shell:
+            end = time.monotonic() + TERMINAL_LIMIT_S
             try:
-                shell.wait(60)
+                while show and shell.running and time.monotonic() < end:
+                    time.sleep(POLL_S)
+                    show_new()
+                shell.wait(max(0.0, end - time.monotonic()))
             finally:
+                if show:
+                    show_new()
                 self._ran.append((commands, '\n'.join(shell.lines)))
         for workspace in (self, *self._overlays.values()):
             workspace._sourced = None  # the commands may have built
-        text = without_folders('\n'.join(shell.lines), self.path)
-        return re.sub(MOVING, '', text, flags=re.M)
+        return self._plain('\n'.join(shell.lines))
+
+    def _plain(self, text: str) -> str:
+        return re.sub(MOVING, '', without_folders(text, self.path), flags=re.M)
 
     def start(self, commands: str, name: str = 'terminal') -> Process:
         """Run commands in a new terminal that stays open, and return its process.
@@ -323,6 +345,11 @@ def _put_aside(folder: Path) -> Path | None:
     kept = folder.with_name(f'{folder.name}.before')
     shutil.rmtree(kept, ignore_errors=True)
     return folder.rename(kept)
+
+
+def _line_before(part: str, file: Path) -> str:
+    is_top = file.suffix == '.py' and re.match(r'(async )?def |class |@', part)
+    return '\n\n' if is_top else '\n'
 
 
 def _state(install: Path) -> list[int]:
@@ -390,8 +417,7 @@ def terminal(line: str, cell: str) -> None:
     if _open_workspace is None:
         raise UsageError("Open a workspace first: workspace = Workspace('my_lesson').")
     if not name:
-        if text := _open_workspace.terminal(cell):
-            print(text)
+        _open_workspace.terminal(cell, show=lambda text: print(text, end='', flush=True))
     else:
         _open_workspace.start(cell, name)
 

@@ -11,6 +11,8 @@ from helpers.checks.programs import (
     error_in,
     error_of_launch,
     launch,
+    manifest,
+    needed,
     started,
     wait_until,
 )
@@ -20,6 +22,7 @@ tasks = Tasks()
 check = tasks.check
 
 ROBOT_AND_DRIVER = 'drives on the floor corridor', '[driver]: I drive at 0.4 m/s'
+IMPORTED = 'geometry_msgs', 'rclpy', 'sensor_msgs', 'std_srvs'
 OWN_SPEEDS = '[one.driver]: I drive at 0.3 m/s', '[two.driver]: I drive at 0.6 m/s'
 
 
@@ -163,9 +166,9 @@ def start_it_again(workspace, file):
 def a_camera_that_waits(workspace):
     def waits_and_turns():
         """Start it before the robot, and a second time after it."""
-        ros2_run = 'source install/setup.bash\nros2 run fleet_pkg'
+        ros2_run = 'source install/setup.bash\nros2 run'
         space = '--ros-args -r __ns:=/tried'
-        with workspace.start(f'{ros2_run} camera {space}', 'the camera') as camera:
+        with workspace.start(f'{ros2_run} fleet_pkg camera {space}', 'the camera') as camera:
 
             def has_waited():
                 return sum('I wait for' in line for line in camera.lines) >= 3
@@ -176,18 +179,19 @@ def a_camera_that_waits(workspace):
             if not has_waited():
                 return 'before there is a robot it does not say again and again that it waits'
             begun_s = time.monotonic()
-            with workspace.start(f'{ros2_run} robot {space}', 'the robot') as robot:
+            with workspace.start(f'{ros2_run} simulated_robot robot {space}', 'the robot') as robot:
                 wait_until(lambda: any('drives on' in line for line in robot.lines), 25)
                 # A slow machine gets more time.
                 limit_s = max(4.0, 3 * (time.monotonic() - begun_s))
                 turned = turns(camera, limit_s)
                 if turned is not True:
                     return turned
-                with workspace.start(f'{ros2_run} camera {space}', 'a late camera') as late:
+                late_camera = f'{ros2_run} fleet_pkg camera {space}'
+                with workspace.start(late_camera, 'a late camera') as late:
                     return turns(late, limit_s)
 
     hint = 'while not self.client.wait_for_service(timeout_sec=1.0): log. Then call_async, and '
-    hint += 'rclpy.spin_until_future_complete(self, future).'
+    hint += 'rclpy.spin_until_future_complete(self, future, timeout_sec=5.0).'
     return [('it turns the camera, whichever starts first', waits_and_turns, hint)]
 
 
@@ -195,6 +199,8 @@ def a_camera_that_waits(workspace):
 def install_the_files(workspace):
     def build():
         workspace.terminal('rm -rf build install')
+        # As a launch file in Python leaves it.
+        workspace.write('src/fleet_pkg/launch/__pycache__/robot.launch.pyc', '')
         return builds(workspace, 'fleet_pkg')
 
     built = once(build)
@@ -213,12 +219,41 @@ def install_the_files(workspace):
         words = 'fleet_pkg two_robots.launch.xml'
         return says(run(workspace, words, *OWN_SPEEDS, programs=4), *OWN_SPEEDS)
 
-    hint = "('share/' + package_name + '/launch', glob('launch/*'))"
+    hint = "('share/' + package_name + '/launch', glob('launch/*launch.[pxy][yma]*'))"
     both = f'{hint}, and the same for config'
     return [
         ('it builds', built, hint),
         ('launch files and parameters are installed', is_installed, both),
         ('ros2 launch fleet_pkg two_robots.launch.xml', is_launched, 'Is it installed?'),
+    ]
+
+
+@tasks.add(10)
+def name_what_it_starts(workspace):
+    def package():
+        return manifest(workspace, 'src/fleet_pkg')
+
+    def is_described():
+        text = package().description
+        return 'TODO' not in text or f'its description is: {text}'
+
+    def names(*wanted):
+        missing = sorted({*wanted} - needed(package(), 'run'))
+        return not missing or f'not named, or not to run: {", ".join(missing)}'
+
+    def names_no_other():
+        known = {*IMPORTED, 'simulated_robot', 'ros2launch'}
+        others = sorted((needed(package(), 'run') | needed(package(), 'build')) - known)
+        return not others or f'named, and not needed: {", ".join(others)}'
+
+    robot = 'The word after pkg= in your launch files, if it is not your own package.'
+    line = '<exec_depend>NAME</exec_depend>'
+    return [
+        ('it says what it is', is_described, 'Write it into <description>.'),
+        ('the package of the robot is named', lambda: names('simulated_robot'), robot),
+        ('what reads the launch files is named', lambda: names('ros2launch'), line),
+        ('what the code imports is named', lambda: names(*IMPORTED), 'Keep the four lines.'),
+        ('no other package is named', names_no_other, 'What is it needed for?'),
     ]
 
 

@@ -31,9 +31,15 @@ NOT_BUILT = 'it does not build'
 # is there, and is far away.
 PROGRAM = """#include <cstdlib>
 #include <iostream>
+#include <optional>
 #include <stdexcept>
 #include <vector>
 #include <scan_tools/HEADER>
+template<class T> void show(const T & x) {std::cout << x << std::endl;}
+template<class T> void show(const std::optional<T> & x)
+{
+  if (x) {show(*x);} else {std::cout << "nothing" << std::endl;}
+}
 int main(int count, char ** word) try {
   const int a = std::atoi(word[1]), b = std::atoi(word[2]);
   std::vector<float> r;
@@ -42,7 +48,7 @@ int main(int count, char ** word) try {
   r.resize(n + 200, 1000);
   (void)b;
   (void)n;
-  std::cout << CALL << std::endl;
+  show(CALL);
 } catch (const std::invalid_argument &) {
   std::cout << "refused" << std::endl;
 }
@@ -82,12 +88,16 @@ class Program:
         return found == right or f'for {ranges} and {a}, {b} it is {found}, not {right}'
 
 
+FEW = 'nothing', 0, 3, 'nan 1 0'
+
+
 @tasks.add(1)
 def the_nearest_range(workspace):
     program = Program(workspace, 'nearest.hpp', 'scan_tools::nearest(r.data(), a, b)')
     loop = 'A for loop from first, while less than last; an if.'
-    nan = 'A comparison with NaN is false; or skip it with std::isnan.'
-    negative = 'Skip what is not a number (std::isnan), and nothing else.'
+    nan = 'Skip it, with std::isnan.'
+    negative = 'Skip NaN and 0.0, and nothing else.'
+    half = 'Count the known ones. If 2 * known < last - first, return std::nullopt.'
     return [
         ('it compiles', program.compiles, 'Braces and semicolons?'),
         ('of 3, 1, 2 it is 1', lambda: program.gives('1', 0, 3, '3 1 2'), loop),
@@ -103,11 +113,10 @@ def the_nearest_range(workspace):
             lambda: program.gives('-inf', 0, 3, '1 -inf 2'),
             negative,
         ),
-        (
-            'of no range it is infinity',
-            lambda: program.gives('inf', 1, 1, '1 2'),
-            'Begin with result.',
-        ),
+        ('0.0 does not count', lambda: program.gives('2', 0, 3, '0 3 2'), negative),
+        ('infinity counts', lambda: program.gives('inf', 0, 2, 'inf nan'), negative),
+        ('one known beam of three is not enough', lambda: program.gives(*FEW), half),
+        ('of no range it is nothing', lambda: program.gives('nothing', 1, 1, '1 2'), half),
     ]
 
 
@@ -116,6 +125,7 @@ def the_gap(workspace):
     call = 'scan_tools::widest_gap(r.data(), n, a)'
     program = Program(workspace, 'gap.hpp', call, '../src/scan_tools/src/gap.cpp')
     every = 'for (int first = 0; first + width <= size; ++first)'
+    known = 'A window whose nearest range is std::nullopt is no gap: if (here && ...).'
     ties = '1 inf inf inf 1 inf inf inf'
     return [
         ('it compiles', program.compiles, 'Braces and semicolons?'),
@@ -127,6 +137,16 @@ def the_gap(workspace):
         ('the last window counts', lambda: program.gives('4', 2, 0, '1 1 1 2 3'), every),
         ('no beam beyond the end', lambda: program.gives('1', 2, 0, '2 2 1'), every),
         ('the first of several', lambda: program.gives('2', 3, 0, ties), '>, not >='),
+        (
+            'what is not known is no gap',
+            lambda: program.gives('6', 2, 0, 'nan nan 0 nan 1 2 3 1'),
+            known,
+        ),
+        (
+            'nothing, if nothing is known',
+            lambda: program.gives('nothing', 2, 0, 'nan nan 0'),
+            known,
+        ),
         (
             'a width of 9 of 3 beams is refused',
             lambda: program.gives('refused', 9, 0, '1 1 1'),
@@ -155,7 +175,7 @@ ament_package()
 """,
     'main.cpp': """#include <iostream>
 #include <scan_tools/gap.hpp>
-int main() {const float r[] = {1, 5, 6, 5}; std::cout << scan_tools::widest_gap(r, 4, 3);}
+int main() {const float r[] = {1, 5, 6, 5}; std::cout << *scan_tools::widest_gap(r, 4, 3);}
 """,
 }
 GIVEN = """
@@ -261,7 +281,7 @@ def link_the_library(workspace, library):
         return prints_for('7, 8, 9, 1, 1, 1', 1)
 
     steps = 'As in step 1, with find_package and target_link_libraries.'
-    call = 'scan_tools::widest_gap(ranges, 6, 3), and install(...)'
+    call = 'scan_tools::widest_gap(ranges, 6, 3).value(), and install(...)'
     return [
         ('colcon builds the library first', library_is_first, '<depend>NAME</depend>'),
         ('look builds', built, steps),
@@ -294,11 +314,10 @@ def give_it_to_others(workspace):
 
 # --- A module of Python ---------------------------------------------------------------------------
 
-STOPPED = """stop = np.zeros(1, np.int32)
-def stop_it():
-    while True: time.sleep(0.05); stop.fill(1)
+STOPPED = """def stop_it():
+    while True: time.sleep(0.05); m.stop()
 threading.Thread(target=stop_it, daemon=True).start()
-print(m.search(stop, 4.0))"""
+print(m.search(4.0))"""
 
 
 @tasks.add(6, limit_s=BUILD_S)
@@ -335,7 +354,8 @@ def bind(workspace):
     return [
         ('it compiles', compiled, 'Compare with nearest: parentheses, commas, semicolons.'),
         ('a gap', lambda: prints('print(m.widest_gap([1, 5, 6, 5, 1], 3))', '2'), function),
-        ('another gap', lambda: prints('print(m.widest_gap(np.arange(9), 5))', '6'), function),
+        ('another gap', lambda: prints('print(m.widest_gap(np.arange(9), 4))', '7'), function),
+        ('no gap is None', lambda: prints('print(m.widest_gap([0, 0], 1))', 'None'), function),
         ('search releases the GIL', lambda: prints(STOPPED, 'True'), guard),
     ]
 
@@ -413,8 +433,9 @@ def through_the_slalom(GapDriver, WIDTH, scan_tools_py):
             if event == 'c_call':
                 calls.append(function)
 
-        ranges = np.ones(181, np.float32)
-        ranges[gap - WIDTH // 2 : gap + WIDTH // 2 + 1] = 3.0
+        ranges = np.full(181, math.nan if gap is None else 1.0, np.float32)
+        if gap is not None:
+            ranges[gap - WIDTH // 2 : gap + WIDTH // 2 + 1] = 3.0
         step = math.pi / 180
         scan = LaserScan(angle_min=-math.pi / 2, angle_increment=step, ranges=ranges.tolist())
         with Bench() as bench:
@@ -436,6 +457,11 @@ def through_the_slalom(GapDriver, WIDTH, scan_tools_py):
             return f'linear.x is {v:.2f}'
         return abs(w - right) < 0.001 or f'with the gap at beam {gap}, angular.z is {w:.2f}'
 
+    def stops():
+        command, _ = command_for(None)
+        v, w = command.linear.x, command.angular.z
+        return v == w == 0.0 or f'of beams that are all NaN it makes {v:.2f} m/s, {w:.2f} rad/s'
+
     def asks_cpp():
         _, asked = command_for(90)
         return asked or 'for a scan it does not call scan_tools_py.widest_gap'
@@ -446,5 +472,6 @@ def through_the_slalom(GapDriver, WIDTH, scan_tools_py):
         ('straight ahead', lambda: drives(90, 0.0), call),
         ('to the left', lambda: drives(120, math.radians(60)), angle),
         ('to the right', lambda: drives(45, -math.radians(90)), angle),
+        ('it stops if there is no gap', stops, 'widest_gap returns None: then publish Twist().'),
         ('it asks C++', asks_cpp, call),
     ]

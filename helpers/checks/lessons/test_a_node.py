@@ -107,8 +107,8 @@ from brake_pkg.speed import safe_speed
 class Brake(Node):
     def __init__(self):
         super().__init__('brake')
-        self.publisher = self.create_publisher(Twist, 'cmd_vel', 10)
-        self.subscription = self.create_subscription(Range, 'range', self.range_callback, 10)
+        self.publisher = self.create_publisher(Twist, 'cmd_vel', 1)
+        self.subscription = self.create_subscription(Range, 'range', self.range_callback, 1)
 
     def range_callback(self, message):
         twist = Twist()
@@ -278,13 +278,18 @@ def fix_the_flaky_test(workspace, tests):
         count = run.passed + len(run.failed)
         return (run.passed == 9 and run.passes) or f'of {count} runs: {without_run(run.says)}'
 
+    def fails_for_wrong():
+        if not (runs()['busy'].passes or runs()['late'].passes):
+            return 'not judged: it passes for no right node'
+        return is_caught(runs, 'wrong')()
+
     def passes_late():
         return runs()['late'].passes or without_run(runs()['late'].says)
 
     return [
         ('on the busy computer all nine runs pass', passes_nine_times, 'Wait for bench.speeds.'),
         ('it passes if the brake connects late', passes_late, 'Wait for a subscriber, then send.'),
-        ('it fails for a node that drives on', is_caught(runs, 'wrong'), 'Keep the assert.'),
+        ('it fails for a node that drives on', fails_for_wrong, 'Keep the assert.'),
     ]
 
 
@@ -303,7 +308,8 @@ def run_them(workspace):
         file = f'{PACKAGE}/test/test_planted.py'
         workspace.write(file, 'def test_planted():\n    assert 1 == 2\n')
         summary = workspace.terminal(
-            'colcon test --packages-select brake_pkg > test.txt 2>&1; colcon test-result | tail -1'
+            'colcon test --packages-select brake_pkg --pytest-args -k "not flake8 and not pep257"'
+            ' > test.txt 2>&1; colcon test-result | tail -1'
         )
         workspace.file(file).unlink()
         counts = {word: int(n) for n, word in re.findall(r'(\d+) (\w+?)s?\b', summary)}
@@ -367,8 +373,9 @@ def test_active(bench):
         bench.executor.spin_once(timeout_sec=0.1)
     assert bench.speeds == [], 'it publishes while it is inactive'
     bench.brake.trigger_activate()
-    say(bench, 0.75, 0.25)
-    wait_until(bench.executor, lambda: len(bench.speeds) >= 2)
+    for count, distance in enumerate((0.75, 0.25), 1):
+        say(bench, distance)
+        wait_until(bench.executor, lambda: len(bench.speeds) >= count)
     assert bench.speeds == [0.125, 0.0]
 
 def test_stop(bench):
@@ -550,8 +557,8 @@ class Brake(LifecycleNode):
         if self.full_mps <= 0:
             self.get_logger().error('full_mps must be above 0')
             return TransitionCallbackReturn.FAILURE
-        self.publisher = self.create_lifecycle_publisher(Twist, 'cmd_vel', 10)
-        self.subscription = self.create_subscription(Range, 'range', self.range_callback, 10)
+        self.publisher = self.create_lifecycle_publisher(Twist, 'cmd_vel', 1)
+        self.subscription = self.create_subscription(Range, 'range', self.range_callback, 1)
         return TransitionCallbackReturn.SUCCESS
 
     def range_callback(self, message):
@@ -584,9 +591,9 @@ class Brake(LifecycleNode):
         self.full = self.get_parameter('full_mps').value
         if not self.full > 0:
             return Return.FAILURE
-        out = self.create_publisher(Twist, 'cmd_vel', 10)
+        out = self.create_publisher(Twist, 'cmd_vel', 1)
         self.say = lambda x: out.publish(Twist(linear=Vector3(x=x)))
-        self.parts = [out, self.create_subscription(Range, 'range', self.hear, 10)]
+        self.parts = [out, self.create_subscription(Range, 'range', self.hear, 1)]
         return Return.SUCCESS
 
     def hear(self, message):

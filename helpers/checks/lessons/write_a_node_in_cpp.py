@@ -1,8 +1,10 @@
 """What the tasks of the lesson "Write a node in C++" are judged by."""
 
+import math
 import re
 import shutil
 import time
+from contextlib import suppress
 
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
@@ -17,22 +19,30 @@ tasks = Tasks()
 check = tasks.check
 
 BUILD_S = 90  # for a point that builds
+FIRST_SCANS = 10  # at most, until a program is known to answer
 START_S = 8  # for a program to start and be known to the others
 CALLS_MY_SPIN = 'brake.cpp calls spin, not my_spin: run the cell above this task again'
 
-TRY_NEAREST = """#include <iostream>
+TRY_NEAREST = """#include <algorithm>
+#include <iostream>
+#include <string>
 #include <scan_tools/nearest.hpp>
 
-// try_nearest RANGE_MIN RANGE_MAX RANGE...  prints nearest(), and what min_element finds.
+// Prints nearest(), and what min_element finds.
 int main(int argc, char ** argv)
 {
+  if (argc < 4) {
+    std::cerr << "usage: try_nearest RANGE_MIN RANGE_MAX RANGE..." << std::endl;
+    return 2;
+  }
   sensor_msgs::msg::LaserScan scan;
   scan.range_min = std::stof(argv[1]);
   scan.range_max = std::stof(argv[2]);
   for (int i = 3; i < argc; ++i) {
     scan.ranges.push_back(std::stof(argv[i]));
   }
-  std::cout << scan_tools::nearest(scan) << std::endl;
+  const auto found = scan_tools::nearest(scan);
+  std::cout << (found ? std::to_string(*found) : "nothing") << std::endl;
   std::cout << *std::min_element(scan.ranges.begin(), scan.ranges.end()) << std::endl;
 }
 """
@@ -64,7 +74,9 @@ def the_nearest_range(workspace):
         numbers = map(str, (range_min, range_max, *ranges))
         with workspace.run('scan_tools', 'try_nearest', *numbers) as program:
             program.wait()
-        found = program.lines[0] if program.lines else 'nothing'
+        found = program.lines[0] if program.lines else 'no line'
+        with suppress(ValueError):
+            found = f'{float(found):g}'
         of = ', '.join(map(str, ranges))
         return found == right or (
             f'of {of}, valid from {range_min} to {range_max}: {found}, not {right}'
@@ -74,26 +86,43 @@ def the_nearest_range(workspace):
         results = nearest_is('0.5', 0.5, 2.5, 2.5, 0.5), nearest_is('2.5', 0.5, 2.5, 2.5)
         return next((result for result in results if result is not True), True)
 
+    known = 'Is it in the range? Two comparisons with && in between; both are false for NaN.'
+    half = 'Count the known ones. If 2 * known < scan.ranges.size(), return std::nullopt.'
     return [
         (
             'the smallest one, wherever it is',
             lambda: nearest_is('0.5', 0.1, 3.5, 2, 0.5, 1),
-            'A loop over scan.ranges; std::min keeps the smaller one.',
+            'A loop over scan.ranges; *found is the smallest one so far, if there is one.',
         ),
         (
-            'NaN and ranges below range_min are dropped',
-            lambda: nearest_is('0.4', 0.2, 3.5, 'nan', 0.0, 0.1, 3, 'nan', 0.4),
-            'Is it in the range? Two comparisons with && in between; both are false for NaN.',
+            'NaN and ranges below range_min are not known',
+            lambda: nearest_is('0.4', 0.2, 3.5, 'nan', 0.1, 3, 0.4),
+            known,
         ),
         (
-            'ranges above range_max are dropped',
-            lambda: nearest_is('inf', 0.1, 3.5, 'inf', 3.6, 'nan'),
-            'Compare with scan.range_max, too.',
+            'ranges above range_max are not known, and inf is range_max',
+            lambda: nearest_is('3.5', 0.1, 3.5, 'inf', 99, 'inf'),
+            'range == INFINITY counts as scan.range_max.',
+        ),
+        (
+            '-inf is 0.0',
+            lambda: nearest_is('0', 0.1, 3.5, 2, '-inf'),
+            'range == -INFINITY counts as 0.0.',
+        ),
+        (
+            '0.0 is not known, also if range_min is 0',
+            lambda: nearest_is('2', 0, 3.5, 0, 2),
+            '... && range > 0',
         ),
         (
             'the limits themselves are valid',
             limits_are_valid,
             'A range is valid if range_min <= range and range <= range_max.',
+        ),
+        (
+            'one known beam of three is not enough',
+            lambda: nearest_is('nothing', 0.1, 3.5, 'nan', 0, 2),
+            half,
         ),
     ]
 
@@ -108,18 +137,29 @@ def answers_to(workspace, program, kind, topic, *distances, pause_s=0.0):
             return scans.get_subscription_count() and tester.count_publishers(topic)
 
         bench.wait(lambda: not process.running or is_known(), START_S)
+        # The program may not know yet who listens to it: its first answers would be lost.
+        for _ in range(FIRST_SCANS):
+            if not answers and process.running:
+                scans.publish(LaserScan(range_min=0.1, range_max=3.5, ranges=[3.5]))
+                bench.wait(lambda: answers, 0.3)
+        count = -1
+        while count < len(answers):  # an answer to an earlier one may be on its way
+            count = len(answers)
+            bench.wait(lambda seen=count: len(answers) > seen, 0.5)
+        answers.clear()
         for number, distance in enumerate(distances):
             if not process.running:
                 last = ' / '.join(process.lines[-2:]) or 'it printed nothing'
                 raise Failed(f'the program has ended: {last}')
-            scans.publish(LaserScan(range_min=0.1, range_max=3.5, ranges=[3.5, distance]))
+            ranges = [math.nan] * 3 if math.isnan(distance) else [3.5, distance]
+            scans.publish(LaserScan(range_min=0.1, range_max=3.5, ranges=ranges))
             bench.wait(lambda sent=number + 1: len(answers) >= sent)
             bench.quiet()
             if len(answers) != number + 1:
                 raise Failed(f'scans: {number + 1}, messages on {topic}: {len(answers)}')
             time.sleep(pause_s)
         names = [name for name in tester.get_node_names() if name != 'tester' and name[0] != '_']
-    return names, answers
+    return names, answers[: len(distances)]  # when it ends, it stops the robot
 
 
 def code_of(workspace, file):
@@ -176,6 +216,19 @@ def a_node_of_your_own(workspace):
     def drives(*pairs):
         return built() and brakes(workspace, *pairs)
 
+    def stops_at_ctrl_c():
+        built()
+        with Bench() as bench, workspace.run('brake', 'brake') as process:
+            commands = bench.hear('cmd_vel', Twist)
+            scans = bench.publisher('scan', LaserScan)
+            bench.wait(lambda: not process.running or scans.get_subscription_count(), START_S)
+            scans.publish(LaserScan(range_min=0.1, range_max=3.5, ranges=[3.0]))
+            bench.wait(lambda: commands)
+            process.stop()
+            bench.wait(lambda: commands and commands[-1].linear.x == 0.0, 2)
+        last = commands[-1].linear.x if commands else 'nothing'
+        return last == 0.0 or f'the last that the robot hears: {last}'
+
     def is_called_brake():
         built()
         names, _ = answers_to(workspace, 'brake', Twist, 'cmd_vel', 3.0)
@@ -197,6 +250,16 @@ def a_node_of_your_own(workspace):
             hint,
         ),
         ('it drives on when the way is free', lambda: drives((0.25, 0.0), (2, 0.5)), hint),
+        (
+            'it stops if no beam is known',
+            lambda: drives((3, 0.5), (math.nan, 0.0), (3, 0.5)),
+            'if (distance && ...): without a distance the Twist stays as it was made, 0.',
+        ),
+        (
+            'Ctrl+C stops the robot',
+            stops_at_ctrl_c,
+            'main: spin(brake), then brake->stop(), then shutdown().',
+        ),
         ('the node is called brake', is_called_brake, 'Node("brake"), after the colon'),
         (
             'its subscription has depth 1',

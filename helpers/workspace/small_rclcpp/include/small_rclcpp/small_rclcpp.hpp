@@ -2,6 +2,7 @@
 // What is here has the names and the arguments of rclcpp in Jazzy. What is not here: all the rest.
 #pragma once
 
+#include <chrono>
 #include <csignal>
 #include <cstdint>
 #include <functional>
@@ -42,11 +43,8 @@ inline void init(int argc, char ** argv)
 
 inline bool ok() {return interrupted == 0;}
 
-inline void shutdown()
-{
-  check(rcl_shutdown(&context));
-  check(rcl_context_fini(&context));
-}
+// The context itself stays until the process ends: nodes may still be there, as in rclcpp.
+inline void shutdown() {check(rcl_shutdown(&context));}
 
 // The rcl_node_t ends when nobody holds it any more: the node, its publishers, its subscriptions.
 using Handle = std::shared_ptr<rcl_node_t>;
@@ -72,6 +70,19 @@ public:
   }
 
   void publish(const Message & message) {check(rcl_publish(&publisher_, &message, nullptr));}
+
+  // Waits until all subscriptions have what was published. Returns false if that takes longer.
+  bool wait_for_all_acked(std::chrono::milliseconds timeout)
+  {
+    const auto result = rcl_publisher_wait_for_all_acked(
+      &publisher_, RCL_MS_TO_NS(timeout.count()));
+    if (result == RCL_RET_TIMEOUT) {
+      rcl_reset_error();
+      return false;
+    }
+    check(result);
+    return true;
+  }
 
 private:
   Handle node_;
