@@ -5,6 +5,7 @@ what is there. So a dependency that it does not name fails here, as it would for
 who takes the package to a robot. `make test-packages LESSON="09 12"` tries those of some lessons.
 """
 
+import ctypes
 import os
 import re
 import shutil
@@ -326,6 +327,7 @@ def start(
                 stderr=subprocess.STDOUT,
                 stdin=subprocess.DEVNULL,
                 start_new_session=True,
+                preexec_fn=end_with_this_process,
             )
 
         def are_there() -> bool:
@@ -358,6 +360,11 @@ def start(
     if process.returncode not in allowed and not said.startswith('usage:'):
         return f'ends with code {process.returncode}: {said[-300:].strip() or "it says nothing"}'
     return ''
+
+
+def end_with_this_process() -> None:
+    """Let Linux end a program when the process that tests it is killed: 1 is PR_SET_PDEATHSIG."""
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)
 
 
 class Ear:
