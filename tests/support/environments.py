@@ -46,7 +46,8 @@ MORE = {'rmw_implementation': ['rmw_fastrtps_cpp']}  # the default middleware: a
 # colcon itself wants pytest. A package that has tests must name it all the same.
 TOOLS = ['colcon-common-extensions', 'cmake', 'setuptools']
 NOT_TOOLS = {'pytest', 'pytest-cov', 'pytest-repeat', 'pytest-rerunfailures', 'coverage'}
-ROBOT = 'simulated_robot'  # installed beside ROS, with a Python of its own
+# Installed beside ROS, with a Python of their own, as programs of another machine would be.
+OUTSIDE = ('simulated_robot', 'robot_localization', 'robot_state_publisher')
 
 
 class MissingError(Exception):
@@ -68,7 +69,7 @@ def wheels_of(name: str) -> frozenset[str]:
     waiting, seen = [name], set()
     while waiting:
         key = waiting.pop()
-        if key in seen or key == ROBOT:
+        if key in seen or key in OUTSIDE:
             continue
         seen.add(key)
         direct = SYSTEM.get(key, [f'ros-{key.replace("_", "-")}'])
@@ -132,7 +133,7 @@ class Environment:
         for wheel in sorted(wheels):
             for file in installed(wheel).files or []:
                 self._link(Path(os.path.normpath(SITE / file)))
-        self.prefixes = [self._robot()] if ROBOT in names else []
+        self.prefixes = [self._outside(name) for name in OUTSIDE if name in names]
 
     def _link(self, file: Path) -> None:
         if not file.is_relative_to(sys.prefix) or not file.is_file():
@@ -153,18 +154,19 @@ class Environment:
             if source.suffix != '.py':
                 break
 
-    def _robot(self) -> Path:
-        """Return a prefix with the robot. Its program runs with the Python of this project."""
-        prefix = self.folder / 'robot'
-        for part in ('share/ament_index/resource_index/packages', f'share/{ROBOT}', f'lib/{ROBOT}'):
+    def _outside(self, name: str) -> Path:
+        """Return a prefix with a package whose programs run with the Python of this project."""
+        prefix = self.folder / 'outside' / name
+        for part in ('share/ament_index/resource_index/packages', f'share/{name}', f'lib/{name}'):
             (prefix / part).mkdir(parents=True)
-        (prefix / 'share/ament_index/resource_index/packages' / ROBOT).touch()
-        shutil.copy(SHARE / ROBOT / 'package.xml', prefix / 'share' / ROBOT)
-        program = prefix / 'lib' / ROBOT / 'robot'
+        (prefix / 'share/ament_index/resource_index/packages' / name).touch()
+        shutil.copy(SHARE / name / 'package.xml', prefix / 'share' / name)
         # The wheels set the path of libraries at each start, unless this variable is there.
         unset = 'unset _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH'
-        program.write_text(f'#!/bin/sh\n{unset}\nexec {sys.prefix}/lib/{ROBOT}/robot "$@"\n')
-        program.chmod(0o755)
+        for installed_program in Path(sys.prefix, 'lib', name).iterdir():
+            program = prefix / 'lib' / name / installed_program.name
+            program.write_text(f'#!/bin/sh\n{unset}\nexec {installed_program} "$@"\n')
+            program.chmod(0o755)
         return prefix
 
     def variables(self, home: Path) -> dict[str, str]:

@@ -916,10 +916,10 @@ def an_action(workspace):
 class Asked:
     """A job in a node, a client, and what the client is told. Make it in a session."""
 
-    def __init__(self, workspace):
-        route = Parameter('route', value=[1.0, 2.0, 3.0, 4.0])
+    def __init__(self, workspace, route=(1.0, 2.0, 3.0, 4.0)):
+        given = [Parameter('route', value=list(route))] if route else []
         self.robot, self.allowed = Robot(EMPTY, sim_time=True), True
-        node, client = Node('tested', parameter_overrides=[*SIM, route]), Node('client')
+        node, client = Node('tested', parameter_overrides=[*SIM, *given]), Node('client')
         self.job = module(workspace, 'job').Job(node, lambda: self.allowed)
         self.client, self.executor = ActionClient(client, action(), 'patrol'), spun(node, client)
         self.robot.run(0.5, self.executor, until=self.client.server_is_ready)
@@ -985,6 +985,11 @@ def the_job(workspace):
         yield 'a goal of 2 places', asked.ask(2), 'accepted'
         yield 'a second goal at once', asked.ask(2), 'refused'
 
+    def without_route():
+        with ros_session():
+            answer = Asked(workspace, route=()).ask(1)
+        return answer == 'refused' or f'without the parameter route, a goal of 1 place: {answer}'
+
     def cancelled(asked):
         yield 'a goal of 5 places', asked.ask(5), 'accepted'
         asked.job.arrived()
@@ -1010,6 +1015,7 @@ def the_job(workspace):
             'The numbers go on: 0, 1, 2. goal.succeed(), and publish feedback.',
         ),
         ('what it refuses', told(refusals), 'GoalResponse.REJECT'),
+        ('without a route', without_route, 'not self.places'),
         ('a cancel, and a new goal', told(cancelled), 'is_cancel_requested in place()'),
         ('aborted', told(broken_off), 'abort(), and self.goal = None'),
     ]
@@ -1214,7 +1220,10 @@ def the_whole_node(workspace):
             tour.run(0.02)
         if len(commands) == before or any(commands[before][1:]):
             return 'it does not stop'
-        if ('error', 'No scan comes: I stop') not in tour.ear.heard:
+        said = 'error', 'No scan comes: I stop'
+        while said not in tour.ear.heard and time.monotonic() < limit:
+            tour.run(0.02)
+        if said not in tour.ear.heard:
             return 'it does not say so'
         tour.cable.plugged, now_s = True, tour.robot.t_s
         tour.run(1)
