@@ -146,7 +146,7 @@ def test_each_hostile_answer_gets_a_sentence_and_leaves_nothing(function, capsys
     assert '[ok] before [not yet] it ends' in said
     assert f'Found: {HOSTILE[function]}' in said
     assert time.monotonic() - started < 20
-    assert threading.active_count() == threads
+    assert threading.active_count() <= threads
     assert psutil.Process().children(recursive=True) == []
     assert not [
         p for p in psutil.process_iter(['cmdline']) if p.info['cmdline'] == ['sleep', '1000']

@@ -304,12 +304,18 @@ class Computer:
 # --- A program that starts, stops and ends
 
 
+# A signal comes while a message is converted: pybind11 makes this of the KeyboardInterrupt. It is an
+# accident of the moment, so the program is started once more.
+CONVERTED = "Unable to convert call argument '0' to Python object"
+
+
 def start(
     command: list[str],
     variables: dict[str, str],
     folder: Path,
     sent: signal.Signals,
     may_drive: bool,
+    again: bool = True,
 ) -> str:
     """Start a program, wait for its node, and end it. Return what is wrong, or nothing.
 
@@ -353,6 +359,8 @@ def start(
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
         said = output.read_text(errors='replace')
+    if CONVERTED in said and again:
+        return start(command, variables, folder, sent, may_drive, again=False)
     errors = re.findall(r'^(?:\[\S+\] )?(\w[\w.]*(?:Error|Exception)\b.*)', said, re.MULTILINE)
     if errors or 'Traceback' in said or 'process has died' in said:
         return f'fails: {errors[-1] if errors else said[-300:]}'

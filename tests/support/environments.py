@@ -161,11 +161,15 @@ class Environment:
             (prefix / part).mkdir(parents=True)
         (prefix / 'share/ament_index/resource_index/packages' / name).touch()
         shutil.copy(SHARE / name / 'package.xml', prefix / 'share' / name)
-        # The wheels set the path of libraries at each start, unless this variable is there.
-        unset = 'unset _ROS_WHEELS_BOOTSTRAP_COMPLETE LD_LIBRARY_PATH PYTHONPATH'
+        # The wheels set the path of libraries at each start, unless this variable is there. What
+        # the workspace has built, such as tf2_msgs, stays.
+        lines = ['#!/bin/sh', 'unset _ROS_WHEELS_BOOTSTRAP_COMPLETE']
+        for variable in ('LD_LIBRARY_PATH', 'PYTHONPATH'):
+            built = f'$(printf %s "${variable}" | tr : "\\n" | grep /install/ | paste -sd:)'
+            lines.append(f'export {variable}="{built}"')
         for installed_program in Path(sys.prefix, 'lib', name).iterdir():
             program = prefix / 'lib' / name / installed_program.name
-            program.write_text(f'#!/bin/sh\n{unset}\nexec {installed_program} "$@"\n')
+            program.write_text('\n'.join([*lines, f'exec {installed_program} "$@"', '']))
             program.chmod(0o755)
         return prefix
 
