@@ -304,8 +304,8 @@ class Computer:
 # --- A program that starts, stops and ends
 
 
-# A signal comes while a message is converted: pybind11 makes this of the KeyboardInterrupt. It is an
-# accident of the moment, so the program is started once more.
+# A signal came while a message was converted: pybind11 makes this of the KeyboardInterrupt. It is
+# an accident of the moment, so the program is started once more.
 CONVERTED = "Unable to convert call argument '0' to Python object"
 
 
