@@ -46,7 +46,7 @@ def _valid(outputs: list[dict]) -> list[NotebookNode]:
     for output in outputs:
         node = nbformat.from_dict(output)
         try:
-            nbformat.validate(node, ref='output')
+            nbformat.validate(node, ref='output', version=4, version_minor=5)
         except nbformat.ValidationError:
             continue
         found.append(node)
