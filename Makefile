@@ -1,7 +1,7 @@
 # `make help` lists the commands. environment.md says what is installed, and why.
 
 help: ## show this list
-	@sed -n 's/^\([a-z-]*\):.*## /  make \1	/p' Makefile | expand -t 23
+	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 23
 
 lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, OUTPUTS=yes (those of the repository), LAB_ARGS=... change how
 	@exec $(PYTHON) -m tools.lab $(if $(filter yes,$(OUTPUTS)),--outputs) $(server) -- $(LAB_ARGS)

@@ -120,7 +120,7 @@ def commands_of(makefile: str) -> str:
     """Return the Makefile with COMMANDS only, and what they need."""
     kept = []
     for part in makefile.split('\n\n'):
-        rule = re.match(r'([a-z][a-z_-]*|\.PHONY):', part)
+        rule = re.match(r'([a-z][a-z0-9_-]*|\.PHONY):', part)
         if not NOT_NEEDED.search(part) and (not rule or rule[1] in COMMANDS):
             kept.append(re.sub(r' OUTPUTS=yes \([^)]*\),', '', part))
     return '\n\n'.join([*kept[:-1], kept[-1].rstrip(), f'.PHONY: {" ".join(COMMANDS)}\n'])
