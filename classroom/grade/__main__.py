@@ -178,7 +178,11 @@ def write(
 
     put('grades.csv', tables.grades(rows, wanted))
     if 'moodle' in systems:
-        put('moodle.csv', tables.moodle(rows, most, next(filter(tables.is_moodle, sheets), None)))
+        sheet = next(filter(tables.is_moodle, sheets), None)
+        text, absent = tables.moodle(rows, most, sheet)
+        put('moodle.csv', text)
+        for name in absent:
+            print(f'{name} is not in {sheet.name}, by number and name: write the grade yourself.')
     if 'canvas' in systems:
         sheet = next(filter(tables.is_canvas, sheets), None)
         try:

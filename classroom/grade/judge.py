@@ -31,6 +31,7 @@ from nbformat.v4 import output_from_msg
 PR_SET_DUMPABLE = 4  # linux/prctl.h
 INTERRUPT_S = 5  # for a cell to end after an interrupt
 START_S = 120
+CHECK_TIMES = 3  # as long as another cell
 POLL_S = 0.5
 MOST_OUTPUTS = 50  # of a cell
 LONGEST = 100_000  # letters of an output
@@ -144,7 +145,9 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
                     if task in job['overlay']:
                         kernel.run(f'{OVERLAY}({str(files)!r})', 60)
                 starter = task in given_up and cell['kind'] == 'exercise'
-                outputs = kernel.run(cell['starter' if starter else 'source'], job['cell_s'])
+                # A check has limits of its own, for each of its points.
+                limit_s = job['cell_s'] * (CHECK_TIMES if cell['kind'] == 'check' else 1)
+                outputs = kernel.run(cell['starter' if starter else 'source'], limit_s)
                 if cell['kind'] in ('exercise', 'check'):
                     yield {'cell': cell['id'], 'outputs': outputs}
         except HungError as why:

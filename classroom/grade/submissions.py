@@ -70,7 +70,7 @@ def submissions_of(folder: Path) -> tuple[list[Submission], list[File]]:
     """
     if folder.is_file():
         try:
-            files = list(_of_zip(io.BytesIO(folder.read_bytes())))
+            files = list(_of_zip(folder))
         except UNREADABLE:
             raise ValueError(f'{folder} cannot be read as a zip: download it again.') from None
     elif folder.is_dir():
@@ -128,7 +128,7 @@ def _of_folder(folder: Path) -> Iterator[tuple[str, Callable[[], bytes]]]:
         if path.is_symlink() or not path.is_file() or _is_hidden(name):
             continue
         if path.parent == folder and path.suffix.lower() == '.zip' and _is_download(path):
-            yield from _of_zip(io.BytesIO(path.read_bytes()))
+            yield from _of_zip(path)
         else:
             yield name, lambda path=path: _limited(path.open('rb'))
 
@@ -149,8 +149,8 @@ def _is_download(path: Path) -> bool:
         return False
 
 
-def _of_zip(data: io.BytesIO) -> Iterator[tuple[str, Callable[[], bytes]]]:
-    archive = zipfile.ZipFile(data)
+def _of_zip(path: Path) -> Iterator[tuple[str, Callable[[], bytes]]]:
+    archive = zipfile.ZipFile(path)  # open as long as its files may be read
     for info in archive.infolist():
         name = info.filename.replace('\\', '/')
         if not info.is_dir() and not _is_hidden(name):

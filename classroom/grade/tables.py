@@ -100,8 +100,12 @@ def _harmless(text: str) -> str:
     return f"'{text}" if text[:1] in tuple('=+-@\t\r') else text
 
 
-def moodle(rows: list[Row], most: int, sheet: Sheet | None) -> str:
-    """Return a grading worksheet. Students of whom nothing was judged are left as they are."""
+def moodle(rows: list[Row], most: int, sheet: Sheet | None) -> tuple[str, list[str]]:
+    """Return a grading worksheet, and the names of students who are not in it.
+
+    Students of whom nothing was judged are left as they are. If a group has handed in, its number
+    may be that of somebody else: the name must be the same, too.
+    """
     by_number = {row.student.number: row for row in rows if row.student.system == 'moodle'}
     if sheet is None:
         lines = [[*MOODLE]]
@@ -116,18 +120,29 @@ def moodle(rows: list[Row], most: int, sheet: Sheet | None) -> str:
         sheet = Sheet('', lines)
     header, *lines = sheet.rows
     at = {column: header.index(column) for column in header}
-    filled = [header]
+    filled, absent = [header], {*by_number}
     for line in lines:
         line = [*line, *[''] * (len(header) - len(line))]
         number = re.search(r'\d+$', line[at['Identifier']])
         row = by_number.get(number[0]) if number else None
+        if row and 'Full name' in at and not _is_same(line[at['Full name']], row.student.name):
+            row = None
+        if row:
+            absent.discard(row.student.number)
         if row and row.results:
             maximum = _number(line[at['Maximum Grade']]) if 'Maximum Grade' in at else None
             line[at['Grade']] = f'{row.points * (maximum or most) / most:.2f}'
             if 'Feedback comments' in at:
                 line[at['Feedback comments']] = f'{row.points} of {most} tasks are solved.'
         filled.append(line)
-    return _text(filled, sheet.delimiter)
+    names = [by_number[number].student.name for number in sorted(absent)]
+    return _text(filled, sheet.delimiter), names
+
+
+def _is_same(name: str, in_download: str) -> bool:
+    """Whether two names are that of one student: that of a file lacks some letters."""
+    one, other = (re.sub(r'[\W_]', '', text).casefold() for text in (name, in_download))
+    return one == other
 
 
 def canvas(rows: list[Row], most: int, sheet: Sheet | None, title: str) -> str:

@@ -398,22 +398,24 @@ def test_without_a_container_it_says_so(submit, monkeypatch, capsys, tmp_path):
     assert capsys.readouterr().err.startswith('There is no ')
 
 
-def test_moodle_takes_its_worksheet_back(submit):
+def test_moodle_takes_its_worksheet_back(submit, capsys):
     header = 'Identifier,"Full name","Email address",Status,Grade,"Maximum Grade",'
     header += '"Grade can be changed","Last modified (submission)","Last modified (grade)"'
     lines = [
         header,
         '"Participant 501","Student 001",a@b.c,Submitted,,100.00,Yes,"Friday, 1",-',
         '"Participant 777","Not There",d@e.f,"No submission",,100.00,Yes,-,-',
+        '"Participant 500","Somebody Else",d@e.f,Submitted,,100.00,Yes,-,-',
     ]
     sheet = '\ufeff' + '\n'.join(lines)
     folder = submit(**moodle_class(2), **{'Grades-X.csv': sheet.encode()})
     assert main([str(folder)], Stand()) == 0
-    one, absent = rows_of(folder, 'moodle.csv')
+    one, absent, other = rows_of(folder, 'moodle.csv')
+    assert 'Student 000 is not in Grades-X.csv, by number and name' in capsys.readouterr().out
     assert one['Grade'] == '100.00'
     assert one['Email address'] == 'a@b.c'
     assert one['Last modified (grade)'] == '-'
-    assert absent['Grade'] == ''
+    assert absent['Grade'] == other['Grade'] == ''
 
 
 def test_moodle_without_a_worksheet(submit):
