@@ -1,7 +1,7 @@
 # `make help` lists the commands. environment.md says what is installed, and why.
 
 help: ## show this list
-	@sed -n 's/^\([a-z-]*\):.*## /  make \1	/p' Makefile | expand -t 23
+	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 23
 
 lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, OUTPUTS=yes (those of the repository), LAB_ARGS=... change how
 	@exec $(PYTHON) -m tools.lab $(if $(filter yes,$(OUTPUTS)),--outputs) $(server) -- $(LAB_ARGS)
@@ -55,6 +55,10 @@ handout: set_up ## a student's edition as one archive: SOLUTIONS=no leaves the s
 	@$(PYTHON) -m classroom.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
 		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
 
+grade: set_up ## judge what students hand in, in a container: FOLDER=submissions, as Moodle or Canvas gives it; LESSON=02, JOBS=2. See teaching.md
+	@$(PYTHON) -m classroom.grade "$(or $(FOLDER),submissions)" --lesson "$(LESSON)" --seed "$(SEED)" --assignment "$(ASSIGNMENT)" \
+		$(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
+
 update: set_up ## get newer lessons, keep what you have written; FROM=ros2_notebooks.tar.gz names a newer archive
 	@$(PYTHON) -m classroom.update $(if $(FROM),"$(FROM)")
 
@@ -103,7 +107,7 @@ test test-ros2 test-tools test-packages test-answers test-browser test-classroom
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present class test test-ros2 test-tools test-packages test-answers test-browser test-classroom image lab-container hub handout update notebooks \
+.PHONY: help lab present class test test-ros2 test-tools test-packages test-answers test-browser test-classroom image lab-container hub handout grade update notebooks \
 	lesson site soak bench release lint lock licences clean set_up
 
 PYTHON := .venv/bin/python

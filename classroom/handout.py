@@ -4,9 +4,11 @@
     python -m classroom.handout --no-solutions        and without solutions
     python -m classroom.handout --wheels 3.11 3.12    with all packages for these Pythons
 
-README.md is without what is between `<!-- not in the handout -->` and `<!-- end -->`.
-`.handed_out` in it holds the same files once more, so that `make update` can see what the student
-has written since. An archive with solutions brings them to those who have one without.
+It is a student's: KEPT, with students.md as its README and a Makefile of COMMANDS.
+environment.md is without what is between `<!-- not in the handout -->` and `<!-- end -->`. The
+notebooks have no outputs. `.handed_out` holds the same files once more, so that `make update` can
+see what the student has written since. An archive with solutions brings them to those who have one
+without.
 """
 
 import argparse
@@ -19,16 +21,32 @@ import tempfile
 from pathlib import Path
 
 import nbformat
+from nbformat import NotebookNode
 from packaging.requirements import Requirement
 
 from classroom.update import BASE, committed
+from helpers.notebook import MARK
 from tools.lessons.clean import text_of
 from tools.lessons.lesson import ROOT, tags
 
 NAME = 'ros2_notebooks'
 LOCK = 'tools/locks/requirements.lock'
 WHEELS = 'wheels'
-LEFT_OUT = ('tests', '.ci', '.github', 'classroom/hub', 'classroom/tests')
+# What `make lab` and `make update` need. The lock of uv is that of the installer itself.
+KEPT = (
+    *('LICENSE', 'Makefile', 'environment.md', 'pyproject.toml', 'helpers', 'notebooks', 'ros2'),
+    *('tools/lab.py', 'tools/lab.css', 'tools/pip.py', 'tools/set_up.sh', 'tools/uv.sh'),
+    *('tools/jupyter', LOCK, 'tools/locks/requirements-uv.lock', 'tools/locks/files.sh'),
+    *('classroom/__init__.py', 'classroom/update.py'),
+)
+LEFT_OUT = ('ros2/tests',)
+README, STUDENTS = 'README.md', 'classroom/students.md'
+LESSONS = re.compile(
+    r'<!-- made by `make notebooks`: lessons -->\n\n(.*?)\n\n<!-- end -->', re.DOTALL
+)
+COMMANDS = ('help', 'lab', 'set_up', 'update')
+NOT_NEEDED = re.compile(r'^(groups|WORKERS|lesson|slow|this_python)\b.*=|: groups :=', re.MULTILINE)
+FOR_INSTRUCTORS = re.compile(r'## \d+\. For instructors')
 NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', re.DOTALL)
 GLIBC = ('_2_28', '_2_27', '_2_26', '_2_24', '_2_17', '_2_12', '_2_5', '2014', '2010', '1')
 
@@ -41,15 +59,17 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
     """
     with tempfile.TemporaryDirectory() as folder:
         course = committed(root, 'HEAD', Path(folder, NAME))
-        for name in LEFT_OUT:
-            shutil.rmtree(course / name, ignore_errors=True)
-        readme = course / 'README.md'
-        readme.write_text(for_students(readme.read_text(encoding='utf-8')), encoding='utf-8')
+        texts = {README: readme_for_students(course)}
+        _keep_only(course)
+        for name, change in (('Makefile', commands_of), ('environment.md', for_students)):
+            if (course / name).exists():
+                texts[name] = change((course / name).read_text(encoding='utf-8'))
+        for name, text in texts.items():
+            (course / name).write_text(text, encoding='utf-8')
         left_out = {'notes'} if solutions else {'notes', 'solution'}
         for path in course.glob('notebooks/*.ipynb'):
             notebook = nbformat.read(path, as_version=4)
-            notebook.cells = [cell for cell in notebook.cells if not left_out & tags(cell)]
-            path.write_text(text_of(notebook), encoding='utf-8')
+            path.write_text(text_of(lesson_for_students(notebook, left_out)), encoding='utf-8')
         shutil.copytree(course, Path(folder, BASE))
         Path(folder, BASE).rename(course / BASE)
         if pythons:
@@ -71,9 +91,53 @@ def not_committed(root: Path) -> list[str]:
     return [line[3:] for line in said.stdout.splitlines()]
 
 
-def for_students(readme: str) -> str:
-    """Return README.md without what only a clone has."""
-    return NOT_HANDED_OUT.sub('', readme)
+def _keep_only(course: Path) -> None:
+    """Remove what no student needs."""
+    for path in sorted(course.rglob('*'), reverse=True):
+        name = path.relative_to(course).as_posix()
+        kept = any(name == one or name.startswith(f'{one}/') for one in KEPT)
+        if kept and not any(name == one or name.startswith(f'{one}/') for one in LEFT_OUT):
+            continue
+        if path.is_symlink() or not path.is_dir():
+            path.unlink()
+        elif not any(path.iterdir()):
+            path.rmdir()
+
+
+def readme_for_students(course: Path) -> str:
+    """Return the README of an archive: students.md, with the table of the lessons."""
+    lessons = LESSONS.search((course / README).read_text(encoding='utf-8'))
+    text = (course / STUDENTS).read_text(encoding='utf-8')
+    return text.replace('<!-- the lessons -->', lessons[1] if lessons else '')
+
+
+def for_students(text: str) -> str:
+    """Return a document without what only a clone has."""
+    return NOT_HANDED_OUT.sub('', text)
+
+
+def commands_of(makefile: str) -> str:
+    """Return the Makefile with COMMANDS only, and what they need."""
+    kept = []
+    for part in makefile.split('\n\n'):
+        rule = re.match(r'([a-z][a-z0-9_-]*|\.PHONY):', part)
+        if not NOT_NEEDED.search(part) and (not rule or rule[1] in COMMANDS):
+            kept.append(re.sub(r' OUTPUTS=yes \([^)]*\),', '', part))
+    return '\n\n'.join([*kept[:-1], kept[-1].rstrip(), f'.PHONY: {" ".join(COMMANDS)}\n'])
+
+
+def lesson_for_students(notebook: NotebookNode, left_out: set[str]) -> NotebookNode:
+    """Return a notebook without outputs, and without what is for instructors."""
+    notebook.cells = [
+        cell
+        for cell in notebook.cells
+        if not left_out & tags(cell) and not FOR_INSTRUCTORS.match(cell.source)
+    ]
+    notebook.metadata.pop(MARK, None)  # what hides outputs of the repository
+    for cell in notebook.cells:
+        if cell.cell_type == 'code':
+            cell.outputs, cell.execution_count = [], None
+    return notebook
 
 
 def download(lock: Path, folder: Path, pythons: tuple) -> None:

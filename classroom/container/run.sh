@@ -1,6 +1,7 @@
 #!/bin/sh
-# The lessons in a container, for `make image` and `make lab-container`. It runs on Linux and macOS.
-# usage: classroom/container/run.sh image|lab|label
+# The lessons in a container, for `make image`, `make lab-container` and `make grade`. It runs on Linux
+# and macOS.
+# usage: classroom/container/run.sh image|lab|label|ready|judge NAME|end NAME
 # CONTAINER is podman or docker, with options if it needs some; IMAGE_ARGS and RUN_ARGS are added to
 # its build and its run; BASE, PORT and LESSONS are those of the Makefile.
 set -eu
@@ -34,11 +35,15 @@ make_image() {
     $container build "$@" ${IMAGE_ARGS-} .
 }
 
-run_lab() {
-    port=${PORT:-8888} lessons=${LESSONS:-my_lessons}
+ready() {
     has=$($container image inspect --format '{{index .Config.Labels "lessons"}}' "$image" 2> /dev/null) ||
         fail 'There is no image yet: run `make image`, then try again.'
     [ "$has" = "$inside" ] || fail 'The image is not of these lessons: run `make image`, then try again.'
+}
+
+run_lab() {
+    ready
+    port=${PORT:-8888} lessons=${LESSONS:-my_lessons}
     mkdir -p "$lessons"
     lessons=$(cd "$lessons" && pwd)
 
@@ -57,8 +62,22 @@ run_lab() {
         --volume "$lessons:/home/student" ${RUN_ARGS-} "$image"
 }
 
+# The code of a student, for classroom/grade: the job comes on stdin, and what it says goes to stdout.
+# No network, no file of this machine, and nothing that can be written but /tmp, in memory.
+judge() {
+    exec $container run --rm --interactive --name "$1" --network none --read-only \
+        --tmpfs /tmp:rw,exec,nosuid,nodev,size=1g,mode=1777 --shm-size=256m \
+        --memory 2g --memory-swap 2g --pids-limit 400 \
+        --cap-drop ALL --security-opt no-new-privileges \
+        --env HOME=/tmp --env TMPDIR=/tmp --workdir /tmp --no-healthcheck \
+        ${RUN_ARGS-} "$image" python -m classroom.grade.judge
+}
+
 case ${1-} in
     image) make_image ;;
     lab) run_lab ;;
-    *) fail 'usage: classroom/container/run.sh image|lab|label' ;;
+    ready) ready ;;
+    judge) judge "$2" ;;
+    end) $container kill "$2" ;;
+    *) fail 'usage: classroom/container/run.sh image|lab|label|ready|judge NAME|end NAME' ;;
 esac

@@ -1,18 +1,22 @@
 """`make handout`: what students get, and what they get with it for a room without a network."""
 
+import os
 import re
 import shutil
+import subprocess
+import sys
 import tarfile
 
 import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_notebook, new_raw_cell
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output, new_raw_cell
 from support.checkouts import git
 
 from classroom import handout, update
 from tools.lessons.lesson import ROOT
 
-FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb'}
+FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb', 'classroom/update.py'}
+LESSONS = '<!-- made by `make notebooks`: lessons -->\n\n| 01 |\n\n<!-- end -->'
 
 
 @pytest.fixture
@@ -20,15 +24,20 @@ def checkout(tmp_path):
     """Return a clone with a lesson, and with files that no student needs."""
     root = tmp_path / 'check out'
     (root / 'notebooks').mkdir(parents=True)
+    said = [new_output('stream', text='1')]
     cells = [
-        new_code_cell('start = 1', id='start', metadata={'tags': ['exercise']}),
+        new_code_cell('start = 1', id='start', outputs=said, metadata={'tags': ['exercise']}),
         new_raw_cell('For the instructor', id='note', metadata={'tags': ['notes']}),
         new_code_cell('solved = 2', id='solution', metadata={'tags': ['solution']}),
+        new_markdown_cell('## 7. For instructors', id='instructors'),
     ]
     nbformat.write(new_notebook(cells=cells), root / 'notebooks/01_publish.ipynb')
-    for name in ('README.md', 'Makefile', 'tests/test_a.py', 'classroom/hub/set_up.sh'):
-        (root / name).parent.mkdir(parents=True, exist_ok=True)
-        (root / name).write_text(name)
+    for name in (*FILES, 'tests/test_a.py', 'classroom/hub/set_up.sh', handout.STUDENTS):
+        if not name.endswith('.ipynb'):
+            (root / name).parent.mkdir(parents=True, exist_ok=True)
+            (root / name).write_text(name)
+    (root / 'README.md').write_text(f'for all: {LESSONS}')
+    (root / handout.STUDENTS).write_text('for students: <!-- the lessons -->')
     git(root, 'init')
     git(root, 'add', '.')
     git(root, 'commit', '-m', 'all')
@@ -47,28 +56,68 @@ def cells_of(course):
     return [c.source for c in nbformat.read(course / 'notebooks/01_publish.ipynb', 4).cells]
 
 
-def test_a_handout_has_no_notes(checkout, tmp_path, capsys):
+def test_a_handout_is_a_students(checkout, tmp_path, capsys):
     course = unpack(checkout, tmp_path / 'home')
     printed = capsys.readouterr().out
     assert re.search(r'ros2_notebooks\.tar\.gz: 0\.0 MB, no packages\.', printed)
     files = {str(p.relative_to(course)) for p in course.rglob('*') if p.is_file()}
     assert files == FILES | {f'{update.BASE}/{name}' for name in FILES}
     assert cells_of(course) == ['start = 1', 'solved = 2']
+    assert '"output_type"' not in (course / 'notebooks/01_publish.ipynb').read_text()
+    assert (course / 'README.md').read_text() == 'for students: | 01 |'
 
 
-def test_its_readme_links_to_what_it_has():
-    readme = handout.for_students((ROOT / 'README.md').read_text(encoding='utf-8'))
-    links = re.findall(r'\]\((?!https?:)([^)#]+)', readme)
-    assert 'notebooks/00_start_here.ipynb' in links
-    assert not [link for link in links if link.startswith(handout.LEFT_OUT)]
-    assert not {*links} - {*git(ROOT, 'ls-files').splitlines()}
-    assert 'make test' not in readme
+@pytest.fixture(scope='module')
+def archive(tmp_path_factory):
+    """Return the unpacked archive of this checkout, as it was committed."""
+    folder = tmp_path_factory.mktemp('archive')
+    with tarfile.open(handout.handout(ROOT, folder / 'ros2_notebooks.tar.gz')) as files:
+        files.extractall(folder)
+    return folder / 'ros2_notebooks'
+
+
+def test_its_documents_name_only_what_it_has(archive):
+    for name in ('README.md', 'environment.md'):
+        text = (archive / name).read_text(encoding='utf-8')
+        links = re.findall(r'\]\((?!https?:)([^)#]*)(?:#([^)]*))?\)', text)
+        assert links
+        for file, heading in links:
+            target = archive / (file or name)
+            assert target.exists(), f'{name} links to {file}'
+            if heading:
+                headings = re.findall(r'^#+ (.+)$', target.read_text(encoding='utf-8'), re.M)
+                slugs = {re.sub(r'[^\w -]', '', h).lower().replace(' ', '-') for h in headings}
+                assert heading in slugs, f'{name} links to #{heading}'
+        commands = {*re.findall(r'`make ([a-z-]+)', text)}
+        assert commands <= {*handout.COMMANDS}, name
+    assert 'For instructors' not in (archive / 'notebooks/00_start_here.ipynb').read_text()
+
+
+def test_its_commands_work(archive):
+    """Only what a student needs; and what it starts is there."""
+    said = subprocess.run(['make', 'help'], cwd=archive, capture_output=True, text=True).stdout
+    assert re.findall(r'make ([a-z]+)', said)[:3] == ['help', 'lab', 'update']
+    assert 'OUTPUTS' not in said
+    assert 'pytest' not in (archive / 'Makefile').read_text()
+    assert len(said.splitlines()) == 3
+    for command in ('lab', 'update'):
+        planned = ['make', '--dry-run', command]
+        said = subprocess.run(planned, cwd=archive, capture_output=True, text=True)
+        assert not said.returncode, said.stderr
+    environment = {'PATH': os.environ['PATH'], 'PYTHONPATH': str(archive)}
+    for module in ('tools.lab', 'classroom.update', 'helpers.machine.doctor'):
+        code = f'import {module}; assert {module}.__file__.startswith({str(archive)!r})'
+        command = [sys.executable, '-c', code]
+        done = subprocess.run(command, cwd=archive, env=environment, capture_output=True, text=True)
+        assert not done.returncode, done.stderr
+    locks = [path.name for path in archive.glob('**/*.lock') if update.BASE not in path.parts]
+    assert sorted(locks) == ['requirements-uv.lock', 'requirements.lock']
 
 
 def test_what_is_not_committed_is_named_and_left_out(checkout, tmp_path, capsys):
     (checkout / 'Makefile').write_text('half done')
     course = unpack(checkout, tmp_path / 'home')
-    assert (course / 'Makefile').read_text() == 'Makefile'
+    assert (course / 'Makefile').read_text().startswith('Makefile\n')
     said = capsys.readouterr().out
     assert re.search(r'^Not committed, so not in it: Makefile, .*my draft', said, re.M)
 

@@ -1,0 +1,17 @@
+"""Grade what students hand in: `make grade FOLDER=submissions`.
+
+    python -m classroom.grade FOLDER            in a container for each lesson that is judged
+    python -m classroom.grade FOLDER --trust    as you, on this machine: only for code that you know
+
+    submissions   whose file is it? From the names that Moodle and Canvas give
+    answers       which lesson is it, and what has the student written? As text: nothing runs
+    judge         runs the lesson with the answers, in the container: the only part that does
+    runner        starts `judge`, reads what it says, and ends it
+    results       what is judged, kept so that a second run goes on
+    tables        grades.csv, and the files that Moodle and Canvas import
+    feedback      the lesson of a student with the verdicts
+    alike         which students have the same answer
+
+A student's notebook is read as JSON, and never run: the text of its exercise cells goes into the
+lesson of this checkout. What `judge` says back is data from hostile code, and is read as such.
+"""

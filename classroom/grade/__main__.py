@@ -1,0 +1,276 @@
+"""`make grade FOLDER=submissions`: see this package's docstring."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import threading
+import zipfile
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from classroom.grade import alike, tables
+from classroom.grade.answers import (
+    Answers,
+    Cell,
+    Handed,
+    answers_of,
+    cells_of,
+    handed_out,
+    lesson_of,
+)
+from classroom.grade.feedback import feedback
+from classroom.grade.results import Kept, digest_of, job_of, result_of
+from classroom.grade.runner import Container, Said, Trusted, Where, run
+from classroom.grade.submissions import ARCHIVES, Submission, submissions_of, workspace_files
+from tools.lessons.lesson import FOLDER, chosen
+
+LIMIT_MIN = 20.0
+
+
+@dataclass
+class Work:
+    """A student's submission as it is read: answers and files for each lesson."""
+
+    row: tables.Row
+    answers: dict[str, Answers] = field(default_factory=dict)
+    files: dict[str, bytes] = field(default_factory=dict)
+    paths: dict[str, str] = field(default_factory=dict)  # of the notebooks, in the download
+
+
+@dataclass
+class Read:
+    """A notebook of a student."""
+
+    path: str
+    cells: list[Cell]
+    lesson: Handed | None
+
+
+def read(student: Submission, known: list[Handed]) -> tuple[Work, list[Read]]:
+    """Return what can be read of a submission, with one sentence for each file that cannot."""
+    work, notebooks = Work(tables.Row(student)), []
+    said = work.row.said
+    for file in student.files:
+        name = file.name.lower()
+        try:
+            if name.endswith('.ipynb'):
+                cells = cells_of(file.read())
+                notebooks.append(Read(file.path, cells, lesson_of(cells, known)))
+            elif name.endswith(ARCHIVES):
+                work.files |= workspace_files(file)
+        except (OSError, RuntimeError, NotImplementedError, ValueError, zipfile.BadZipFile) as why:
+            said.append(f'{file.name} cannot be read: {why}')
+    for one in notebooks:
+        if one.lesson is None:
+            said.append(f'{Path(one.path).name} is no lesson of this course')
+    if not notebooks and not said:
+        said.append('no notebook')
+    return work, [one for one in notebooks if one.lesson]
+
+
+def choose(work: Work, notebooks: list[Read], wanted: list[Handed]) -> None:
+    """Take for each lesson the notebook with the most answers, and say what is left out."""
+    best: dict[str, tuple[int, Answers]] = {}
+    said = work.row.said
+    for one in notebooks:
+        lesson = one.lesson
+        if lesson not in wanted:
+            said.append(f'{Path(one.path).name} is lesson {lesson.lesson.number}, not asked for')
+            continue
+        answers = answers_of(one.cells, lesson)
+        count = sum(map(answers.changed, lesson.tasks.values()))
+        number = lesson.lesson.number
+        if number in best:
+            work.row.said.append(
+                f'lesson {number} is there twice: the one with more answers counts'
+            )
+        if number not in best or count >= best[number][0]:
+            best[number] = count, answers
+            work.paths[number] = one.path
+    for number, (_, answers) in best.items():
+        work.answers[number] = answers
+        said += answers.said
+    for lesson in wanted:
+        if notebooks and lesson.lesson.number not in best:
+            said.append(f'lesson {lesson.lesson.number} is not there')
+
+
+def judge_all(
+    works: list[Work], wanted: list[Handed], kept: Kept, where: Where, options: object
+) -> int:
+    """Judge what is not judged yet, and print a line for each student. Return how many failed."""
+    writing = threading.Lock()
+    failed = 0
+
+    def one(work: Work) -> None:
+        try:
+            judge_one(work)
+        except Exception as error:  # whatever is wrong with one, the others are judged
+            fail(work, f'it could not be judged: {type(error).__name__}: {error}')
+
+    def fail(work: Work, why: str) -> None:
+        nonlocal failed
+        with writing:
+            failed += 1
+            work.row.said.append(why)
+            print(f'{work.row.student.name}: {"; ".join(work.row.said)}', flush=True)
+
+    def judge_one(work: Work) -> None:
+        student, lines = work.row.student, []
+        for lesson in wanted:
+            number = lesson.lesson.number
+            answers = work.answers.get(number)
+            if answers is None:
+                continue
+            if options.seed:
+                answers.seed = options.seed
+            key = f'{student.key}-{lesson.lesson.name}'
+            digest = digest_of(lesson, answers, work.files)
+            result, again = kept.get(key, digest, options.limit), ''
+            if result is None:
+                job = job_of(lesson, answers, work.files)
+                said = run(job, where, options.limit * 60) if job else Said()
+                if said.is_ours:
+                    fail(work, said.trouble)
+                    return
+                result = result_of(lesson, answers, work.files, said, digest)
+                kept.put(key, result)
+            else:
+                again = ', judged before'
+            work.row.results[number] = result
+            if all(outcome.why == 'not answered' for outcome in result.tasks.values()):
+                work.row.said.append(f'nothing is written in lesson {number}')
+            if result.trouble:
+                work.row.said.append(result.trouble)
+            for task, outcome in result.tasks.items():
+                if outcome.why not in ('', 'not answered') and not outcome.of:
+                    work.row.said.append(f'task {task}: {outcome.why}')
+            lines.append(f'lesson {number}: {result.points} of {len(result.tasks)}{again}')
+        with writing:
+            print(f'{student.name}: {"; ".join([*lines, *work.row.said])}', flush=True)
+
+    with ThreadPoolExecutor(options.jobs) as pool:
+        try:
+            for _ in pool.map(one, works):
+                pass
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            where.stop()
+            raise
+    return failed
+
+
+def write(
+    output: Path, works: list[Work], wanted: list[Handed], sheets: list[tables.Sheet], title: str
+) -> list[str]:
+    """Write all tables and the feedback; return the files, and what could not be written."""
+    rows = [work.row for work in works]
+    most = sum(len(lesson.tasks) for lesson in wanted)
+    systems = {row.student.system for row in rows}
+    said = []
+
+    def put(name: str, text: str) -> None:
+        (output / name).write_text(text, encoding='utf-8')
+        said.append(name)
+
+    put('grades.csv', tables.grades(rows, wanted))
+    if 'moodle' in systems:
+        sheet = next(filter(tables.is_moodle, sheets), None)
+        text, absent = tables.moodle(rows, most, sheet)
+        put('moodle.csv', text)
+        for name in absent:
+            print(f'{name} is not in {sheet.name}, by number and name: write the grade yourself.')
+    if 'canvas' in systems:
+        sheet = next(filter(tables.is_canvas, sheets), None)
+        try:
+            put('canvas.csv', tables.canvas(rows, most, sheet, title))
+        except ValueError as why:
+            said.append(f'no canvas.csv: {why}')
+    # Under the names of the download: so Moodle and Canvas know whose file it is.
+    with zipfile.ZipFile(output / 'feedback.zip', 'w', zipfile.ZIP_DEFLATED) as archive:
+        for work in works:
+            for lesson in wanted:
+                number = lesson.lesson.number
+                if result := work.row.results.get(number):
+                    text = feedback(lesson, work.answers[number], result)
+                    archive.writestr(work.paths[number], text)
+    said.append('feedback.zip')
+    equal = []
+    for lesson in wanted:
+        number = lesson.lesson.number
+        students = [(w.row.student.name, w.answers[number]) for w in works if number in w.answers]
+        for task, names in alike.groups(lesson, students):
+            equal.append(f'lesson {number}, task {task}: {", ".join(names)}')
+    put('equal_answers.txt', ''.join(f'{line}\n' for line in equal) or 'none\n')
+    for line in equal:
+        print(f'The same answer: {line}')
+    return said
+
+
+def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
+    """Run the tool; return its exit status."""
+    parser = argparse.ArgumentParser(description='Grade what students hand in.')
+    parser.add_argument('folder', type=Path, help='the download: a folder, or a zip')
+    parser.add_argument('--lesson', default='', help='which lessons are asked for: "02 03"')
+    parser.add_argument('--output', type=Path, help='where the tables go: FOLDER_graded')
+    parser.add_argument('--jobs', type=int, default=1, help='how many are judged at once')
+    parser.add_argument('--trust', action='store_true', help='without a container, as you')
+    parser.add_argument('--limit', type=float, default=LIMIT_MIN, help='minutes for a lesson')
+    parser.add_argument('--seed', default='', help='of a lesson that has one, for all students')
+    parser.add_argument('--assignment', default='', help='its name or id in Canvas')
+    parser.add_argument('--notebooks', type=Path, default=FOLDER, help=argparse.SUPPRESS)
+    options = parser.parse_args(arguments)
+    try:
+        if options.jobs < 1 or (options.seed and not options.seed.isdecimal()):
+            raise ValueError('JOBS= is a number from 1 on, and SEED= a number.')
+        students, files = submissions_of(options.folder)
+        if not students:
+            raise ValueError(f'Nobody has handed in anything in {options.folder}.')
+        sheets = [tables.read_sheet(file.name, file.read()) for file in files]
+        known = handed_out(options.notebooks)
+        reads = [read(student, known) for student in students]
+        if options.lesson:
+            names = {path.name for path in chosen(options.lesson, options.notebooks)}
+            wanted = [one for one in known if one.lesson.file in names]
+        else:
+            count = Counter(one.lesson.lesson.file for _, found in reads for one in found)
+            most = {name for name, _ in count.most_common(1)}
+            wanted = [one for one in known if one.lesson.file in most]
+        if not wanted:
+            raise ValueError(f'There is no notebook of a lesson in {options.folder}.')
+        where = where or (Trusted() if options.trust else Container())
+        if why := where.ready():
+            raise ValueError(
+                f'{why.rstrip(".")}; or TRUST=yes, which runs the code of students as you.'
+            )
+        name = options.folder.resolve()
+        output = options.output or name.with_name(f'{name.stem}_graded')
+        kept = Kept(output / 'judged')
+    except (ValueError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    works = [work for work, _ in reads]
+    for work, notebooks in reads:
+        choose(work, notebooks, wanted)
+    for sheet in sheets:
+        if not tables.is_moodle(sheet) and not tables.is_canvas(sheet):
+            print(
+                f'{sheet.name} is neither a grading worksheet of Moodle nor a gradebook of Canvas.'
+            )
+    title = options.assignment or wanted[0].lesson.title
+    status = 0
+    try:
+        status = judge_all(works, wanted, kept, where, options) and 1
+    except KeyboardInterrupt:
+        print('Interrupted: the same command goes on from here.', file=sys.stderr)
+        status = 130
+    said = write(output, works, wanted, sheets, title)
+    print(f'{output}: {", ".join(said)}')
+    return status
+
+
+if __name__ == '__main__':
+    sys.exit(main())

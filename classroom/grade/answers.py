@@ -1,0 +1,212 @@
+"""Which lesson is it, and what has the student written? All of it is read as text."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from nbformat import NotebookNode
+
+from tools.lessons.lesson import FOLDER, Lesson, lessons, tags
+
+CHECKS = re.compile(r'^from helpers\.checks\.lessons\.(\w+) import ', re.MULTILINE)
+CHECK = re.compile(r'check\((\d+)')
+HEADING = re.compile(r'^### ✎ Task (\d+)', re.MULTILINE)
+SEED = re.compile(r'^SEED = (\d{1,9})$', re.MULTILINE)
+LARGEST_SOURCE = 200_000  # letters of a cell
+# What an answer of a lesson has no need for, and what forges a verdict would use.
+MACHINERY = re.compile(
+    r'helpers\.checks|ros2_notebooks|sys\.modules|get_ipython|gc\.get_|_getframe|ctypes|/proc/'
+    r'|\.ipynb|__globals__|__closure__|__code__|inspect\.'
+)
+
+
+@dataclass
+class Task:
+    """A task of a lesson: its exercise cells, in their order, and the cells of its checks."""
+
+    number: int
+    exercises: list[NotebookNode] = field(default_factory=list)
+    checks: list[NotebookNode] = field(default_factory=list)
+    solutions: list[NotebookNode] = field(default_factory=list)
+
+
+class Handed:
+    """A lesson as it was handed out, with its tasks."""
+
+    def __init__(self, lesson: Lesson) -> None:
+        self.lesson = lesson
+        self.cells = lesson.notebook.cells
+
+    @cached_property
+    def module(self) -> str:
+        """The name of the module that has the checks."""
+        found = [name for cell in self.cells for name in CHECKS.findall(cell.source)]
+        return found[0] if found else self.lesson.name
+
+    @cached_property
+    def tasks(self) -> dict[int, Task]:
+        """The tasks, by their numbers."""
+        tasks: dict[int, Task] = {}
+        waiting: list[NotebookNode] = []
+        for cell in self.cells:
+            if 'exercise' in tags(cell):
+                waiting.append(cell)
+            elif 'check' in tags(cell) and (match := CHECK.search(cell.source)):
+                task = tasks.setdefault(int(match[1]), Task(int(match[1])))
+                task.checks.append(cell)
+                task.exercises += waiting
+                waiting = []
+            elif 'solution' in tags(cell):
+                number = int(cell.source.split(maxsplit=2)[1])
+                tasks.setdefault(number, Task(number)).solutions.append(cell)
+        return tasks
+
+    @cached_property
+    def ids(self) -> set[str]:
+        """The ids of the cells of tasks."""
+        return {
+            cell.id
+            for task in self.tasks.values()
+            for cell in (*task.exercises, *task.checks, *task.solutions)
+        }
+
+
+def handed_out(folder: Path = FOLDER) -> list[Handed]:
+    """Return the lessons that have tasks."""
+    return [one for one in map(Handed, lessons(folder)) if one.tasks]
+
+
+@dataclass
+class Cell:
+    """A cell of a student's notebook, whatever else it has."""
+
+    kind: str
+    source: str
+    id: str
+    tags: set[str]
+
+
+def cells_of(data: bytes) -> list[Cell]:
+    """Return the cells of a notebook. Raises ValueError with the end of a sentence."""
+    if not data.strip():
+        raise ValueError('it is empty')
+    try:
+        notebook = json.loads(data)
+    except (ValueError, RecursionError):
+        raise ValueError('it is broken: it is no JSON') from None
+    cells = notebook.get('cells') if isinstance(notebook, dict) else None
+    if not isinstance(cells, list):
+        raise ValueError('it is no notebook: it has no cells')
+    return [_cell(cell) for cell in cells if isinstance(cell, dict)]
+
+
+def _cell(cell: dict) -> Cell:
+    source = cell.get('source', '')
+    if isinstance(source, list):
+        source = ''.join(line for line in source if isinstance(line, str))
+    source = source if isinstance(source, str) else ''
+    # Half of a pair of UTF-16, which JSON may name, is no text.
+    source = source.encode('utf-8', 'replace').decode()
+    metadata = cell.get('metadata')
+    named = metadata.get('tags') if isinstance(metadata, dict) else None
+    found = {tag for tag in named if isinstance(tag, str)} if isinstance(named, list) else set()
+    return Cell(str(cell.get('cell_type')), source, str(cell.get('id', '')), found)
+
+
+def lesson_of(cells: Iterable[Cell], known: Iterable[Handed]) -> Handed | None:
+    """Return the lesson of a notebook, or None: by the ids of its tasks, else by its import."""
+    cells = list(cells)
+    ids = {cell.id for cell in cells}
+    imported = {name for cell in cells for name in CHECKS.findall(cell.source)}
+    best = max(known, key=lambda one: (len(ids & one.ids), one.module in imported), default=None)
+    return best if best and (ids & best.ids or best.module in imported) else None
+
+
+@dataclass
+class Answers:
+    """The sources of a student's exercise cells by the ids of the lesson, and what was found."""
+
+    sources: dict[str, str] = field(default_factory=dict)
+    said: list[str] = field(default_factory=list)
+    seed: str = ''
+
+    def changed(self, task: Task) -> bool:
+        """Whether the student has written something for a task."""
+        return any(
+            cell.id in self.sources and _plain(self.sources[cell.id]) != _plain(cell.source)
+            for cell in task.exercises
+        )
+
+
+def _plain(source: str) -> str:
+    """Return a source without the white space that an editor adds or takes."""
+    return '\n'.join(line.rstrip() for line in source.strip().splitlines())
+
+
+def answers_of(cells: list[Cell], handed: Handed) -> Answers:
+    """Return what a student has written in the exercise cells of a lesson."""
+    answers = Answers()
+    doubled, missing, looked_at = [], [], []
+    by_id: dict[str, list[Cell]] = {}
+    for cell in cells:
+        if cell.kind == 'code':
+            by_id.setdefault(cell.id, []).append(cell)
+    for task in handed.tasks.values():
+        in_order = _below_heading(cells, task.number)
+        for place, exercise in enumerate(task.exercises):
+            same = by_id.get(exercise.id, [])
+            if len(same) > 1:
+                doubled.append(str(task.number))
+            if same:
+                source = same[-1].source
+            elif place < len(in_order):
+                source = in_order[place].source
+            else:
+                missing.append(str(task.number))
+                continue
+            if len(source) > LARGEST_SOURCE:
+                answers.said.append(f'task {task.number} has a cell of {len(source)} letters')
+                continue
+            answers.sources[exercise.id] = source
+            taught = '\n'.join(cell.source for cell in (*task.exercises, *task.solutions))
+            if set(MACHINERY.findall(source)) - set(MACHINERY.findall(taught)):
+                looked_at.append(str(task.number))
+    for numbers, what in (
+        (missing, 'has no cell'),
+        (doubled, 'has its cell twice: the last one counts'),
+        (looked_at, 'reaches for what judges it: read it yourself'),
+    ):
+        if numbers:
+            answers.said.append(f'task {", ".join(dict.fromkeys(numbers))} {what}')
+    # A number decides which robots the lesson has: the one thing that is taken from other cells.
+    if any(SEED.search(cell.source) for cell in handed.cells):
+        found = [SEED.search(cell.source) for cell in cells if cell.kind == 'code']
+        answers.seed = next((match[1] for match in found if match), '')
+    return answers
+
+
+def _below_heading(cells: list[Cell], task: int) -> list[Cell]:
+    """Return the exercise cells below the heading of a task, by their tag, else by their place."""
+    inside, found = False, []
+    for cell in cells:
+        heading = HEADING.search(cell.source) if cell.kind == 'markdown' else None
+        if heading:
+            inside = int(heading[1]) == task
+        elif inside and cell.kind == 'markdown' and cell.source.startswith('#'):
+            inside = False
+        elif inside and cell.kind == 'code':
+            found.append(cell)
+    tagged = [cell for cell in found if 'exercise' in cell.tags]
+    if tagged:
+        return tagged
+    above = []
+    for cell in found:
+        if CHECK.match(cell.source) or cell.source.startswith('%%solution'):
+            break
+        above.append(cell)
+    return above

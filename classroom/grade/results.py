@@ -1,0 +1,175 @@
+"""What is judged, one file for a student and a lesson, so that a second run goes on."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from classroom.grade.answers import SEED, Answers, Handed
+from classroom.grade.runner import Said
+from helpers.checks.verdict import KEY
+from tools.lessons.lesson import ROOT, tags
+
+FORM = 1  # of the files
+CELL_S = 100.0  # as `make notebooks` gives a cell
+
+
+@dataclass
+class Outcome:
+    """What became of a task. `met` of `of` points of its check; `why` if there is no verdict."""
+
+    solved: bool = False
+    met: int = 0
+    of: int = 0
+    why: str = ''
+
+
+@dataclass
+class Result:
+    """A lesson of a student, judged: its tasks, and the outputs of their cells."""
+
+    digest: str
+    tasks: dict[int, Outcome] = field(default_factory=dict)
+    outputs: dict[str, list[dict]] = field(default_factory=dict)
+    minutes: float = 0.0
+    trouble: str = ''
+    form: int = FORM
+
+    @property
+    def points(self) -> int:
+        return sum(task.solved for task in self.tasks.values())
+
+
+def digest_of(handed: Handed, answers: Answers, files: dict[str, bytes]) -> str:
+    """Return what changes if an answer, the lesson or its checks do."""
+    checks = ROOT / f'helpers/checks/lessons/{handed.module}.py'
+    digest = hashlib.sha256(checks.read_bytes() if checks.exists() else b'')
+    for part in (
+        [[cell.id, cell.cell_type, cell.source] for cell in handed.cells],
+        sorted(answers.sources.items()),
+        answers.seed,
+        [[name, hashlib.sha256(data).hexdigest()] for name, data in sorted(files.items())],
+    ):
+        digest.update(json.dumps(part).encode())
+    return digest.hexdigest()
+
+
+def job_of(
+    handed: Handed, answers: Answers, files: dict[str, bytes], cell_s: float = CELL_S
+) -> dict | None:
+    """Return what `judge` runs, or None if the student has written nothing.
+
+    The cells after the last task with an answer are left out: no verdict depends on them.
+    """
+    of_cell = {}
+    for task in handed.tasks.values():
+        for kind in ('exercises', 'checks', 'solutions'):
+            of_cell |= {cell.id: (kind[:-1], task.number) for cell in getattr(task, kind)}
+    wanted = [task for task in handed.tasks.values() if files or answers.changed(task)]
+    if not wanted:
+        return None
+    cells, last = [], 0
+    for cell in handed.cells:
+        if cell.cell_type != 'code':
+            continue
+        kind, number = of_cell.get(cell.id, ('', 0))
+        one = {'id': cell.id, 'source': cell.source, 'kind': kind, 'task': number}
+        if kind == 'exercise':
+            one |= {'source': answers.sources.get(cell.id, cell.source), 'starter': cell.source}
+        elif answers.seed:
+            one['source'] = SEED.sub(f'SEED = {answers.seed}', cell.source)
+        cells.append(one)
+        if number == wanted[-1].number and 'check' in tags(cell):
+            last = len(cells)
+    encoded = {name: base64.b64encode(data).decode() for name, data in files.items()}
+    return {
+        'cells': cells[:last],
+        'module': handed.module,
+        'files': encoded,
+        'overlay': [n for n, task in handed.tasks.items() if files and not answers.changed(task)],
+        'cell_s': cell_s,
+    }
+
+
+def result_of(
+    handed: Handed, answers: Answers, files: dict[str, bytes], said: Said, digest: str
+) -> Result:
+    """Return the result of what `judge` said."""
+    cells = {cell.id for task in handed.tasks.values() for cell in (*task.exercises, *task.checks)}
+    outputs = {id: found for id, found in said.outputs.items() if id in cells}
+    result = Result(digest, outputs=outputs, minutes=said.seconds / 60, trouble=said.trouble)
+    for number, task in handed.tasks.items():
+        outcome = Outcome()
+        if not files and not answers.changed(task):
+            outcome.why = 'not answered'
+        elif number in said.given_up:
+            outcome.why = said.given_up[number]
+        else:
+            found = [_verdict(number, outputs.get(cell.id, [])) for cell in task.checks]
+            if found and all(found):
+                outcome.solved = all(one['solved'] is True for one in found)
+                points = [point for one in found for point in one['points']]
+                outcome.met, outcome.of = sum(p.get('ok') is True for p in points), len(points)
+                outcome.why = next((str(one['note'])[:200] for one in found if 'note' in one), '')
+            else:
+                outcome.why = _error(task.checks, outputs) or said.trouble or 'no verdict'
+        result.tasks[number] = outcome
+    return result
+
+
+def _verdict(task: int, outputs: list[dict]) -> dict | None:
+    """Return the one verdict of a check's outputs. If there are two, one is forged: none counts."""
+    found = []
+    for output in outputs:
+        metadata = output.get('metadata')
+        data = metadata.get(KEY) if isinstance(metadata, dict) else None
+        if isinstance(data, dict):
+            points = data.setdefault('points', [])
+            if not isinstance(points, list) or not all(isinstance(p, dict) for p in points):
+                return None
+            found.append(data)
+    if len(found) != 1 or found[0].get('task') != task or found[0].get('of') != 'answer':
+        return None
+    data = found[0]
+    met = bool(data['points']) and all(point.get('ok') is True for point in data['points'])
+    return data | {'solved': data.get('solved') is True and met}
+
+
+def _error(checks: list, outputs: dict[str, list[dict]]) -> str:
+    for cell in checks:
+        for output in outputs.get(cell.id, []):
+            if output.get('output_type') == 'error':
+                return f'{output.get("ename")}: {output.get("evalue")}'.splitlines()[0][:200]
+    return ''
+
+
+class Kept:
+    """The results of earlier runs, in a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def get(self, key: str, digest: str, limit_min: float) -> Result | None:
+        """Return the result of this student and lesson, if it is that of the same answers.
+
+        One that was ended before its end counts if it had as much time as now.
+        """
+        try:
+            data = json.loads((self._folder / f'{key}.json').read_text(encoding='utf-8'))
+            if (data['form'], data['digest']) != (FORM, digest):
+                return None
+            tasks = {int(number): Outcome(**task) for number, task in data['tasks'].items()}
+            result = Result(**(data | {'tasks': tasks}))
+            return None if result.trouble and result.minutes < limit_min * 0.99 else result
+        except (OSError, ValueError, LookupError, TypeError):
+            return None
+
+    def put(self, key: str, result: Result) -> None:
+        path = self._folder / f'{key}.json'
+        new = path.with_suffix('.new')
+        new.write_text(json.dumps(asdict(result)), encoding='utf-8')
+        new.replace(path)

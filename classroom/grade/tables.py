@@ -1,0 +1,192 @@
+"""The tables: grades.csv for you, and the files that Moodle and Canvas import.
+
+Moodle takes its grading worksheet back: *Identifier*, *Grade* and *Last modified (grade)* must be
+there (`mod/assign/feedback/offline/importgradeslib.php`). Canvas takes its gradebook: *Student*,
+*ID*, perhaps the SIS columns, *Section*, then assignments (`lib/gradebook_importer.rb`). If their
+own file lies beside the submissions, it is filled in, and its maximum counts. Otherwise a file with
+the same columns is made.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import dataclass, field
+
+from classroom.grade.answers import Handed
+from classroom.grade.results import Result
+from classroom.grade.submissions import Submission
+
+MOODLE = (
+    *('Identifier', 'Full name', 'Email address', 'Status', 'Grade', 'Maximum Grade'),
+    *('Grade can be changed', 'Last modified (submission)', 'Last modified (grade)'),
+    'Feedback comments',
+)
+MOODLE_NEEDS = {'Identifier', 'Grade', 'Last modified (grade)'}
+CANVAS = ('Student', 'ID', 'SIS User ID', 'SIS Login ID', 'Section')
+POINTS_POSSIBLE = '    Points Possible'  # as Canvas writes it
+
+
+@dataclass
+class Row:
+    """A student, and the results of the lessons, by their numbers. `said` are the sentences."""
+
+    student: Submission
+    results: dict[str, Result] = field(default_factory=dict)
+    said: list[str] = field(default_factory=list)
+
+    @property
+    def points(self) -> int:
+        return sum(result.points for result in self.results.values())
+
+
+@dataclass
+class Sheet:
+    """A CSV file of Moodle or Canvas."""
+
+    name: str
+    rows: list[list[str]]
+    delimiter: str = ','
+
+    def text(self) -> str:
+        return _text(self.rows, self.delimiter)
+
+
+def read_sheet(name: str, data: bytes) -> Sheet:
+    """Return a CSV file. Raises ValueError with one sentence if it is none."""
+    try:
+        text = data.decode('utf-8-sig')
+        first = text.partition('\n')[0]
+        delimiter = ';' if first.count(';') > first.count(',') else ','
+        rows = list(csv.reader(io.StringIO(text), delimiter=delimiter))
+    except (UnicodeDecodeError, csv.Error):
+        raise ValueError(f'{name} cannot be read as CSV in UTF-8.') from None
+    return Sheet(name, rows, delimiter)
+
+
+def is_moodle(sheet: Sheet) -> bool:
+    return bool(sheet.rows) and {*sheet.rows[0]} >= MOODLE_NEEDS
+
+
+def is_canvas(sheet: Sheet) -> bool:
+    header = sheet.rows[0] if sheet.rows else []
+    return len(header) > 3 and header[:2] == ['Student', 'ID'] and 'Section' in header
+
+
+def grades(rows: list[Row], lessons: list[Handed]) -> str:
+    """Return grades.csv: a row for each student, a column for each task."""
+    columns = [(one.lesson.number, number) for one in lessons for number in one.tasks]
+    header = ['name', 'id', 'late', *(f'{lesson} task {number}' for lesson, number in columns)]
+    table = [[*header, 'points', 'of', 'minutes to judge', 'said']]
+    for row in rows:
+        values = []
+        for lesson, number in columns:
+            result = row.results.get(lesson)
+            task = result.tasks.get(number) if result else None
+            values.append(int(task.solved) if task else '')
+        minutes = sum(result.minutes for result in row.results.values())
+        student = row.student
+        said = '; '.join(row.said)
+        points = row.points if row.results else ''
+        end = [points, len(columns), f'{minutes:.1f}', _harmless(said)]
+        late = 'late' if student.late else ''
+        table.append([_harmless(student.name), student.number, late, *values, *end])
+    return _text(table)
+
+
+def _harmless(text: str) -> str:
+    """Return a text that no spreadsheet takes for a formula."""
+    return f"'{text}" if text[:1] in tuple('=+-@\t\r') else text
+
+
+def moodle(rows: list[Row], most: int, sheet: Sheet | None) -> tuple[str, list[str]]:
+    """Return a grading worksheet, and the names of students who are not in it.
+
+    Students of whom nothing was judged are left as they are. If a group has handed in, its number
+    may be that of somebody else: the name must be the same, too.
+    """
+    by_number = {row.student.number: row for row in rows if row.student.system == 'moodle'}
+    if sheet is None:
+        lines = [[*MOODLE]]
+        for number, row in by_number.items():
+            known = {
+                'Identifier': f'Participant {number}',
+                'Full name': row.student.name,
+                'Maximum Grade': f'{most:.2f}',
+                'Grade can be changed': 'Yes',
+            }
+            lines.append([known.get(column, '') for column in MOODLE])
+        sheet = Sheet('', lines)
+    header, *lines = sheet.rows
+    at = {column: header.index(column) for column in header}
+    filled, absent = [header], {*by_number}
+    for line in lines:
+        line = [*line, *[''] * (len(header) - len(line))]
+        number = re.search(r'\d+$', line[at['Identifier']])
+        row = by_number.get(number[0]) if number else None
+        if row and 'Full name' in at and not _is_same(line[at['Full name']], row.student.name):
+            row = None
+        if row:
+            absent.discard(row.student.number)
+        if row and row.results:
+            maximum = _number(line[at['Maximum Grade']]) if 'Maximum Grade' in at else None
+            line[at['Grade']] = f'{row.points * (maximum or most) / most:.2f}'
+            if 'Feedback comments' in at:
+                line[at['Feedback comments']] = f'{row.points} of {most} tasks are solved.'
+        filled.append(line)
+    names = [by_number[number].student.name for number in sorted(absent)]
+    return _text(filled, sheet.delimiter), names
+
+
+def _is_same(name: str, in_download: str) -> bool:
+    """Whether two names are that of one student: that of a file lacks some letters."""
+    one, other = (re.sub(r'[\W_]', '', text).casefold() for text in (name, in_download))
+    return one == other
+
+
+def canvas(rows: list[Row], most: int, sheet: Sheet | None, title: str) -> str:
+    """Return a gradebook with one assignment. Raises ValueError if the sheet has more that fit."""
+    by_number = {row.student.number: row for row in rows if row.student.system == 'canvas'}
+    by_number.pop('', None)  # the anonymous
+    if sheet is None:
+        lines = [[*CANVAS, title], [POINTS_POSSIBLE, *[''] * (len(CANVAS) - 1), str(most)]]
+        for number, row in by_number.items():
+            points = str(row.points) if row.results else ''
+            lines.append([row.student.name, number, '', '', '', points])
+        return _text(lines)
+    header, *lines = sheet.rows
+    info = header.index('Section') + 1
+    assignments = [n for n, name in enumerate(header) if n >= info and re.search(r'\(\d+\)$', name)]
+    wanted = title.casefold()
+    fit = [n for n in assignments if wanted in header[n].casefold()] or assignments
+    if len(fit) != 1:
+        names = ', '.join(header[n] for n in fit) or 'none'
+        raise ValueError(
+            f'{sheet.name} has these assignments: {names}. Name yours with ASSIGNMENT= and its id.'
+        )
+    column = fit[0]
+    maximum = None
+    filled = [[*header[:info], header[column]]]
+    for line in lines:
+        line = [*line, *[''] * (len(header) - len(line))]
+        score = line[column]
+        if 'Points Possible' in line[0]:
+            maximum = _number(line[column])
+        elif (row := by_number.get(line[1].strip())) and row.results:
+            score = f'{row.points * (maximum or most) / most:.2f}'
+        filled.append([*line[:info], score])
+    return _text(filled, sheet.delimiter)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text.replace(',', '.'))
+    except ValueError:
+        return None
+
+
+def _text(rows: list[list], delimiter: str = ',') -> str:
+    lines = io.StringIO()
+    csv.writer(lines, delimiter=delimiter, lineterminator='\n').writerows(rows)
+    return lines.getvalue()

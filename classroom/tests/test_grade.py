@@ -1,0 +1,545 @@
+"""`make grade`: from the downloads of Moodle and Canvas to tables and feedback."""
+
+import csv
+import io
+import json
+import subprocess
+import sys
+import tarfile
+import zipfile
+
+import nbformat
+import pytest
+
+from classroom.grade import alike, runner, tables
+from classroom.grade.__main__ import main
+from classroom.grade.answers import answers_of, cells_of, handed_out, lesson_of
+from classroom.grade.results import Kept, digest_of, job_of, result_of
+from classroom.grade.submissions import submissions_of, workspace_files
+from helpers.checks.verdict import KEY
+from tools.lessons.lesson import ROOT, tags
+
+RIGHT, WRONG = 'speed = 1.75 / 3.5\nshow(speed)', 'speed = 1.75\nshow(speed)'
+STARTER = 'task-00-1-starter'
+
+
+@pytest.fixture(scope='module')
+def lessons():
+    return {one.lesson.number: one for one in handed_out()}
+
+
+def notebook(number='00', **sources):
+    """Return a lesson as a student saves it, with other sources of some cells."""
+    [path] = (ROOT / 'notebooks').glob(f'{number}_*.ipynb')
+    content = json.loads(path.read_text(encoding='utf-8'))
+    for cell in content['cells']:
+        cell['source'] = sources.get(cell['id'], cell['source'])
+    return content
+
+
+def with_answer(source):
+    return json.dumps(notebook(**{STARTER: source})).encode()
+
+
+@pytest.fixture
+def submit(tmp_path):
+    """Return a function that puts files into the folder of submissions, and returns that."""
+    folder = tmp_path / 'submissions'
+
+    def submit(**files):
+        for name, data in files.items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+        return folder
+
+    return submit
+
+
+class Stand(runner.Where):
+    """Stands for the container: who writes RIGHT is right. It counts what it has judged."""
+
+    script = f"""
+import json, sys
+job = json.load(sys.stdin)
+for cell in job['cells']:
+    if cell['kind'] == 'exercise':
+        ok = cell['source'].startswith('speed = 1.75 / 3.5')
+    if cell['kind'] == 'check':
+        verdict = {{'task': cell['task'], 'of': 'answer', 'solved': ok}}
+        verdict['points'] = [{{'what': 'x', 'ok': ok}}]
+        output = {{'output_type': 'display_data', 'data': {{'text/plain': 'x'}}}}
+        output['metadata'] = {{{KEY!r}: verdict}}
+        print(json.dumps({{'cell': cell['id'], 'outputs': [output]}}), flush=True)
+print(json.dumps({{'end': True}}))
+"""
+
+    def __init__(self, script=None):
+        super().__init__()
+        self.count, self.script = 0, script or self.script
+
+    def start(self, **pipes):
+        self.count += 1
+        process = subprocess.Popen([sys.executable, '-I', '-c', self.script], **pipes)
+        return process, process.kill
+
+
+def rows_of(folder, name='grades.csv'):
+    text = (folder.with_name('submissions_graded') / name).read_text(encoding='utf-8')
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+# --- Whose file is it? ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ('path', 'expected'),
+    [
+        ('Ada Lovelace_101_assignsubmission_file/02_x.ipynb', ('Ada Lovelace', '101', 'moodle')),
+        ('Ada Lovelace_101_assignsubmission_file_/02_x.ipynb', ('Ada Lovelace', '101', 'moodle')),
+        ('Ada Lovelace_101_assignsubmission_file_02_x.ipynb', ('Ada Lovelace', '101', 'moodle')),
+        ('Ada_7_101_assignsubmission_file_a/b.ipynb', ('Ada_7', '101', 'moodle')),
+        ('lovelaceada_55_4567_02_x.ipynb', ('lovelaceada', '55', 'canvas')),
+        ('lovelaceada_LATE_55_4567_02_x-1.ipynb', ('lovelaceada', '55', 'canvas')),
+        ('anon_x7Yz1_4567_02_x.ipynb', ('anon_x7Yz1', '', 'canvas')),
+        ('Ada/02_x.ipynb', ('Ada', '', '')),
+        ('Zoë.ipynb', ('Zoë', '', '')),
+    ],
+)
+def test_names_say_whose_file_it_is(submit, path, expected):
+    [one], sheets = submissions_of(submit(**{path: b'{}'}))
+    assert (one.name, one.number, one.system) == expected
+    assert one.late == ('LATE' in path)
+    assert not sheets
+    assert one.files[0].name in ('02_x.ipynb', '02_x-1.ipynb', 'a/b.ipynb', 'Zoë.ipynb')
+
+
+def test_a_download_may_be_a_zip_or_in_the_folder(submit, tmp_path):
+    names = 'Ada_1_assignsubmission_file/a.ipynb', 'Bob_2_assignsubmission_file/__MACOSX/b.ipynb'
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, 'w') as archive:
+        for name in names:
+            archive.writestr(name, '{}')
+    folder = submit(**{'Course-Task-12.zip': data.getvalue(), 'grades.csv': b'a,b'})
+    for place in (folder, folder / 'Course-Task-12.zip'):
+        found, sheets = submissions_of(place)
+        assert [one.name for one in found] == ['Ada']
+        assert len(sheets) == (place == folder)
+    (tmp_path / 'broken.zip').write_bytes(b'PK')
+    with pytest.raises(ValueError, match='cannot be read as a zip'):
+        submissions_of(tmp_path / 'broken.zip')
+
+
+def archive_of(files, kind='tar'):
+    data = io.BytesIO()
+    if kind == 'zip':
+        with zipfile.ZipFile(data, 'w') as archive:
+            for name, content in files.items():
+                archive.writestr(name, content)
+    else:
+        with tarfile.open(fileobj=data, mode='w:gz') as archive:
+            for name, content in files.items():
+                info = tarfile.TarInfo(name)
+                info.size = len(content)
+                archive.addfile(info, io.BytesIO(content))
+            link = tarfile.TarInfo('src/link')
+            link.type, link.linkname = tarfile.SYMTYPE, '/etc/passwd'
+            archive.addfile(link)
+    return data.getvalue()
+
+
+@pytest.mark.parametrize('kind', ['zip', 'tar'])
+@pytest.mark.parametrize('above', ['', 'src/', 'lesson_09/src/', 'scratch/lesson_09/src/'])
+def test_the_files_of_a_workspace(submit, kind, above):
+    files = {f'{above}pkg/src/a.cpp': b'//', f'{above}pkg/package.xml': b'<'}
+    if above.startswith(('lesson', 'scratch')):
+        files[above.replace('src/', 'build/x')] = b'built'
+    ending = 'zip' if kind == 'zip' else 'tar.gz'
+    folder = submit(**{f'Ada/work.{ending}': archive_of(files, kind)})
+    [[file]] = (one.files for one in submissions_of(folder)[0])
+    found = workspace_files(file)
+    found.pop('link', None)
+    assert {*found} - {'lesson_09/build/x', 'build/x'} == {'pkg/src/a.cpp', 'pkg/package.xml'}
+    assert 'link' not in found
+
+
+@pytest.mark.parametrize('name', ['../../x', '/etc/x'])
+def test_no_file_leads_out_of_its_archive(submit, name):
+    folder = submit(**{'Ada/a.zip': archive_of({name: b''}, 'zip'), 'Ada/b.tgz': b'none'})
+    [[bad, none]] = (one.files for one in submissions_of(folder)[0])
+    with pytest.raises(ValueError, match='leads out of it'):
+        workspace_files(bad)
+    with pytest.raises(ValueError, match='cannot be read as an archive'):
+        workspace_files(none)
+
+
+# --- What has the student written? ----------------------------------------------------------------
+
+
+def read(content, lessons):
+    cells = cells_of(json.dumps(content).encode())
+    lesson = lesson_of(cells, lessons.values())
+    return lesson, answers_of(cells, lesson)
+
+
+def test_a_lesson_is_found_by_what_is_in_it(lessons):
+    content = notebook('02')
+    assert read(content, lessons)[0] is lessons['02']
+    for cell in content['cells']:
+        cell.pop('id')  # as another program may save it
+    assert read(content, lessons)[0] is lessons['02']
+    assert lesson_of(cells_of(b'{"cells": [{"cell_type": "code", "source": "1"}]}'), ()) is None
+
+
+@pytest.mark.parametrize(
+    'change',
+    [
+        lambda cell: None,
+        lambda cell: cell.pop('id'),
+        lambda cell: (cell.pop('id'), cell['metadata'].clear()),
+        lambda cell: cell.update(source=cell['source'].splitlines(keepends=True)),
+    ],
+)
+def test_answers_go_into_the_cells_of_the_lesson(lessons, change):
+    """By the id of a cell, else by the heading of its task and the tag, else by the place."""
+    first = next(iter(lessons['02'].tasks.values())).exercises[0].id
+    content = notebook('02', **{first: 'mine = 1\n'})
+    for cell in content['cells']:
+        if isinstance(cell['source'], list):
+            cell['source'] = ''.join(cell['source'])
+        change(cell)
+    _, answers = read(content, lessons)
+    assert answers.sources[first] == 'mine = 1\n'
+    assert [n for n, task in lessons['02'].tasks.items() if answers.changed(task)] == [1]
+    assert not answers.said
+
+
+def test_missing_and_doubled_cells_are_named(lessons):
+    content = notebook(**{STARTER: WRONG})
+    [cell] = [one for one in content['cells'] if one['id'] == STARTER]
+    content['cells'].append(cell | {'source': RIGHT})
+    _, answers = read(content, lessons)
+    assert answers.sources[STARTER] == RIGHT
+    assert answers.said == ['task 1 has its cell twice: the last one counts']
+    content['cells'] = [one for one in content['cells'] if one['id'] != STARTER]
+    _, answers = read(content, lessons)
+    assert answers.said == ['task 1 has no cell']
+    assert job_of(lessons['00'], answers, {}) is None
+
+
+def test_only_exercise_cells_are_taken(lessons):
+    content = notebook(**{STARTER: RIGHT, 'check-00-1': 'evil()', 'the-door-way': 'evil()'})
+    content['cells'].append({'cell_type': 'code', 'source': 'evil()', 'id': 'new'})
+    lesson, answers = read(content, lessons)
+    job = job_of(lesson, answers, {})
+    assert 'evil' not in json.dumps(job)
+    assert job['cells'][-1]['id'] == 'check-00-1'  # what follows is not run
+
+
+def test_what_reaches_for_the_checks_is_named(lessons):
+    _, answers = read(notebook(**{STARTER: 'import sys\nsys.modules.clear()'}), lessons)
+    assert answers.said == ['task 1 reaches for what judges it: read it yourself']
+
+
+@pytest.mark.parametrize(
+    ('data', 'why'),
+    [
+        (b'', 'it is empty'),
+        (b'{"cells": [', 'it is broken: it is no JSON'),
+        (b'\xff\xfe', 'it is broken: it is no JSON'),
+        (b'[' * 100_000, 'it is broken: it is no JSON'),
+        (b'{"worksheets": []}', 'it is no notebook: it has no cells'),
+    ],
+)
+def test_broken_notebooks(data, why):
+    with pytest.raises(ValueError, match=why):
+        cells_of(data)
+
+
+def test_strange_cells_are_read():
+    data = b'{"cells": [1, {"source": [1, "a"], "metadata": [], "id": 3}, {"source": "\\ud800"}]}'
+    assert [cell.source for cell in cells_of(data)] == ['a', '?']
+
+
+# --- Verdicts -------------------------------------------------------------------------------------
+
+
+def said_of(*verdicts):
+    outputs = [{'output_type': 'display_data', 'metadata': {KEY: one}} for one in verdicts]
+    return runner.Said({'check-00-1': outputs}, ended=True)
+
+
+GOOD = {'task': 1, 'of': 'answer', 'solved': True, 'points': [{'what': 'x', 'ok': True}]}
+
+
+@pytest.mark.parametrize(
+    ('verdicts', 'solved'),
+    [
+        ([GOOD], True),
+        ([GOOD, GOOD], False),  # one of them is forged
+        ([GOOD | {'task': 2}], False),
+        ([GOOD | {'of': 'solution'}], False),
+        ([GOOD | {'points': []}], False),
+        ([GOOD | {'points': [{'ok': False}]}], False),
+        ([GOOD | {'points': 'all'}], False),
+        ([GOOD | {'solved': 'yes'}], False),
+        ([], False),
+    ],
+)
+def test_a_verdict_counts_if_it_is_one(lessons, verdicts, solved):
+    _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
+    result = result_of(lessons['00'], answers, {}, said_of(*verdicts), 'digest')
+    assert result.tasks[1].solved == solved
+    assert result.points == solved
+
+
+def test_hostile_lines_are_left_out():
+    said = runner.Said()
+    for line in (
+        b'no JSON',
+        b'[]',
+        b'{"cell": 1, "outputs": []}',
+        b'{"cell": "a", "outputs": [1]}',
+    ):
+        runner._read(line, said)
+    assert said == runner.Said({'a': []})
+
+
+@pytest.mark.parametrize(
+    ('script', 'limit_s', 'trouble'),
+    [
+        ('import time; time.sleep(60)', 0.5, 'it was ended after'),
+        ('while True: print("x" * 100_000)', 60, 'it said too much'),
+        ('raise SystemExit("no such image")', 60, 'it could not be judged: no such image'),
+    ],
+)
+def test_what_does_not_end_is_ended(monkeypatch, script, limit_s, trouble):
+    monkeypatch.setattr(runner, 'MOST_SAID', 1_000_000)
+    said = runner.run({}, Stand(script), limit_s)
+    assert said.trouble.startswith(trouble)
+    assert said.is_ours == ('image' in script)  # tried again
+
+
+# --- A class --------------------------------------------------------------------------------------
+
+
+def moodle_class(count):
+    names = [f'Student {n:03}_{n + 500}_assignsubmission_file/lesson.ipynb' for n in range(count)]
+    return {name: with_answer(RIGHT if n % 2 else WRONG) for n, name in enumerate(names)}
+
+
+def test_a_second_run_goes_on_where_the_first_one_ended(submit, capsys):
+    files = moodle_class(4)
+    where = Stand()
+    folder = submit(**files)
+    assert main([str(folder)], where) == 0
+    assert where.count == 4
+    assert 'Student 001: lesson 00: 1 of 1\n' in capsys.readouterr().out
+    changed = next(iter(files))
+    submit(**{changed: with_answer(RIGHT), 'New_9_assignsubmission_file/a.ipynb': files[changed]})
+    assert main([str(folder), '--jobs', '2'], where) == 0
+    assert where.count == 6
+    assert 'Student 001: lesson 00: 1 of 1, judged before' in capsys.readouterr().out
+    assert [row['points'] for row in rows_of(folder)] == ['0', '1', '1', '0', '1']
+
+
+def test_two_hundred_students(submit, capsys):
+    files = moodle_class(200)
+    broken = list(files)[7]
+    files[broken] = b'{'
+    where = Stand()
+    assert main([str(submit(**files)), '--jobs', '4'], where) == 0
+    assert where.count == 199
+    lines = capsys.readouterr().out.splitlines()
+    assert sum(line.startswith('Student') for line in lines) == 200
+    assert 'Student 007: lesson.ipynb cannot be read: it is broken: it is no JSON' in lines
+    rows = rows_of(submit())
+    assert sum(row['00 task 1'] == '1' for row in rows) == 99
+    assert [row['points'] for row in rows if row['name'] == 'Student 007'] == ['']
+
+
+def test_a_line_for_each_strange_submission(submit, capsys):
+    folder = submit(
+        **{
+            'Ada/x.ipynb': with_answer(RIGHT),
+            'Bob/02.ipynb': json.dumps(notebook('02')).encode(),
+            'Cy/notes.txt': b'I was ill',
+            'Di/00.ipynb': json.dumps(notebook()).encode(),
+            'Eve/a.ipynb': with_answer(WRONG),
+            'Eve/a (1).ipynb': json.dumps(notebook()).encode(),
+            'Fay/own.ipynb': b'{"cells": []}',
+            '=cmd()/a.ipynb': with_answer(WRONG),
+        }
+    )
+    assert main([str(folder)], Stand()) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[:8] == [
+        '=cmd(): lesson 00: 0 of 1',
+        'Ada: lesson 00: 1 of 1',
+        'Bob: 02.ipynb is lesson 02, not asked for; lesson 00 is not there',
+        'Cy: no notebook',
+        'Di: lesson 00: 0 of 1; nothing is written in lesson 00',
+        'Eve: lesson 00: 0 of 1; lesson 00 is there twice: the one with more answers counts',
+        'Fay: own.ipynb is no lesson of this course',
+        f'{folder}_graded: grades.csv, feedback.zip, equal_answers.txt',
+    ]
+    assert rows_of(folder)[0]['name'] == "'=cmd()"  # no formula
+
+
+def test_without_a_container_it_says_so(submit, monkeypatch, capsys, tmp_path):
+    monkeypatch.setenv('CONTAINER', 'no-such-command')
+    folder = submit(**moodle_class(1))
+    assert main([str(folder)]) == 1
+    said = capsys.readouterr().err
+    assert said.count('\n') == 1
+    assert 'no-such-command' in said
+    assert 'TRUST=yes' in said
+    assert main([str(tmp_path / 'nothing')]) == 1
+    assert capsys.readouterr().err.startswith('There is no ')
+
+
+def test_moodle_takes_its_worksheet_back(submit, capsys):
+    header = 'Identifier,"Full name","Email address",Status,Grade,"Maximum Grade",'
+    header += '"Grade can be changed","Last modified (submission)","Last modified (grade)"'
+    lines = [
+        header,
+        '"Participant 501","Student 001",a@b.c,Submitted,,100.00,Yes,"Friday, 1",-',
+        '"Participant 777","Not There",d@e.f,"No submission",,100.00,Yes,-,-',
+        '"Participant 500","Somebody Else",d@e.f,Submitted,,100.00,Yes,-,-',
+    ]
+    sheet = '\ufeff' + '\n'.join(lines)
+    folder = submit(**moodle_class(2), **{'Grades-X.csv': sheet.encode()})
+    assert main([str(folder)], Stand()) == 0
+    one, absent, other = rows_of(folder, 'moodle.csv')
+    assert 'Student 000 is not in Grades-X.csv, by number and name' in capsys.readouterr().out
+    assert one['Grade'] == '100.00'
+    assert one['Email address'] == 'a@b.c'
+    assert one['Last modified (grade)'] == '-'
+    assert absent['Grade'] == other['Grade'] == ''
+
+
+def test_moodle_without_a_worksheet(submit):
+    folder = submit(**moodle_class(2))
+    assert main([str(folder)], Stand()) == 0
+    rows = rows_of(folder, 'moodle.csv')
+    assert {*rows[0]} >= tables.MOODLE_NEEDS
+    assert [row['Identifier'] for row in rows] == ['Participant 500', 'Participant 501']
+    assert [row['Grade'] for row in rows] == ['0.00', '1.00']
+
+
+def test_canvas_takes_its_gradebook_back(submit, capsys):
+    lines = [
+        'Student,ID,SIS User ID,SIS Login ID,Section,Start here (71),Essay (72),Final Score',
+        '    Points Possible,,,,,50,10,(read only)',
+        '"Lovelace, Ada",55,s1,ada,A,,9,40',
+        '"Turing, Alan",56,s2,alan,A,3,,40',
+    ]
+    files = {'lovelaceada_LATE_55_9_x.ipynb': with_answer(RIGHT), 'book.csv': '\n'.join(lines)}
+    folder = submit(**files | {'book.csv': files['book.csv'].encode()})
+    assert main([str(folder)], Stand()) == 0
+    possible, ada, alan = rows_of(folder, 'canvas.csv')
+    assert list(ada) == [*tables.CANVAS, 'Start here (71)']
+    assert possible['Start here (71)'] == '50'
+    assert (ada['Start here (71)'], alan['Start here (71)']) == ('50.00', '3')
+    assert rows_of(folder)[0]['late'] == 'late'
+    assert main([str(folder), '--assignment', 'none of them'], Stand()) == 0
+    assert 'Start here (71), Essay (72). Name yours with ASSIGNMENT=' in capsys.readouterr().out
+
+
+def test_canvas_without_a_gradebook(submit):
+    folder = submit(**{'lovelaceada_55_9_x.ipynb': with_answer(RIGHT)})
+    assert main([str(folder)], Stand()) == 0
+    possible, ada = rows_of(folder, 'canvas.csv')
+    assert (ada['ID'], ada['Start here'], possible['Start here']) == ('55', '1', '1')
+
+
+def test_feedback_has_verdicts_and_no_solution(submit):
+    folder = submit(**moodle_class(2))
+    assert main([str(folder)], Stand()) == 0
+    with zipfile.ZipFile(folder.with_name('submissions_graded') / 'feedback.zip') as archive:
+        assert archive.namelist() == list(moodle_class(2))  # the names of the download
+        text = archive.read(archive.namelist()[1]).decode()
+    found = nbformat.reads(text, as_version=4)
+    nbformat.validate(found)
+    assert found.cells[0].source.startswith('# 1 of 1 tasks are solved')
+    [answer] = [cell for cell in found.cells if cell.id == STARTER]
+    [check] = [cell for cell in found.cells if cell.id == 'check-00-1']
+    assert answer.source == RIGHT
+    assert check.outputs[0].metadata[KEY]['solved']
+    assert not {'solution', 'notes'} & {tag for cell in found.cells for tag in tags(cell)}
+
+
+def test_equal_answers_are_named(lessons):
+    task = next(iter(lessons['02'].tasks.values()))
+    [cell] = task.exercises
+    own = 'for my_own_number in range(100, 10_000, 7):\n    print("What I think", my_own_number)\n'
+    own += 'my_second_thought = [my_own_number for _ in range(12)]\n'
+    renamed = own.replace('"', "'").replace('\n', '   # a comment\n\n')
+    solution = task.solutions[0].source.split('\n', 1)[1]
+    written = {
+        'Ada': own,
+        'Bob': renamed + cell.source,
+        'Cy': own.replace('7', '8'),
+        'Di': solution,
+        'Eve': solution,
+        'Fay': cell.source,
+        'Gus': 'x = 1',
+        'Hal': 'x = 1',
+    }
+    students = []
+    for name, source in written.items():
+        students.append((name, read(notebook('02', **{cell.id: source}), lessons)[1]))
+    assert alike.groups(lessons['02'], students) == [(task.number, ['Ada', 'Bob'])]
+
+
+def test_what_is_kept_is_that_of_the_same_answers_and_lesson(lessons, tmp_path):
+    _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
+    digest = digest_of(lessons['00'], answers, {})
+    result = result_of(lessons['00'], answers, {}, said_of(GOOD), digest)
+    kept = Kept(tmp_path / 'judged')
+    kept.put('ada', result)
+    assert kept.get('ada', digest, 20) == result
+    assert kept.get('ada', digest_of(lessons['00'], answers, {'a': b''}), 20) is None
+    result.trouble, result.minutes = 'it was ended after 5 minutes', 5.0
+    kept.put('ada', result)
+    assert kept.get('ada', digest, 5) == result
+    assert kept.get('ada', digest, 20) is None  # it has more time now
+    (tmp_path / 'judged/ada.json').write_text('{')
+    assert kept.get('ada', digest, 20) is None
+
+
+def test_the_number_of_a_lesson_that_draws_its_task(lessons):
+    lesson = lessons['02']
+    first = lesson.tasks[1].exercises[0].id
+    _, answers = read(notebook('02', **{first: 'mine = 1'}), lessons)
+    answers.seed = '7'
+    cells = [cell.copy() for cell in lesson.cells]
+    cells[[cell.cell_type for cell in cells].index('code')].source = 'SEED = 1\nother(SEED)'
+    drawn = type(lesson)(lesson.lesson)
+    drawn.cells = cells
+    assert 'SEED = 7\\nother(SEED)' in json.dumps(job_of(drawn, answers, {}))
+
+
+# --- A real kernel --------------------------------------------------------------------------------
+
+HOSTILE = """
+def check(*answer):
+    print('forged')
+
+
+import os
+
+os._exit(3)
+"""
+
+
+def test_real_checks_judge_and_survive(submit, capsys):
+    """A right answer, a wrong one, and one that ends the kernel: each gets its line."""
+    files = {'Ada/a.ipynb': with_answer(RIGHT), 'Bob/b.ipynb': with_answer(WRONG)}
+    folder = submit(**files, **{'Cy/c.ipynb': with_answer(HOSTILE)})
+    assert main([str(folder), '--trust']) == 0
+    assert capsys.readouterr().out.splitlines()[:3] == [
+        'Ada: lesson 00: 1 of 1',
+        'Bob: lesson 00: 0 of 1',
+        'Cy: lesson 00: 0 of 1; task 1: its code ended the kernel',
+    ]
