@@ -2,7 +2,8 @@
 // for pages without scripts, free play in the page. Its ink is currentColor.
 
 const ROWS = 120; // at most
-const [WIDTH, RIGHT, LINE, LETTER] = [480, 14, 20, 7.6]; // pixels; letters are about so wide
+const [RIGHT, LINE, LETTER] = [14, 20, 7.6]; // pixels; letters are about so wide
+const [WIDTH, BESIDE] = [480, 350]; // alone, and beside another: so its letters are never tiny
 // Why a message waits, and a callback, as model.js calls it: dashes, and the legend's words.
 const WAITS = {
   '': ['', 'waits, a thread is free'],
@@ -17,8 +18,17 @@ const RUNS = {
 };
 const CROSS = 'm-3-3l6 6m0-6l-6 6';
 
-// Return the picture of each run, of the same span of seconds, all on one scale.
-function pictures(runs, span) {
+// When the last message of a run is lost (s), if one is.
+function lastLoss(run) {
+  const step = walk(run).scan().at(-1);
+  return step && run.moves[step - 1][0] / 1e6;
+}
+
+// Return the picture of each run, of the same span of seconds, all on one scale. The cursor stands at
+// a time, else at the last loss, else at the end.
+function pictures(runs, span, at, beside) {
+  const losses = runs.map(lastLoss).filter(loss => loss !== undefined);
+  const cursor = at ?? (losses.length ? Math.max(...losses) : span[1]);
   const seen = runs.map(run => {
     const messages = stories(run, ROWS);
     const { callbacks } = run.setup;
@@ -29,13 +39,16 @@ function pictures(runs, span) {
   const longest = Math.max(...seen.flatMap(({ names }) => names.map(name => name.length)));
   const rows = Math.max(1, ...seen.map(({ messages }) => messages.length));
   const left = Math.max(36, 12 + LETTER * longest);
-  return seen.map(run => picture(run, span, rows, left));
+  // Pictures beside each other have legends of one height.
+  const draw = least => seen.map(run => picture(run, span, rows, left, cursor, beside ? BESIDE : WIDTH, least));
+  const least = Math.max(...draw(0).map(([, legend]) => legend));
+  return draw(least).map(([svg]) => svg);
 }
 
-function picture({ messages, names, time }, [from, until], rows, left) {
-  const step = Math.max(2.5, Math.min(15, 200 / rows));
+function picture({ messages, names, time }, [from, until], rows, left, cursor, width, least) {
+  const step = Math.max(1.7, Math.min(15, 200 / rows));
   const bottom = step * rows;
-  const wide = WIDTH - left - RIGHT;
+  const wide = width - left - RIGHT;
   const x = at => +(left + wide * (Math.max(at, from) - from) / (until - from)).toFixed(1);
   const y = row => +(step * (row + 0.5)).toFixed(1);
   const path = (d, colour, width, dashes = '') =>
@@ -67,19 +80,20 @@ function picture({ messages, names, time }, [from, until], rows, left) {
   function add(d, mark, words, ...looks) {
     drawn += path(d, ...looks);
     const needed = Math.round(42 + LETTER * words.length);
-    if (at > RIGHT && at + needed > WIDTH) [at, down] = [RIGHT, down + LINE];
+    if (at > RIGHT && at + needed > width) [at, down] = [RIGHT, down + LINE];
     legend += path(`M${at} ${down - 5}${mark}`, ...looks) + text(words, at + 28, down);
     at += needed;
   }
   const looks = [['waits', WAITS, LOOK.waiting, 0.3, 1.5], ['runs', RUNS, LOOK.heard, 0.75, 3]];
-  looks.forEach(([kind, causes, colour, part, least]) => {
-    const thick = +Math.max(least, part * step).toFixed(1);
+  looks.forEach(([kind, causes, colour, part, thin]) => {
+    const thick = +Math.max(thin, part * step).toFixed(1);
     Object.entries(causes).forEach(([cause, [dashes, words]]) => {
       if (found[kind][cause]) add(found[kind][cause], 'h22', words, colour, thick, dashes);
     });
   });
   if (pushed) drawn += path(pushed, LOOK.lost, 0.8, '1 2');
   if (crosses) add(crosses, 'm9-3l6 6m0-6l-6 6', 'pushed out', LOOK.lost, 1.6);
+  down = Math.max(down, least);
 
   const rough = (until - from) / 5;
   const power = 10 ** Math.floor(Math.log10(rough));
@@ -92,10 +106,10 @@ function picture({ messages, names, time }, [from, until], rows, left) {
   const every = [1, 2, 5, 10].find(n => n * step >= 14);
   for (let i = 0; i < names.length; i += every) axes += text(names[i], left - 6, y(i) + 5, 'end');
   axes += text(time, left + wide / 2, bottom + 40, 'middle');
-  axes += `<path class="cursor" d="M${left} 0V${bottom}" stroke="currentColor" stroke-width="1.5"/>`;
+  axes += `<path class="cursor" d="M${left} 0V${bottom}" transform="translate(${+(x(Math.min(cursor, until)) - left).toFixed(1)})" stroke="currentColor" stroke-width="1.5"/>`;
   const [top, height] = [down + 12, down + bottom + 60];
-  return `<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${height}" width="${WIDTH}" `
+  return [`<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" `
     + `height="${height}" font-family="system-ui, sans-serif" font-size="14" color="${LOOK.ink}" `
     + `fill="currentColor" preserveAspectRatio="xMinYMin" data-wide="${wide}">${legend}`
-    + `<g transform="translate(0 ${top})">${drawn}${axes}</g></svg>`;
+    + `<g transform="translate(0 ${top})">${drawn}${axes}</g></svg>`, down];
 }

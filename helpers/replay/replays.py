@@ -41,6 +41,7 @@ class Run:
     moves: list[list[int]]
     time_label: str = 'time since the first publish (s)'
     after_s: float = 0.0
+    opens: str = 'last loss'
 
     styles = ()
 
@@ -84,7 +85,9 @@ class Replay:
         span_s = min(starts), max(ends)  # pictures beside each other share their time
         of_queues = [run for run in self.runs if run.setup]
         asked = [{**run.record(), 'time': run.time_label} for run in of_queues]
-        drawn = iter(javascript('pictures', asked, span_s))
+        at_s = max((run.telling_s for run in self.runs if not run.setup), default=None)
+        beside = len(self.runs) > 1
+        drawn = iter(javascript('pictures', asked, span_s, at_s, beside))
         figures = ''.join(
             figure(run, next(drawn) if run.setup else run.picture()) for run in self.runs
         )
@@ -92,7 +95,8 @@ class Replay:
         ordered = sorted(self.runs, key=lambda run: not run.setup)
         scripts = dict.fromkeys(file for run in ordered for file in run.scripts)
         styles = dict.fromkeys(file for run in ordered for file in run.styles)
-        record = {'span': span_s, 'runs': [run.record() for run in self.runs]}
+        opens = {'opens': 'end'} if any(run.opens == 'end' for run in self.runs) else {}
+        record = {'span': span_s, **opens, 'runs': [run.record() for run in self.runs]}
         html = (
             f'<div class="replay" data-record={attribute(record)}>'
             f'{style(*styles)}<p>{escape(str(self))}</p>{figures}'

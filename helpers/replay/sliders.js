@@ -29,7 +29,7 @@ function show(root, values) {
     }
     const run = { ...predicted(now), time: 'time (s)' };
     says.textContent = told(stories(run, MESSAGES));
-    [drawn.innerHTML] = pictures([run], [0, run.moves.at(-1)[0] / 1e6]);
+    [drawn.innerHTML] = pictures([run], [0, run.moves.at(-1)[0] / 1e6], 0);
     seen(drawn.firstChild, WORDS);
   }
 

@@ -1,7 +1,16 @@
 // A replay as a page shows it: lists that can be read, buttons, keys. What may happen is decided in
 // model.js, and a state is drawn by board.js. Nothing is global: a page may have many replays.
 
-const DELAYS = [800, 400, 200, 100, 50]; // ms a step, while it plays
+const PLAYS_S = 10; // about so long a run plays
+const SPEEDS = [1, 2, 4, 0.5]; // and how much faster or slower
+const HOLD_MS = 1200; // a sentence while it plays, at least
+
+// How many times as fast as it was a run of so many microseconds plays: a number that is easily read.
+function pace(us) {
+  const needed = us / 1e6 / PLAYS_S || 1;
+  const power = 10 ** Math.floor(Math.log10(needed));
+  return +(power * [10, 7, 5, 4, 3, 2, 1.5, 1].find(n => n * power <= 1.2 * needed)).toPrecision(2);
+}
 
 // The picture of a run, as a part of the page: its ink is that of the page.
 function drawing(image) {
@@ -24,33 +33,50 @@ function panel(run, record, image, [from, until], grouped) {
   const node = element('div', { class: 'replay-run', role: name ? 'group' : undefined, 'aria-label': name || undefined },
     row(name || 'time', time), ...rows, element('div', { class: 'replay-picture' }, svg));
 
-  return { node, draw(position) {
+  return { node, draw(position, us) {
     const { state, says } = run.seek(position);
     draw(state, asks ? circleOf(setup, state) : []);
-    time.textContent = `${state.now.toFixed(3)} s`;
-    const part = Math.min(Math.max((state.now - from) / (until - from), 0), 1);
-    cursor.setAttribute('transform', `translate(${(part * svg.dataset.wide).toFixed(1)})`);
+    point(us ?? 1e6 * state.now);
     return says;
-  } };
+  }, point };
+
+  // Put the clock and the cursor to a time.
+  function point(us) {
+    time.textContent = `${(us / 1e6).toFixed(3)} s`;
+    const part = Math.min(Math.max((us / 1e6 - from) / (until - from), 0), 1);
+    cursor.setAttribute('transform', `translate(${(part * svg.dataset.wide).toFixed(1)})`);
+  }
 }
 
 function show(root, record) {
   // One that has no setup is the drive of a robot: see drive.js.
-  const drives = record.runs.some(({ setup }) => !setup);
   const runs = record.runs.map(one => (one.setup ? walk(one) : drive(one)));
-  // All steps in the order of time: when, of which run, and whether it says something.
-  const steps = runs.flatMap((run, who) => run.times.map(
-    (us, own) => ({ us, who, told: run.told?.[own] ?? true }))).sort((one, other) => one.us - other.us);
+  const own = runs.map(run => run.scan());
+  const ranks = runs.map((run, i) => run.ranks ?? run.times.map((_, step) => +own[i].includes(step + 1)));
+  // All steps in the order of time: when, of which run, whether it says something, and whether also
+  // while it plays: 1, or 2 if nothing else may be said in its place.
+  const steps = runs.flatMap((run, who) => run.times.map((us, step) => ({
+    us, who, step, told: run.told?.[step] ?? true, rank: ranks[who][step],
+  }))).sort((one, other) => one.us - other.us);
   const last = steps.length;
   // How many steps of each run are done after so many of all.
   const counts = runs.map(() => [0]);
   for (const { who } of steps) counts.forEach((count, i) => count.push(count.at(-1) + (i === who)));
   // The steps after which a message is lost, or the robot hits something.
-  const losses = runs.flatMap((run, i) => run.scan().map(own => counts[i].indexOf(own))).sort((a, b) => a - b);
+  const stops = own.map((found, i) => found.map(step => counts[i].indexOf(step)));
+  const losses = stops.flat().sort((a, b) => a - b);
   const lists = record.runs.some(({ setup }) => setup?.callbacks.length === 1);
+  const named = (who, text) => (record.runs[who].name ? `${record.runs[who].name}: ` : '') + text;
+  const outcome = record.runs.flatMap((one, who) => (one.outcome ? [named(who, one.outcome)] : [])).join(' ');
+  // It opens where it tells most: at the bump of the drive, else at the last loss, else at the end.
+  const drives = record.runs.flatMap((one, who) => (one.setup ? [] : [who]));
+  const bump = drives.length === 1 && record.opens !== 'end' ? stops[drives[0]][0] : undefined;
+  const telling = bump ?? (drives.length ? last : losses.at(-1) ?? last);
   let position = 0;
+  let fresh = true; // as it was opened
   let playing = null;
-  let delay = 0;
+  let speed = 0;
+  let said = {}; // while it plays
 
   const images = [...root.querySelectorAll('figure > img')];
   // One thread that runs one callback needs no group to be understood.
@@ -59,74 +85,144 @@ function show(root, record) {
     : floor(runs[i], one, drawing(images[i]))));
   const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
   const slider = element('input', {
-    type: 'range', min: 0, max: last, step: 1, 'aria-label': 'step', oninput: () => go(+slider.value),
+    type: 'range', min: 0, max: last, step: 1, 'aria-label': 'step', onchange: () => speak(true),
+    oninput: () => { stop(); speak(false); go(+slider.value); },
   });
-  const button = (name, onclick, label) =>
-    element('button', { type: 'button', onclick, 'aria-label': label }, name);
-  const play = button('Play', toggle);
-  const rate = () => DELAYS[0] / DELAYS[delay];
-  const faster = button('Speed 1×', () => {
-    delay = (delay + 1) % DELAYS.length;
-    faster.textContent = `Speed ${rate()}×`;
-    if (playing) run();
-  });
+  const button = (name, onclick, label, kind) =>
+    element('button', { type: 'button', onclick, 'aria-label': label, class: kind }, name);
+  const play = button('', toggle, undefined, 'replay-play');
+  const usual = pace(steps.at(-1)?.us ?? 0);
+  const rate = () => +(usual * SPEEDS[speed]).toPrecision(2);
+  const faster = button('', () => {
+    speed = (speed + 1) % SPEEDS.length;
+    nameSpeed();
+  }, undefined, 'replay-rate');
   const nextLoss = () => losses.find(step => step > position);
   const loss = button('Next loss', () => {
-    const step = nextLoss();
+    const step = fresh ? losses[0] : nextLoss();
     if (step === undefined) says.textContent = 'No message is lost after this.';
-    else go(step);
+    else rest(step);
   });
-  const back = button('◀', () => step(-1), 'back');
-  const forth = button('▶', () => step(1), 'forward');
+  const back = button('‹', () => step(-1), 'back');
+  const forth = button('›', () => step(1), 'forward');
+  const shown = element('div', { class: 'replay-runs' }, ...panels.map(({ node }) => node));
 
-  // `us` is the time of a drive that plays, between two steps.
+  function nameSpeed() {
+    faster.textContent = `${rate()}×`;
+    faster.setAttribute('aria-label', `speed ${rate()}×`);
+  }
+
+  // A text that changes is read out, but not while it changes all the time.
+  function speak(on) {
+    if ((says.getAttribute('aria-live') === 'polite') === on) return;
+    says.setAttribute('aria-live', on ? 'polite' : 'off');
+    if (on) setTimeout(() => says.replaceChildren(says.textContent), 50);
+  }
+
+  const sentence = (who, step) => runs[who].says?.(step) ?? runs[who].seek(step).says;
+
+  // What is said of the steps since `from` while it plays.
+  function tell(from) {
+    const now = performance.now();
+    steps.slice(from, position).forEach(({ who, step, rank }) => {
+      if (!rank || (now < said.until && rank <= said.rank)) return;
+      said = { rank, until: now + HOLD_MS };
+      says.textContent = named(who, sentence(who, step + 1));
+    });
+  }
+
+  // `us` is the time while it plays, between two steps.
   function go(to, us) {
+    const [from, plays] = [position, us !== undefined];
+    fresh = false;
     position = Math.min(Math.max(to, 0), last);
-    const texts = panels.map(({ draw }, i) => draw(counts[i][position], us ?? steps[position - 1]?.us ?? 0));
-    const { who } = steps.slice(0, position).findLast(({ told }) => told) ?? {};
-    const name = record.runs[who]?.name;
-    const text = texts[who] ? (name && `${name}: `) + texts[who] : 'Nothing has happened yet. Step forward: ▶ or →.';
-    // A text that is set again is read out again.
-    if (says.textContent !== text) says.textContent = text;
+    if (plays) tell(from);
+    const texts = panels.map((one, i) => {
+      const still = plays && !one.draw.always && counts[i][from] === counts[i][position];
+      return still ? one.point(us) : one.draw(counts[i][position], us ?? steps[position - 1]?.us ?? 0, plays);
+    });
+    if (!plays || position === last) {
+      const { who } = steps.slice(0, position).findLast(({ told }) => told) ?? {};
+      const text = texts[who] ?? (who === undefined ? '' : sentence(who, counts[who][position]));
+      // A text that is set again is read out again.
+      const now = (position === last && outcome) || (text ? named(who, text) : 'Nothing has happened yet. Step forward: › or →.');
+      if (says.textContent !== now) says.textContent = now;
+    }
     slider.value = position;
     slider.setAttribute('aria-valuetext', `step ${position} of ${last}`);
     back.disabled = position === 0;
     forth.disabled = position === last;
+    keepHeight();
     if (position === last) stop();
+    else nameButton();
+  }
+
+  function nameButton() {
+    play.textContent = playing ? '❚❚ Pause' : fresh || position === last ? '▶ Watch again' : '▶ Play';
+  }
+
+  // What is below does not move while it plays.
+  let [tall, wide] = [0, 0];
+  function keepHeight() {
+    if (shown.offsetWidth !== wide) {
+      [tall, wide] = [0, shown.offsetWidth];
+      shown.style.minHeight = '';
+    }
+    if (shown.offsetHeight <= tall) return;
+    tall = shown.offsetHeight;
+    shown.style.minHeight = `${tall}px`;
+  }
+
+  function rest(to) {
+    stop();
+    go(to);
   }
 
   // To the next step that says something, one way or the other.
   function step(way) {
     let to = position + way;
     while (to < last && steps[to - 1]?.told === false) to += way;
-    go(to);
+    rest(to);
   }
 
   function run() {
-    clearInterval(playing);
-    const next = drives ? inTime(steps, position, rate(), go) : () => go(position + 1);
-    playing = setInterval(() => (root.isConnected ? next() : stop()), drives ? FRAME : DELAYS[delay]);
-    play.textContent = 'Pause';
+    let us = steps[position - 1]?.us ?? 0;
+    let to = position;
+    let before;
+    function frame(now) {
+      if (!root.isConnected) return stop();
+      us += 1000 * Math.min(now - (before ?? now), 100) * rate();
+      before = now;
+      while (steps[to]?.us <= us) to += 1;
+      playing = requestAnimationFrame(frame);
+      go(to, us);
+    }
+    speak(false);
+    said = {};
+    says.textContent = '';
+    playing = requestAnimationFrame(frame);
+    nameButton();
   }
 
   function stop() {
-    clearInterval(playing);
+    cancelAnimationFrame(playing);
     playing = null;
-    play.textContent = 'Play';
+    nameButton();
+    speak(true);
   }
 
   function toggle() {
-    if (playing) return stop();
-    if (position === last) go(0);
-    run();
+    if (playing) return rest(position);
+    if (fresh || position === last) go(0);
+    if (last) run();
   }
 
   const KEYS = {
     ArrowRight: () => step(1),
     ArrowLeft: () => step(-1),
     ' ': toggle,
-    Home: () => go(0),
-    End: () => go(last),
+    Home: () => rest(0),
+    End: () => rest(last),
   };
 
   function onKey(event) {
@@ -142,19 +238,22 @@ function show(root, record) {
   function onStop(event) {
     if (position === last) return;
     event.preventDefault();
-    go(position < losses[0] ? losses[0] : last);
+    const first = losses[0];
+    rest(first !== position && (fresh || position < first) ? first ?? last : last);
   }
 
   wake(root, 'replay');
   root.addEventListener('keydown', onKey);
   root.addEventListener('next-stop', onStop);
   root.querySelectorAll('figure').forEach(figure => figure.remove());
-  root.querySelector('.replay-on > p').after(
-    says,
-    element('div', { class: 'replay-controls' }, back, forth, play, faster, slider, ...(lists && losses.length ? [loss] : [])),
-    element('div', { class: 'replay-runs' }, ...panels.map(({ node }) => node)),
-  );
-  go(0);
+  const controls = element('div', { class: 'replay-controls' }, back, forth, play, faster, slider,
+    ...(lists && losses.length ? [loss] : []));
+  root.querySelector('.replay-on > p').before(controls, says, shown); // which is then below
+  nameSpeed();
+  rest(telling);
+  fresh = true;
+  if (bump !== undefined && outcome) says.textContent = outcome;
+  nameButton();
 }
 
 const root = document.currentScript.closest('.replay');

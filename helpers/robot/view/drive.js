@@ -10,9 +10,9 @@ function drive({ step, poses, commands, scans, events, bumps }) {
     ? '' : ` The callback of message ${seq} says so, which is ${seconds(age)} s old.`);
   const isNew = (one, i) => !i || one[1] !== commands[i - 1][1] || one[2] !== commands[i - 1][2];
   const steps = [
-    ...poses.map((_, i) => [1000 * i * step, '']),
-    ...commands.map((one, i) => [one[0], isNew(one, i) ? told(one) + because(one) : '']),
-    ...events,
+    ...poses.map((_, i) => [1000 * i * step, '', 0]),
+    ...commands.map((one, i) => [one[0], isNew(one, i) ? told(one) + because(one) : '', isNew(one, i) && !one[1] && !one[2] ? 1 : 0]),
+    ...events.map(([ms, text]) => [ms, text, bumps.includes(ms) ? 2 : 1]),
   ].sort(([one], [other]) => one - other);
   let text = '';
   const says = steps.map(([, said]) => (text = said || text));
@@ -56,6 +56,7 @@ function drive({ step, poses, commands, scans, events, bumps }) {
   return {
     times: steps.map(([ms]) => 1000 * ms),
     told: steps.map(([, said]) => said !== ''),
+    ranks: steps.map(([, , rank]) => rank), // what is said while it plays: a stop or an event, above all a bump
     points: poses.map(([x, y]) => `${x} ${y}`),
     says: to => says[to - 1] ?? '',
     scan: () => bumps.map(at => steps.findLastIndex(([ms]) => ms <= at) + 1),
@@ -63,26 +64,31 @@ function drive({ step, poses, commands, scans, events, bumps }) {
   };
 }
 
-const FRAME = 40; // ms
-
-// Return what goes on by a frame while it plays, `rate` times as fast as it was.
-function inTime(steps, position, rate, go) {
-  let us = steps[position - 1]?.us ?? 0;
-  let to = position;
-  return () => {
-    us += 1000 * FRAME * rate;
-    while (steps[to]?.us <= us) to += 1;
-    go(to, us);
-  };
+// A ring that grows around where it hit something.
+function ringAt(svg, { x, y, yaw }, r) {
+  if (matchMedia('(prefers-reduced-motion: reduce)').matches) return;
+  const group = svg.querySelector('.robot').parentNode;
+  const ring = document.createElementNS(svg.namespaceURI, 'circle');
+  const most = 30 / group.getScreenCTM().a; // pixels in metres
+  const looks = { class: 'ring', cx: x + r * Math.cos(yaw), cy: y + r * Math.sin(yaw), r: most, fill: 'none',
+    stroke: svg.querySelector('.bumps').getAttribute('stroke'), 'stroke-width': 3, 'vector-effect': 'non-scaling-stroke' };
+  Object.entries(looks).forEach(([name, value]) => ring.setAttribute(name, value));
+  group.append(ring);
+  ring.animate([{ r: 0.3 * most, opacity: 1 }, { r: most, opacity: 0.2 }], 400).finished.finally(() => ring.remove());
 }
 
 function floor(run, record, svg) {
   const find = name => svg.querySelector(`.${name}`);
   find('all').setAttribute('stroke-opacity', '.3');
-  const marks = ['seconds', 'bumps'].map(name => [find(name), find(name).getAttribute('d').split(/(?=M)/)]);
+  const marks = ['seconds', 'bumps'].map(name => {
+    const path = find(name);
+    return [path, (path.getAttribute('d') + path.dataset.later).split(/(?=M)/)];
+  });
+  const radius = +find('robot').querySelector('circle').getAttribute('r');
+  let hits = 0;
   const [time, robot, told] = Array.from({ length: 3 }, () => element('span', { class: 'replay-time' }));
 
-  function draw(position, us) {
+  function draw(position, us, plays) {
     const ms = us / 1000;
     const now = run.look(ms);
     const { x, y, yaw, v, w } = now;
@@ -90,9 +96,11 @@ function floor(run, record, svg) {
     find('robot').firstChild.setAttribute('transform', `rotate(${(yaw * 180 / Math.PI).toFixed(1)})`);
     find('driven').setAttribute('d', `M${run.points.slice(0, now.till + 1).join('L')}L${x.toFixed(3)} ${y.toFixed(3)}`);
     find('fan').setAttribute('d', now.fan);
-    const { r } = now.old ? { r: find('robot').querySelector('circle').getAttribute('r') } : {};
+    const r = radius;
     find('old').setAttribute('d', now.old && `${now.old}M${now.was.x - r} ${now.was.y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`);
     const counts = [Math.floor(ms / 1000), record.bumps.filter(at => at <= ms).length];
+    if (plays && counts[1] > hits) ringAt(svg, now, radius);
+    [, hits] = counts;
     marks.forEach(([path, parts], i) => path.setAttribute('d', parts.slice(0, counts[i]).join('')));
     time.textContent = `${(ms / 1000).toFixed(2)} s`;
     robot.textContent = `${v.toFixed(2)} m/s, ${w.toFixed(2)} rad/s`;
@@ -102,5 +110,6 @@ function floor(run, record, svg) {
 
   const node = element('div', { class: 'replay-floor' }, svg,
     row('time', time), row('robot', robot), row('told', told));
+  draw.always = true; // also between two steps
   return { node, draw };
 }

@@ -12,13 +12,20 @@ from helpers.replay import Replay, style
 from helpers.robot.floor import Pose
 from helpers.robot.robot import Robot
 from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
-from helpers.robot.view.replay import bumps, place, replay_drive
+from helpers.robot.view.replay import bumps, outcome, place, replay_drive
 from helpers.robot.view.scans import ScanRecording
 from helpers.ros import current_session
 
 PERIOD_S = 1 / 12
 EVERY = 5  # steps of the robot: a point of its path
 NEWS_S = 3.0  # so long an event is shown
+# Those of view.js, in their places: nothing moves when the replay comes.
+CONTROLS = (
+    '<div class="replay-controls" aria-hidden="true"><button disabled>‹</button>'
+    '<button disabled>›</button><button class="replay-play" disabled>● Live</button>'
+    '<button class="replay-rate" disabled>1×</button>'
+    '<input type="range" disabled min="0" max="1" value="1"></div>'
+)
 
 
 def watch(
@@ -42,10 +49,12 @@ def watch(
     view = LiveView(robot, recording)
 
     def end() -> None:
+        # Who has watched sees the robot stay where it stopped.
+        opens = 'end' if view.is_shown else 'bump'
         try:
-            shown = replay_drive(robot.record, recording, name)
+            shown = replay_drive(robot.record, recording, name, opens)
         except ValueError:  # interrupted where it does not add up, or heard by several threads
-            shown = replay_drive(robot.record, name=name)
+            shown = replay_drive(robot.record, name=name, opens=opens)
         view.stop(shown)
 
     view.start()
@@ -65,6 +74,10 @@ class LiveView:
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name='robot view', daemon=True)
 
+    @property
+    def is_shown(self) -> bool:
+        return self._display is not None
+
     def start(self) -> None:
         """Show the first picture, in the output of the cell that runs, where somebody watches."""
         if somebody_watches():
@@ -82,7 +95,7 @@ class LiveView:
         """End the pictures, and show this in their place."""
         from IPython.display import display
 
-        if self._display is None:
+        if not self.is_shown:
             display(shown)
             return
         self._over.set()
@@ -93,25 +106,31 @@ class LiveView:
         """Return the picture of now, and what the robot and its callback do."""
         record = self._record
         poses, scans, commands = record.poses, record.scans, record.commands
-        now = poses[-1]
+        now, hit = poses[-1], bumps(record)
         svg = floor_picture(
             record.floor,
             [row[1:3] for row in [*poses[::EVERY], now]],
             Pose(now.x, now.y, now.yaw),
             scans[-1] if scans else None,
-            [place(record, bump.t_s) for bump in bumps(record)],
+            [place(record, bump.t_s) for bump in hit],
+            scan_pose=place(record, scans[-1].t_s) if scans else None,
+            ring_s=now.t_s - hit[-1].t_s if hit else None,
         )
         told = speeds(*commands[-1][1:]) if commands else 'nothing yet'
         news = record.events[-1:]
         event = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
+        if hit:
+            event = outcome(record)
         return (
-            f'<div class="replay robot-live">{style(DRIVE_CSS)}'
+            f'<div class="replay replay-on robot-live">{style(DRIVE_CSS)}{CONTROLS}'
+            f'<p class="replay-says">{escape(event)}</p><div class="replay-runs">'
+            '<div class="replay-floor">'
             f'<div role="img" aria-label="{escape(floor_in_words(record.floor))}">{svg}</div>'
             f'{_row("time", f"{now.t_s:.1f} s")}{_row("robot", speeds(now.v, now.w))}'
-            f'{_row("told", told)}{self._queue()}<p class="replay-says">{escape(event)}</p></div>'
+            f'{_row("told", told)}</div>{self._queue(now.t_s)}</div></div>'
         )
 
-    def _queue(self) -> str:
+    def _queue(self, now_s: float) -> str:
         """Return which message has a callback, and which wait."""
         if self._recording is None:
             return ''
@@ -122,7 +141,8 @@ class LiveView:
         ]
         waiting = ''.join(f'<li><b>{seq}</b></li>' for seq in waits)
         busy = busy or ['<li class="replay-free">free</li>']
-        return _row('callback', *busy) + _row('queue', waiting)
+        rows = _row('time', f'{now_s:.1f} s') + _row('callback', *busy) + _row('queue', waiting)
+        return f'<div class="replay-run">{rows}</div>'
 
 
 def speeds(v: float, w: float) -> str:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,8 +24,17 @@ WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor
 BEAMS = 61  # of a scan, in a picture
 WALL_M = 0.15  # of an outer wall
+RING, RING_S = 30, 0.4  # pixels, and how long: around a bump, as drive.js draws it
 DRIVE_CSS = Path(__file__).with_name('drive.css')
 ROBOT, WAITING, LOST = LOOK['robot'], LOOK['waiting'], LOOK['lost']
+
+
+class Later(NamedTuple):
+    """What comes after the time of a picture. `points` are those of the whole drive."""
+
+    points: Sequence[tuple[float, float]] = ()
+    bumps: Sequence[Pose] = ()
+    seconds: Sequence[Pose] = ()
 
 
 def floor_picture(
@@ -34,30 +44,38 @@ def floor_picture(
     scan: Scan | None = None,
     bumps: Sequence[Pose] = (),
     seconds: Sequence[Pose] = (),
+    *,
+    scan_pose: Pose | None = None,
+    later: Later | None = None,
+    ring_s: float | None = None,
 ) -> str:
     """Return the SVG: the floor, the path through `points`, the robot at `pose` with its laser.
 
-    `scan` was made at `pose`. `seconds` are the places that get a dot, `bumps`
-    those where it hit something.
+    `scan` was made at `scan_pose`, which is mostly a little behind `pose`. `seconds` are the places
+    that get a dot, `bumps` those where it hit something, the last one `ring_s` ago. `later` is what
+    comes after `pose`: drive.js draws it when its time has come.
     """
     x, y, right, above = edges(floor)
     scale = min((WIDTH - 2 * MARGIN) / (right - x), (HEIGHT - 2 * MARGIN) / (above - y))
     width, height = (scale * size + 2 * MARGIN for size in (right - x, above - y))
     r = max(RADIUS_M, SMALLEST / scale)  # on a large floor the robot is drawn larger than it is
-    way = 'L'.join(f'{x:.2f} {y:.2f}' for x, y in points)
+    way = line(points)
+    whole, drawn = (line(later.points), way) if later else (way, '')
+    pale = ' stroke-opacity=".3"' if later else ''
+    later = later or Later()
     start = floor.start
     ring = f'M{start.x - r:.3f} {start.y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} 0'
     ring += f'a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
     parts = [
         _floor(floor, scale),
-        f'<path class="fan" d="{fan(pose, scan)}" fill="{ROBOT}" fill-opacity=".16" '
+        f'<path class="fan" d="{fan(scan_pose or pose, scan)}" fill="{ROBOT}" fill-opacity=".16" '
         f'stroke="{ROBOT}" stroke-opacity=".6"/>',
         f'<path class="old" d="" fill="none" stroke="{WAITING}" '
         'stroke-width="2" stroke-dasharray="5 4"/>',
-        f'<path class="all" d="M{way}" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
-        f'<path class="driven" d="" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
-        f'<path class="seconds" d="{dots(seconds)}" stroke="{ROBOT}" stroke-width="6.5" '
-        'stroke-linecap="round"/>',
+        f'<path class="all" d="{whole}" fill="none" stroke="{ROBOT}" stroke-width="2.6"{pale}/>',
+        f'<path class="driven" d="{drawn}" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
+        f'<path class="seconds" d="{dots(seconds)}" data-later="{dots(later.seconds)}" '
+        f'stroke="{ROBOT}" stroke-width="6.5" stroke-linecap="round"/>',
         f'<path class="start" d="{ring}" fill="none" stroke="currentColor" stroke-opacity=".6" '
         'stroke-dasharray="3 3"/>',
         # A disc with an arrow that shows its heading.
@@ -65,14 +83,23 @@ def floor_picture(
         f'<g transform="rotate({math.degrees(pose.yaw):.1f})">'
         f'<circle r="{r:.3f}" fill="{ROBOT}"/><path d="M{0.68 * r:.3f} 0L{-0.42 * r:.3f} '
         f'{0.52 * r:.3f}L{-0.18 * r:.3f} 0L{-0.42 * r:.3f} {-0.52 * r:.3f}z" fill="#fff"/></g></g>',
-        f'<path class="bumps" d="{crosses(bumps, r, 7 / scale)}" stroke="{LOST}" '
-        'stroke-width="3.2"/>',
+        f'<path class="bumps" d="{crosses(bumps, r, 7 / scale)}" '
+        f'data-later="{crosses(later.bumps, r, 7 / scale)}" stroke="{LOST}" stroke-width="3.2"/>',
     ]
+    if bumps and ring_s is not None and ring_s < RING_S:
+        x0, y0, yaw = bumps[-1][:3]
+        part = ring_s / RING_S
+        parts.append(
+            f'<circle class="ring" cx="{x0 + r * math.cos(yaw):.3f}" '
+            f'cy="{y0 + r * math.sin(yaw):.3f}" r="{(0.3 + 0.7 * part) * RING / scale:.3f}" '
+            f'fill="none" stroke="{LOST}" stroke-opacity="{1 - part:.2f}" stroke-width="3" '
+            'vector-effect="non-scaling-stroke"/>'
+        )
     left, below = 14 + scale * WALL_M, height - 14 - scale * WALL_M
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
         f'width="{width:.0f}" height="{height:.0f}" color="{LOOK["ink"]}" '
-        f'font-family="system-ui, sans-serif" font-size="14"><g transform="translate('
+        f'font-family="system-ui, sans-serif" font-size="16"><g transform="translate('
         f'{MARGIN - scale * x:.1f} {height - MARGIN + scale * y:.1f}) '
         f'scale({scale:.2f} -{scale:.2f})" stroke-linejoin="round">{"".join(parts)}</g>'
         f'<path d="M{left:.0f} {below:.0f}v-6m0 3h{scale:.0f}m0-3v6" fill="none" '
@@ -116,6 +143,10 @@ def _floor(floor: Floor, scale: float) -> str:
         f'<path d="{boxes("box")}" fill="{LOOK["ink"]}" fill-opacity=".35" stroke="{LOOK["ink"]}" '
         f'stroke-width="1.5"/>{names}'
     )
+
+
+def line(points: Iterable[tuple[float, float]]) -> str:
+    return 'M' + 'L'.join(f'{x:.2f} {y:.2f}' for x, y in points)
 
 
 def dots(poses: Sequence[Pose]) -> str:

@@ -14,12 +14,13 @@ from helpers.replay import Replay, replay
 from helpers.robot.floor import Pose
 from helpers.robot.record import DriveRecord, Event, Scan
 from helpers.robot.sensors import RANGE_MAX
-from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
+from helpers.robot.view.picture import DRIVE_CSS, Later, floor_in_words, floor_picture
 from helpers.robot.view.scans import ScanRecording
 
 # What a notebook keeps of a drive, at most: so it stays below 60 kB.
 POSES, SCANS, COMMANDS, EVENTS = 400, 60, 150, 50
 EVERY_S = 0.1  # a pose
+NEAR_M = 2.0  # so near, a robot stands before what it sees
 BEAMS = 46  # of a scan
 TIMES = ['published_s', 'started_s', 'finished_s']
 TIME_LABEL = "time since the robot's start (s)"
@@ -34,6 +35,7 @@ class Drive:
     recording: ScanRecording | None = None
     name: str = ''
     setup: None = None
+    opens: str = 'bump'  # where it opens: at its first bump, if there is one, or at its 'end'
 
     scripts = (Path(__file__).with_name('drive.js'),)
     styles = (DRIVE_CSS,)
@@ -53,17 +55,37 @@ class Drive:
         poses = np.stack([np.interp(times, rows[:, 0], column) for column in columns], axis=1)
         return end / (count - 1) if end else EVERY_S, poses.round(3)
 
-    def picture(self) -> str:
-        """Return the floor as an SVG at the end of the drive."""
-        _, end = self.span_s
-        scans = self.record_.scans
+    @property
+    def telling_s(self) -> float:
+        """The time at which it opens."""
+        hit = bumps(self.record_) if self.opens == 'bump' else []
+        return hit[0].t_s if hit else self.span_s[1]
+
+    def picture(self, at_s: float | None = None) -> str:
+        """Return the floor as an SVG, at the time at which it opens."""
+        record, end = self.record_, self.span_s[1]
+        now = self.telling_s if at_s is None else at_s
+        step, poses = self.sampled()
+        points = poses[:, :2].tolist()
+        pose = place(record, now)
+        before = [scan for scan in record.scans if scan.t_s <= now + 1e-9]
+        hits = [(bump.t_s <= now + 1e-9, place(record, bump.t_s)) for bump in bumps(record)]
+        dots = [
+            (second <= now, place(record, second)) for second in range(min(int(end), POSES) + 1)
+        ]
         return floor_picture(
-            self.record_.floor,
-            self.sampled()[1][:, :2].tolist(),
-            place(self.record_, end),
-            scans[-1] if scans else None,
-            [place(self.record_, bump.t_s) for bump in bumps(self.record_)],
-            seconds=[place(self.record_, second) for second in range(min(int(end), POSES) + 1)],
+            record.floor,
+            [*points[: int(now / step) + 1], pose[:2]],
+            pose,
+            before[-1] if before else None,
+            [hit for done, hit in hits if done],
+            [dot for done, dot in dots if done],
+            scan_pose=place(record, before[-1].t_s) if before else None,
+            later=Later(
+                points,
+                [hit for done, hit in hits if not done],
+                [dot for done, dot in dots if not done],
+            ),
         )
 
     @property
@@ -75,6 +97,7 @@ class Drive:
         step, poses = self.sampled()
         return {
             'name': self.name,
+            'outcome': outcome(self.record_),
             'step': round(step, 4),
             'poses': poses.tolist(),
             'scans': [
@@ -121,13 +144,14 @@ def replay_drive(
     record: DriveRecord,
     recording: ScanRecording | None = None,
     name: str = '',
+    opens: str = 'bump',
 ) -> Replay:
     """Return a drive to step through: the floor, and when `recording` is given, its queue beside.
 
     `record` is `robot.record`, `recording` what `watch` returned for the subscription that commands
     the robot, in one thread. With the mouse, keys or Play one sees what the robot saw, what it was
     told, and which scan it acted on. `name` is what this drive is called in words, so that one
-    tells it from others of the page.
+    tells it from others of the page. It opens at the first bump, if there is one, or at the 'end'.
 
     Raises TypeError for anything else, ValueError for a recording beside a drive in sim time, and
     what `helpers.replay.replay` raises.
@@ -140,7 +164,7 @@ def replay_drive(
     called = f'{name}: ' if name else ''
     summary = f'{called}A drive on the floor {record.floor.name}. The robot {end}.'
     if recording is None:
-        return Replay((Drive(record, summary),))
+        return Replay((Drive(record, summary, opens=opens),))
     if record.started_s is None:
         raise ValueError(
             'In sim time a drive and a recording share no clock: replay the drive alone.'
@@ -150,7 +174,7 @@ def replay_drive(
     (run,) = replay(table, recording.depth).runs
     # How many messages there were differs from run to run.
     words = run.summary.partition(', ')[2]
-    drive = Drive(record, summary, recording)
+    drive = Drive(record, summary, recording, opens=opens)
     after_s = drive.span_s[1] - run.moves[-1][0] / 1e6
     words = called + words[0].upper() + words[1:]
     run = replace(run, summary=words, time_label=TIME_LABEL, after_s=after_s)
@@ -168,6 +192,28 @@ def place(record: DriveRecord, t_s: float) -> Pose:
     """Return where the robot was at a time, after its last step."""
     after = bisect_right(record.poses, t_s + 1e-9, key=lambda row: row.t_s) - 1
     return Pose(*record.poses[after][1:4]) if after >= 0 else record.floor.start
+
+
+def outcome(record: DriveRecord) -> str:
+    """Return how a drive ended, in one sentence.
+
+    How far a wall is away is what the laser says straight ahead: measured from the middle.
+    """
+    floor = record.floor
+    if hit := bumps(record):
+        x, y, _ = place(record, hit[0].t_s)
+        kind = min(floor.walls, key=lambda wall: wall.distance(x, y)).kind
+        what = 'the wall' if kind == 'wall' else f'a {kind}'
+        return f'The robot hit {what} after {hit[0].t_s:.1f} s.'
+    if not any(row.v or row.w for row in record.poses):
+        return 'The robot did not move.'
+    *_, x, y, yaw, v, w = record.poses[-1]
+    (distance,), (seen,) = floor.ranges(x, y, np.array([yaw]))
+    if v or w or distance > NEAR_M:
+        return 'Nothing was hit.'
+    kind = floor.walls[seen].kind
+    what = 'the wall' if kind == 'wall' else f'a {kind}'
+    return f'The robot stands, {distance:.2f} m before {what}.'
 
 
 def bumps(record: DriveRecord) -> list[Event]:
