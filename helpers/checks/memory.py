@@ -106,9 +106,9 @@ def place(lesson: str, step: int) -> str:
 
 
 def missed() -> dict[str, str]:
-    """Return the questions that were missed and not yet answered right later, and in which lesson.
+    """Return the questions that are still to be answered, and in which lesson each was missed.
 
-    A line is `memory NAME LESSON` after a wrong answer, `memory NAME` after a right one that counts.
+    A line is `memory NAME LESSON` after a wrong answer, and `memory NAME` after the right one.
     """
     found: dict[str, str] = {}
     for line in progress.lines_of(MARK):

@@ -2,8 +2,9 @@
 
 `checks.check` records each task that passes, and lesson 00 shows the table. The file has one line
 for each task, such as `lose_messages 1`: the lesson's name and not its number, which changes when
-a lesson is added before it. What `checks.remember` keeps are lines that begin with `memory`. Lines are only ever added, so kernels that write at once lose nothing.
-Titles and tasks are read from the notebooks, as text: also from one that a student has broken.
+a lesson is added before it. What `checks.remember` keeps are lines that begin with `memory`. Lines
+are only ever added, so kernels that write at once lose nothing. Titles and tasks are read from the
+notebooks, as text: also from one that a student has broken.
 """
 
 from __future__ import annotations
@@ -101,9 +102,8 @@ def add(line: str) -> None:
 
 
 def lines_of(first_word: str) -> list[str]:
-    """Return the lines of the file that begin with this word, the oldest first. None is made."""
-    path = file()
-    if path is not None:
+    """Return the lines that begin with this word, the oldest first. No file is made for it."""
+    if (path := file()) is not None:
         with suppress(OSError):
             lines = path.read_text(encoding='utf-8', errors='replace').splitlines()
             return [line for line in lines if line.startswith(f'{first_word} ')]

@@ -323,9 +323,9 @@ def answers_come_after_guesses(lesson: Lesson) -> Iterator[str]:
                         f'The cell {called(other)} gives the answer of {parts[1]!r} away before it '
                         f'is guessed: {found}. Let the code compute it.'
                     )
-            elif heading := re.match(r'#+ (.*)', other.source):
-                if len(answer) > 3 and re.search(rf'\b{re.escape(answer)}\b', heading[1]):
-                    yield f'The heading {heading[1]!r} has the answer of {parts[1]!r}.'
+            elif len(answer) > 3 and re.match(rf'#+ .*\b{re.escape(answer)}\b', other.source):
+                title = other.source.partition('\n')[0].lstrip('# ')
+                yield f'The heading {title!r} has the answer of {parts[1]!r}.'
 
 
 def asks_from_memory(lesson: Lesson) -> Iterator[str]:
