@@ -2,6 +2,7 @@
 
 from helpers.checks.classroom import guess, join_class, leave_class, lower_hand, raise_hand
 from helpers.checks.guesses import compare_prediction
+from helpers.checks.memory import remember
 
 __all__ = [
     'compare_prediction',
@@ -10,4 +11,5 @@ __all__ = [
     'leave_class',
     'lower_hand',
     'raise_hand',
+    'remember',
 ]

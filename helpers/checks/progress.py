@@ -2,8 +2,9 @@
 
 `checks.check` records each task that passes, and lesson 00 shows the table. The file has one line
 for each task, such as `lose_messages 1`: the lesson's name and not its number, which changes when
-a lesson is added before it. Lines are only ever added, so kernels that write at once lose nothing.
-Titles and tasks are read from the notebooks, as text: also from one that a student has broken.
+a lesson is added before it. What `checks.remember` keeps are lines that begin with `memory`. Lines
+are only ever added, so kernels that write at once lose nothing. Titles and tasks are read from the
+notebooks, as text: also from one that a student has broken.
 """
 
 from __future__ import annotations
@@ -88,8 +89,30 @@ def record(task: int, about: str = '') -> None:
     with suppress(OSError):
         for key in (f'{lesson} {task}', f'{lesson} {task} {about}'.strip()):
             if key not in _read(path).splitlines():
-                with path.open('ab', buffering=0) as lines:  # a short write is one system call
-                    lines.write(f'{key}\n'.encode())
+                add(key)
+
+
+def add(line: str) -> None:
+    """Add a line to the file, if there is one and it can be written."""
+    if (path := file()) is not None:
+        with suppress(OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open('ab', buffering=0) as lines:  # a short write is one system call
+                lines.write(f'{line}\n'.encode())
+
+
+def lines_of(first_word: str) -> list[str]:
+    """Return the lines that begin with this word, the oldest first. No file is made for it."""
+    if (path := file()) is not None:
+        with suppress(OSError):
+            lines = path.read_text(encoding='utf-8', errors='replace').splitlines()
+            return [line for line in lines if line.startswith(f'{first_word} ')]
+    return []
+
+
+def number_of(lesson: str) -> str:
+    """Return the number of a lesson by its name, such as '02'; empty if there is no notebook."""
+    return next((path.name[:2] for path in _notebooks() if path.stem[3:] == lesson), '')
 
 
 def about(task: int) -> list[str]:

@@ -2,7 +2,7 @@
 
 import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_output
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_output
 
 from tools.lessons import rules
 from tools.lessons.lesson import FOLDER, Lesson
@@ -56,6 +56,87 @@ KEPT = [
         code('%%solution 2\nwait = [Node(str(i)) for i in ()]', 'solution'),
     ),
 ]
+
+GUESS = code("my_first = guess('How many?', ...)", 'predict')
+ANSWER = new_output('stream', name='stdout', text='How many?\n  The answer is 14.\n')
+COMPARED = code("compare_prediction('How many?', my_first, len(heard))", outputs=[ANSWER])
+MOVES = code("compare_prediction('How many?', my_first, len(heard), 3)")
+GIVEN_AWAY = [
+    [GUESS, code("compare_prediction('How many?', my_first, 14)")],
+    [GUESS, code("right = [1, 4]\ncompare_prediction('How many?', my_first, right)")],
+    [GUESS, code("print('They are all:', len(heard) == 14)"), COMPARED],
+    [GUESS, code('assert len(heard) == approx(14)'), COMPARED],
+    [GUESS, code('print(abs(len(heard) - 20) <= 3)'), MOVES],
+    [
+        GUESS,
+        code(
+            "why = 'The queue keeps 10, and 4 are in flight: 14.'\n"
+            "compare_prediction('How many?', my_first, len(heard), because=why)",
+            outputs=[ANSWER],
+        ),
+    ],
+]
+KEPT_SECRET = [
+    [GUESS, COMPARED, code('len(heard) == 14')],
+    [code('len(heard) == 14'), GUESS, COMPARED],
+    [GUESS, code('%%solution 2\nlen(heard) == 14', 'solution'), COMPARED],
+    [GUESS, code('heard[:2] == [0, 1] and depth == 10 and abs(x - 0.5) < 0.1'), COMPARED],
+    [GUESS, code('print(abs(len(heard) - expected) <= 3)'), MOVES],
+    [
+        GUESS,
+        code(
+            "kind = 'A'\nif heard:\n    kind = 'B'\n"
+            "compare_prediction('How many?', my_first, kind, because=f'In flight: {14.5}.')",
+            outputs=[ANSWER],
+        ),
+    ],
+]
+
+
+@pytest.mark.parametrize('cells', GIVEN_AWAY)
+def test_an_answer_before_its_question_is_found(cells):
+    [sentence] = complaints(rules.answers_come_after_guesses, *cells)
+    assert "gives the answer of 'How many?' away before it is guessed: " in sentence
+
+
+@pytest.mark.parametrize('cells', KEPT_SECRET)
+def test_code_that_gives_no_answer_away_is_left_alone(cells):
+    assert complaints(rules.answers_come_after_guesses, *cells) == []
+
+
+def test_a_heading_with_the_answer_is_found():
+    answer = new_output('stream', name='stdout', text='  The answer is SIGKILL.\n')
+    compared = code("compare_prediction('How many?', my_first, hits)", outputs=[answer])
+    heading = new_markdown_cell('### Run until SIGKILL')
+    [sentence] = complaints(rules.answers_come_after_guesses, GUESS, heading, compared)
+    assert sentence == "The heading 'Run until SIGKILL' has the answer of 'How many?'."
+
+
+@pytest.mark.parametrize(
+    ('old', 'new', 'said'),
+    [
+        ('=..., what', '=..., what', []),
+        ('## From memory', '## Before', ['needs a cell that begins with `## From memory`']),
+        ('=..., what', "='A', what", ['`remember(one_name=..., other_name=...)`']),
+        (', what_reliable_does_for_a_queue=...', '', ['with two questions']),
+        ('what_reliable', 'what_else', ['The question what_else_does_for_a_queue is not in ']),
+    ],
+)
+def test_a_lesson_opens_with_two_questions_from_memory(old, new, said):
+    notebook = template()
+    for cell in notebook.cells[:6]:
+        cell.source = cell.source.replace(old, new)
+    found = list(rules.asks_from_memory(Lesson('90_write_a_lesson.ipynb', notebook)))
+    assert len(found) == len(said)
+    assert all(words in sentence for words, sentence in zip(said, found, strict=True))
+
+
+def test_the_first_lessons_ask_nothing_from_memory():
+    notebook = template()
+    notebook.cells = [cell for cell in notebook.cells if 'remember(' not in cell.source]
+    notebook.cells = [cell for cell in notebook.cells if '## From' not in cell.source]
+    assert not list(rules.asks_from_memory(Lesson('02_write_a_lesson.ipynb', notebook)))
+    assert list(rules.asks_from_memory(Lesson('03_write_a_lesson.ipynb', notebook)))
 
 
 @pytest.mark.parametrize(('rule', 'cell'), BROKEN)

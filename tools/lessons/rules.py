@@ -12,8 +12,9 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
+from helpers.checks.memory import questions
 from helpers.checks.verdict import KEY
-from tools.lessons.code import guess_of, names_of
+from tools.lessons.code import given_away, guess_of, names_of, recalled
 from tools.lessons.comparison import comment_markers, metadata_tags
 from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, called, tags
 
@@ -298,6 +299,57 @@ def guesses_are_compared(lesson: Lesson) -> Iterator[str]:
             yield f'No later cell has compare_prediction({question!r}, {guess}, ...).'
 
 
+def answers_come_after_guesses(lesson: Lesson) -> Iterator[str]:
+    """Between a question and its answer, no code and no heading says the answer: both are read."""
+    cells = lesson.notebook.cells
+    for place, cell in enumerate(cells):
+        if (parts := guess_of(cell)) is None:
+            continue
+        between: list[NotebookNode] = []
+        for later in cells[place + 1 :]:
+            between.append(later)
+            if later.cell_type == 'code' and f'({parts[1]!r},' in re.sub(
+                r'compare_prediction\(\s+', 'compare_prediction(', later.source
+            ):
+                break
+        else:
+            continue  # guesses_are_compared says it
+        said = re.search(r'^  The answer is (.+)\.$', '\n'.join(texts(later)), re.MULTILINE)
+        answer = said[1] if said else ''
+        for other in between:
+            if other.cell_type == 'code' and 'solution' not in tags(other):
+                for found in given_away(other.source, parts[1], answer):
+                    yield (
+                        f'The cell {called(other)} gives the answer of {parts[1]!r} away before it '
+                        f'is guessed: {found}. Let the code compute it.'
+                    )
+            elif len(answer) > 3 and re.match(rf'#+ .*\b{re.escape(answer)}\b', other.source):
+                title = other.source.partition('\n')[0].lstrip('# ')
+                yield f'The heading {title!r} has the answer of {parts[1]!r}.'
+
+
+def asks_from_memory(lesson: Lesson) -> Iterator[str]:
+    """The first two lessons have nothing to ask about; all others open with two questions."""
+    if not lesson.is_lesson:
+        return
+    cells = lesson.notebook.cells
+    sources = [cell.source for cell in cells]
+    place = next((i for i, text in enumerate(sources) if text.startswith('## From memory\n')), None)
+    step = next((i for i, text in enumerate(sources) if text.startswith('## 1. ')), len(cells))
+    names = None
+    if place is not None and place < step and place + 1 < len(cells):
+        names = recalled(sources[place + 1])
+    if names is None or len(names) != 2:
+        if place is not None or lesson.number > '02':
+            yield (
+                'Before step 1 the lesson needs a cell that begins with `## From memory`, and '
+                'below it one of code with two questions: `remember(one_name=..., other_name=...)`.'
+            )
+        return
+    for name in sorted(names - questions().keys()):
+        yield f'The question {name} is not in helpers/checks/questions.yaml.'
+
+
 def tasks_are_checked(lesson: Lesson) -> Iterator[str]:
     """The check finds the starter wanting and the solution right."""
     inside = 0
@@ -347,6 +399,8 @@ RULES: list[Rule] = [
     named,
     links_lead_somewhere,
     guesses_are_compared,
+    answers_come_after_guesses,
+    asks_from_memory,
     tasks_are_checked,
     questions_have_one_right_answer,
 ]
