@@ -24,7 +24,7 @@ from domain_coordinator import domain_id
 from geometry_msgs.msg import Twist, TwistStamped
 from packages.declared import undeclared
 from rclpy.executors import SingleThreadedExecutor
-from support.environments import Environment, MissingError, needed_to_use
+from support.environments import OUTSIDE, SHARE, Environment, MissingError, needed_to_use
 from support.kernel import NOTEBOOKS, Kernel
 
 from helpers.workspace import fix_wheels, lines_that_matter, without_folders
@@ -178,6 +178,8 @@ class Computer:
             if name in self.packages and name not in found:
                 found.append(name)
                 waiting += needed_to_use(self.packages[name])
+            elif name in OUTSIDE:
+                waiting += needed_to_use(parse_package(SHARE / name / 'package.xml'))
         return found
 
     def _terminal(self, name: str, *moments: str, tools: bool = False) -> dict[str, str]:
