@@ -267,6 +267,9 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
     except KeyboardInterrupt:
         print('Interrupted: the same command goes on from here.', file=sys.stderr)
         status = 130
+        for work in works:
+            if work.answers and not work.row.results and not work.row.said:
+                work.row.said.append('not judged yet')
     said = write(output, works, wanted, sheets, title)
     print(f'{output}: {", ".join(said)}')
     return status

@@ -1,9 +1,14 @@
 """Run a lesson with a student's answers, and say what its checks say. It runs in the container.
 
 The job comes as JSON on stdin, and what happens goes as lines of JSON to stdout, so that nothing is
-lost if this is ended: `{"cell": "check-02-1", "outputs": [...]}` for each cell of a task, and
-`{"given_up": 3, "why": "..."}` for a task whose code hung or ended the kernel. Then the lesson runs
-again, with the starter of that task.
+lost if this is ended:
+
+    {"begin": true}                                  before any code of the student
+    {"cell": "check-02-1", "outputs": [...]}         for each cell of a task
+    {"given_up": 3, "why": "its code ended ..."}     a task hung, or ended the kernel
+    {"end": true}
+
+After a task was given up, the lesson runs again, with the starter of that task.
 
 Job: `cells`, each with `id`, `source`, `kind` ('', 'exercise', 'check', 'solution'), `task`, and
 for an exercise its `starter`; `module`, the checks; `files`, of a workspace, in Base64, and
@@ -127,6 +132,7 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
         path = files / name
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(base64.b64decode(content))
+    yield {'begin': True}
     given_up: set[int] = set()
     exercises = [cell for cell in job['cells'] if cell['kind'] == 'exercise']
     answered = {cell['task'] for cell in exercises if cell['source'] != cell['starter']}

@@ -8,8 +8,8 @@ import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from classroom.grade.answers import SEED, Answers, Handed
-from classroom.grade.runner import Said
+from classroom.grade.answers import SEED, Answers, Handed, Task
+from classroom.grade.runner import LATE, Said
 from helpers.checks.verdict import KEY
 from tools.lessons.lesson import ROOT, tags
 
@@ -115,7 +115,7 @@ def result_of(
                 outcome.met, outcome.of = sum(p.get('ok') is True for p in points), len(points)
                 outcome.why = next((str(one['note'])[:200] for one in found if 'note' in one), '')
             else:
-                outcome.why = _error(task.checks, outputs) or said.trouble or 'no verdict'
+                outcome.why = _error(task, outputs) or said.trouble or 'no verdict'
         result.tasks[number] = outcome
     return result
 
@@ -138,11 +138,15 @@ def _verdict(task: int, outputs: list[dict]) -> dict | None:
     return data | {'solved': data.get('solved') is True and met}
 
 
-def _error(checks: list, outputs: dict[str, list[dict]]) -> str:
-    for cell in checks:
+def _error(task: Task, outputs: dict[str, list[dict]]) -> str:
+    """Return the error of a task's own cells, or else that of its check."""
+    for cell in (*task.exercises, *task.checks):
         for output in outputs.get(cell.id, []):
             if output.get('output_type') == 'error':
-                return f'{output.get("ename")}: {output.get("evalue")}'.splitlines()[0][:200]
+                said = f'{output.get("ename")}: {output.get("evalue")}'.strip(': ').splitlines()[0]
+                return (
+                    f'{"its check" if cell in task.checks else "its cell"} ended with {said[:200]}'
+                )
     return ''
 
 
@@ -156,7 +160,7 @@ class Kept:
     def get(self, key: str, digest: str, limit_min: float) -> Result | None:
         """Return the result of this student and lesson, if it is that of the same answers.
 
-        One that was ended before its end counts if it had as much time as now.
+        One whose time was over counts if it had as much time as now.
         """
         try:
             data = json.loads((self._folder / f'{key}.json').read_text(encoding='utf-8'))
@@ -164,7 +168,8 @@ class Kept:
                 return None
             tasks = {int(number): Outcome(**task) for number, task in data['tasks'].items()}
             result = Result(**(data | {'tasks': tasks}))
-            return None if result.trouble and result.minutes < limit_min * 0.99 else result
+            too_short = result.trouble.startswith(LATE) and result.minutes < limit_min * 0.99
+            return None if too_short else result
         except (OSError, ValueError, LookupError, TypeError):
             return None
 

@@ -21,6 +21,7 @@ from tools.lessons.lesson import ROOT
 SCRIPT = ROOT / 'classroom/container/run.sh'
 MOST_SAID = 30_000_000  # bytes that are read of what it says
 NOT_STARTED = 'it could not be judged: '
+LATE = 'it was ended after'
 
 
 @dataclass
@@ -29,6 +30,7 @@ class Said:
 
     outputs: dict[str, list[dict]] = field(default_factory=dict)
     given_up: dict[int, str] = field(default_factory=dict)
+    begun: bool = False  # before any code of a student
     ended: bool = False
     trouble: str = ''  # why it did not end by itself
     is_ours: bool = False  # the trouble is that of this machine: to be tried again
@@ -129,12 +131,12 @@ def run(job: dict, where: Where, limit_s: float) -> Said:
         if where.stopped:
             said.trouble, said.is_ours = 'it was interrupted', True
         elif late.is_set():
-            said.trouble = f'it was ended after {limit_s / 60:.0f} minutes'
+            said.trouble = f'{LATE} {limit_s / 60:.0f} minutes'
         elif not said.ended and not said.trouble:
             errors.seek(0)
             lines = errors.read()[-10_000:].decode(errors='replace').strip().splitlines()
             reason = lines[-1][:200] if lines else f'exit status {process.returncode}'
-            said.is_ours = not said.outputs and not said.given_up
+            said.is_ours = not said.begun
             said.trouble = f'{NOT_STARTED if said.is_ours else "it was ended: "}{reason}'
     return said
 
@@ -157,4 +159,5 @@ def _read(line: bytes, said: Said) -> None:
         said.outputs[event['cell']] = [one for one in outputs if isinstance(one, dict)]
     elif isinstance(given_up, int):
         said.given_up[given_up] = str(event.get('why', ''))[:200]
+    said.begun |= event.get('begin') is True
     said.ended |= event.get('end') is True or given_up == 0

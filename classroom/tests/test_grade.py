@@ -293,6 +293,17 @@ def test_a_verdict_counts_if_it_is_one(lessons, verdicts, solved):
     assert result.points == solved
 
 
+def test_without_a_verdict_the_error_is_said(lessons):
+    _, answers = read(notebook(**{STARTER: 'speed = input()'}), lessons)
+    error = {'output_type': 'error', 'ename': 'NameError', 'evalue': 'speed', 'traceback': []}
+    said = runner.Said({STARTER: [error | {'ename': 'KeyboardInterrupt', 'evalue': ''}]})
+    result = result_of(lessons['00'], answers, {}, said, 'digest')
+    assert result.tasks[1].why == 'its cell ended with KeyboardInterrupt'
+    said = runner.Said({'check-00-1': [error]})
+    result = result_of(lessons['00'], answers, {}, said, 'digest')
+    assert result.tasks[1].why == 'its check ended with NameError: speed'
+
+
 def test_hostile_lines_are_left_out():
     said = runner.Said()
     for line in (
@@ -311,6 +322,7 @@ def test_hostile_lines_are_left_out():
         ('import time; time.sleep(60)', 0.5, 'it was ended after'),
         ('while True: print("x" * 100_000)', 60, 'it said too much'),
         ('raise SystemExit("no such image")', 60, 'it could not be judged: no such image'),
+        ('print(\'{"begin": true}\', flush=True); exit(9)', 60, 'it was ended: exit status 9'),
     ],
 )
 def test_what_does_not_end_is_ended(monkeypatch, script, limit_s, trouble):
