@@ -41,7 +41,7 @@ class Run:
     moves: list[list[int]]
     time_label: str = 'time since the first publish (s)'
     after_s: float = 0.0
-    opens: str = 'last loss'
+    opens: str = 'last loss'  # else at its end
 
     styles = ()
 

@@ -129,7 +129,7 @@ class LiveView:
             f'<div class="replay replay-on robot-live">{style(DRIVE_CSS)}{CONTROLS}'
             f'<p class="replay-says">{escape(event)}</p><div class="replay-runs">'
             '<div class="replay-floor">'
-            f'<div role="img" aria-label="{escape(floor_in_words(record.floor))}">{svg}</div>'
+            f'<span role="img" aria-label="{escape(floor_in_words(record.floor))}">{svg}</span>'
             f'{_row("time", f"{now.t_s:.2f} s")}{_row("robot", speeds(now.v, now.w))}'
             f'{_row("told", told)}</div>{self._queue(now.t_s)}</div>'
             f'<p>A drive on the floor {escape(record.floor.name)}.</p></div>'

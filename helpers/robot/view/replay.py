@@ -18,7 +18,7 @@ from helpers.robot.view.picture import BEAMS, DRIVE_CSS, Later, floor_in_words, 
 from helpers.robot.view.scans import ScanRecording
 
 # What a notebook keeps of a drive, at most: so it stays below 60 kB.
-POSES, SCANS, COMMANDS, EVENTS = 400, 60, 150, 50
+POSES, SCANS, COMMANDS, EVENTS = 400, 50, 150, 50
 EVERY_S = 0.1  # a pose
 NEAR_M = 2.0  # so near, a robot stands before what it sees
 TIMES = ['published_s', 'started_s', 'finished_s']
