@@ -263,7 +263,7 @@ def test_the_picture_shows_why_messages_wait(threads, group, cause):
     drawn = svg(shown)
     assert set(re.findall('waits, [a-z ]+', drawn)) == {cause}
     assert drawn.count('m-3-3') == table['started_s'].isna().sum()
-    assert ElementTree.fromstring(drawn).get('width') == '480'
+    assert ElementTree.fromstring(drawn).get('width') == '370'
 
 
 def test_two_runs_side_by_side():

@@ -5,7 +5,9 @@ import math
 import re
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import quickjs
 from geometry_msgs.msg import Twist
@@ -29,6 +31,7 @@ from helpers.robot import (
 from helpers.robot.body import Body
 from helpers.robot.record import Command, Event, Scan, Step
 from helpers.robot.sensors import Sensors
+from helpers.robot.view.live import LiveView
 from helpers.ros import ros_session
 
 MOST_BYTES = 60_000
@@ -103,6 +106,50 @@ def test_the_page_shows_where_the_robot_was(script, long_drive):
         # Ten poses a second are kept: at 1 m/s a wall is noticed 5 cm too early or too late.
         assert math.dist((row.x, row.y), (at['x'], at['y'])) < 0.06
         assert abs(math.remainder(row.yaw - at['yaw'], math.tau)) < 0.05
+
+
+def made_drive(*rows, bumps=()):
+    """Return a drive in the corridor, (t, x, v) of each step, and the times of its bumps."""
+    poses = [Step(t_s, x, 1.25, 0.0, v, 0.0) for t_s, x, v in rows]
+    events = [Event(t_s, 'bump', 'It hit something.') for t_s in bumps]
+    return DriveRecord(CORRIDOR, poses=poses, events=events)
+
+
+@pytest.mark.parametrize(
+    ('record', 'says'),
+    [
+        (made_drive((0, 1, 0.5), (2, 2, 0.5), bumps=[1.24]), 'The robot hit the wall after 1.2 s.'),
+        (made_drive((0, 1, 0.5), (2, 4.08, 0)), 'The robot stands, 0.42 m before the wall.'),
+        (made_drive((0, 1, 0.5), (2, 2, 0.5)), 'Nothing was hit.'),
+        (made_drive((0, 1, 0.5), (2, 1, 0)), 'Nothing was hit.'),
+        (made_drive((0, 1, 0), (2, 1, 0)), 'The robot did not move.'),
+    ],
+)
+def test_how_a_drive_ended_is_a_sentence(record, says):
+    shown = replay_drive(record)
+    assert record_of(shown)['outcome'] == says
+    assert not re.search(r'\d', str(shown))  # that is compared, and times differ from run to run
+
+
+def test_a_picture_without_scripts_is_at_the_bump():
+    record = made_drive((0, 1, 0.5), (2, 2, 0.5), (4, 1, -0.5), bumps=[2])
+    assert (
+        'class="robot" transform="translate(2.000 1.250)"' in replay_drive(record).runs[0].picture()
+    )
+    at_end = replay_drive(record, opens='end')
+    assert 'class="robot" transform="translate(1.000 1.250)"' in at_end.runs[0].picture()
+    assert '"opens":"end"' in unescape(html(at_end))
+
+
+def test_the_live_laser_belongs_to_its_pose():
+    # The scan was made at x 1, and the robot has driven on.
+    record = made_drive((0, 1, 0.5), (2, 2, 0.5))
+    ranges = np.full(181, 0.5, np.float32)
+    record.scans.append(Scan(0, 0.0, 0, ranges, -math.pi / 2, math.pi / 180))
+    robot = SimpleNamespace(record=record)
+    drawn = LiveView(robot, None).html()
+    assert re.search(r'class="fan" d="M1\.00 1\.25L', drawn)
+    assert 'class="robot" transform="translate(2.000 1.250)"' in drawn
 
 
 # Beside the queue

@@ -2,8 +2,9 @@
 
 A replay is an output of a cell: a sentence and a picture, and a script that makes them something to
 step through. The script needs neither a kernel nor the network. If a page does not run it, as in
-a notebook that JupyterLab does not trust yet, the picture stays. In a level the learner is the
-executor, and free play draws the prediction of any numbers.
+a notebook that JupyterLab does not trust yet, the picture stays. It opens where it tells most: at
+the bump of a drive or its end, else at the last loss, else at the end. In a level the learner is
+the executor, and free play draws the prediction of any numbers.
 
 model.js decides what may happen, view.js shows it.
 """

@@ -3,7 +3,7 @@
 
 const ROWS = 120; // at most
 const [RIGHT, LINE, LETTER] = [14, 20, 7.6]; // pixels; letters are about so wide
-const [WIDTH, BESIDE] = [480, 350]; // alone, and beside another: so its letters are never tiny
+const WIDTH = 370; // so letters have 12 pixels on a phone, too
 // Why a message waits, and a callback, as model.js calls it: dashes, and the legend's words.
 const WAITS = {
   '': ['', 'waits, a thread is free'],
@@ -26,7 +26,7 @@ function lastLoss(run) {
 
 // Return the picture of each run, of the same span of seconds, all on one scale. The cursor stands at
 // a time, else at the last loss, else at the end.
-function pictures(runs, span, at, beside) {
+function pictures(runs, span, at) {
   const losses = runs.map(lastLoss).filter(loss => loss !== undefined);
   const cursor = at ?? (losses.length ? Math.max(...losses) : span[1]);
   const seen = runs.map(run => {
@@ -40,15 +40,15 @@ function pictures(runs, span, at, beside) {
   const rows = Math.max(1, ...seen.map(({ messages }) => messages.length));
   const left = Math.max(36, 12 + LETTER * longest);
   // Pictures beside each other have legends of one height.
-  const draw = least => seen.map(run => picture(run, span, rows, left, cursor, beside ? BESIDE : WIDTH, least));
+  const draw = least => seen.map(run => picture(run, span, rows, left, cursor, least));
   const least = Math.max(...draw(0).map(([, legend]) => legend));
   return draw(least).map(([svg]) => svg);
 }
 
-function picture({ messages, names, time }, [from, until], rows, left, cursor, width, least) {
+function picture({ messages, names, time }, [from, until], rows, left, cursor, least) {
   const step = Math.max(1.7, Math.min(15, 200 / rows));
   const bottom = step * rows;
-  const wide = width - left - RIGHT;
+  const wide = WIDTH - left - RIGHT;
   const x = at => +(left + wide * (Math.max(at, from) - from) / (until - from)).toFixed(1);
   const y = row => +(step * (row + 0.5)).toFixed(1);
   const path = (d, colour, width, dashes = '') =>
@@ -80,7 +80,7 @@ function picture({ messages, names, time }, [from, until], rows, left, cursor, w
   function add(d, mark, words, ...looks) {
     drawn += path(d, ...looks);
     const needed = Math.round(42 + LETTER * words.length);
-    if (at > RIGHT && at + needed > width) [at, down] = [RIGHT, down + LINE];
+    if (at > RIGHT && at + needed > WIDTH) [at, down] = [RIGHT, down + LINE];
     legend += path(`M${at} ${down - 5}${mark}`, ...looks) + text(words, at + 28, down);
     at += needed;
   }
@@ -108,7 +108,7 @@ function picture({ messages, names, time }, [from, until], rows, left, cursor, w
   axes += text(time, left + wide / 2, bottom + 40, 'middle');
   axes += `<path class="cursor" d="M${left} 0V${bottom}" transform="translate(${+(x(Math.min(cursor, until)) - left).toFixed(1)})" stroke="currentColor" stroke-width="1.5"/>`;
   const [top, height] = [down + 12, down + bottom + 60];
-  return [`<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${width} ${height}" width="${width}" `
+  return [`<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${height}" width="${WIDTH}" `
     + `height="${height}" font-family="system-ui, sans-serif" font-size="14" color="${LOOK.ink}" `
     + `fill="currentColor" preserveAspectRatio="xMinYMin" data-wide="${wide}">${legend}`
     + `<g transform="translate(0 ${top})">${drawn}${axes}</g></svg>`, down];

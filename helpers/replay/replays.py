@@ -41,7 +41,7 @@ class Run:
     moves: list[list[int]]
     time_label: str = 'time since the first publish (s)'
     after_s: float = 0.0
-    opens: str = 'last loss'
+    opens: str = 'last loss'  # else at its end
 
     styles = ()
 
@@ -86,8 +86,7 @@ class Replay:
         of_queues = [run for run in self.runs if run.setup]
         asked = [{**run.record(), 'time': run.time_label} for run in of_queues]
         at_s = max((run.telling_s for run in self.runs if not run.setup), default=None)
-        beside = len(self.runs) > 1
-        drawn = iter(javascript('pictures', asked, span_s, at_s, beside))
+        drawn = iter(javascript('pictures', asked, span_s, at_s))
         figures = ''.join(
             figure(run, next(drawn) if run.setup else run.picture()) for run in self.runs
         )

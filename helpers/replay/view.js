@@ -97,9 +97,8 @@ function show(root, record) {
     speed = (speed + 1) % SPEEDS.length;
     nameSpeed();
   }, undefined, 'replay-rate');
-  const nextLoss = () => losses.find(step => step > position);
   const loss = button('Next loss', () => {
-    const step = fresh ? losses[0] : nextLoss();
+    const step = losses.find(step => fresh || step > position);
     if (step === undefined) says.textContent = 'No message is lost after this.';
     else rest(step);
   });
@@ -109,7 +108,7 @@ function show(root, record) {
 
   function nameSpeed() {
     faster.textContent = `${rate()}×`;
-    faster.setAttribute('aria-label', `speed ${rate()}×`);
+    faster.ariaLabel = `speed ${rate()}×`;
   }
 
   // A text that changes is read out, but not while it changes all the time.
@@ -145,7 +144,7 @@ function show(root, record) {
       const { who } = steps.slice(0, position).findLast(({ told }) => told) ?? {};
       const text = texts[who] ?? (who === undefined ? '' : sentence(who, counts[who][position]));
       // A text that is set again is read out again.
-      const now = (position === last && outcome) || (text ? named(who, text) : 'Nothing has happened yet. Step forward: › or →.');
+      const now = (position === last && outcome) || (text ? named(who, text) : 'Nothing has happened yet. Step: →');
       if (says.textContent !== now) says.textContent = now;
     }
     slider.value = position;
@@ -238,8 +237,7 @@ function show(root, record) {
   function onStop(event) {
     if (position === last) return;
     event.preventDefault();
-    const first = losses[0];
-    rest(first !== position && (fresh || position < first) ? first ?? last : last);
+    rest(losses.slice(0, 1).find(first => first !== position && (fresh || first > position)) ?? last);
   }
 
   wake(root, 'replay');

@@ -18,6 +18,8 @@ ENDLESS = """with ros_session():
     watch(robot)
     while True:
         robot.drive(0.0, 1.0, 1.0)"""
+# A live picture may be replaced while it is looked for: so in one go.
+WIDTH = "() => document.querySelector('.replay-floor svg').getBoundingClientRect().width"
 # How the robot is drawn: each picture has a place and a heading.
 ROBOT = '.robot-live .robot'
 PICTURES = """count => new Promise(resolve => {
@@ -75,16 +77,23 @@ def test_watched_driven_and_replayed(lab):
                 document.querySelector('.robot-live').textContent)"""
         )
     lab.screenshot('robot_by_hand')
+    width = page.evaluate(WIDTH)
+    stopped = place(page)
     page.locator('.by-hand-keys').focus()
     page.keyboard.press('End')
     lab.wait_until_ran(1)
     assert complaints(lab.cells()[1]) == []
     assert page.locator('.robot-live, .by-hand').count() == 0
 
-    # Stepped through with keys.
+    # The replay stays where the robot stopped, as large as it was. Stepped through with keys.
     shown = page.locator('.replay-on')
+    assert page.evaluate(WIDTH) == width
+    assert shown.locator('.robot').get_attribute('transform') == stopped
+    assert shown.get_by_role('button', name='Watch again').is_visible()
     shown.focus()
-    says = shown.locator('[aria-live=polite]')
+    says = shown.locator('.replay-says')
+    assert says.inner_text() == 'Nothing was hit.'
+    page.keyboard.press('Home')
     page.keyboard.press('ArrowRight')
     assert says.inner_text() == 'The robot is told to drive 0.50 m/s.'
     page.keyboard.press('ArrowRight')

@@ -108,7 +108,7 @@ function floor(run, record, svg) {
     return run.says(position);
   }
 
-  const node = element('div', { class: 'replay-floor' }, svg,
+  const node = element('div', { class: 'replay-floor' }, ...(record.name ? [element('b', {}, record.name)] : []), svg,
     row('time', time), row('robot', robot), row('told', told));
   draw.always = true; // also between two steps
   return { node, draw };

@@ -12,7 +12,7 @@ from helpers.replay import Replay, style
 from helpers.robot.floor import Pose
 from helpers.robot.robot import Robot
 from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
-from helpers.robot.view.replay import bumps, outcome, place, replay_drive
+from helpers.robot.view.replay import bumps, outcome, place, replay_drive, seconds
 from helpers.robot.view.scans import ScanRecording
 from helpers.ros import current_session
 
@@ -113,10 +113,14 @@ class LiveView:
             Pose(now.x, now.y, now.yaw),
             scans[-1] if scans else None,
             [place(record, bump.t_s) for bump in hit],
+            seconds(record, now.t_s),
             scan_pose=place(record, scans[-1].t_s) if scans else None,
             ring_s=now.t_s - hit[-1].t_s if hit else None,
         )
-        told = speeds(*commands[-1][1:]) if commands else 'nothing yet'
+        told = 'nothing yet'
+        if commands:
+            _, v, w = commands[-1]
+            told = f'{v:.2f} m/s' + (f' and {w:.2f} rad/s' if w else '')
         news = record.events[-1:]
         event = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
         if hit:
@@ -125,9 +129,10 @@ class LiveView:
             f'<div class="replay replay-on robot-live">{style(DRIVE_CSS)}{CONTROLS}'
             f'<p class="replay-says">{escape(event)}</p><div class="replay-runs">'
             '<div class="replay-floor">'
-            f'<div role="img" aria-label="{escape(floor_in_words(record.floor))}">{svg}</div>'
-            f'{_row("time", f"{now.t_s:.1f} s")}{_row("robot", speeds(now.v, now.w))}'
-            f'{_row("told", told)}</div>{self._queue(now.t_s)}</div></div>'
+            f'<span role="img" aria-label="{escape(floor_in_words(record.floor))}">{svg}</span>'
+            f'{_row("time", f"{now.t_s:.2f} s")}{_row("robot", speeds(now.v, now.w))}'
+            f'{_row("told", told)}</div>{self._queue(now.t_s)}</div>'
+            f'<p>A drive on the floor {escape(record.floor.name)}.</p></div>'
         )
 
     def _queue(self, now_s: float) -> str:
@@ -141,7 +146,7 @@ class LiveView:
         ]
         waiting = ''.join(f'<li><b>{seq}</b></li>' for seq in waits)
         busy = busy or ['<li class="replay-free">free</li>']
-        rows = _row('time', f'{now_s:.1f} s') + _row('callback', *busy) + _row('queue', waiting)
+        rows = _row('time', f'{now_s:.3f} s') + _row('callback', *busy) + _row('queue', waiting)
         return f'<div class="replay-run">{rows}</div>'
 
 

@@ -22,7 +22,7 @@ from helpers.robot.sensors import RANGE_MAX
 
 WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor
-BEAMS = 61  # of a scan, in a picture
+BEAMS = 40  # of a scan, in a picture
 WALL_M = 0.15  # of an outer wall
 RING, RING_S = 30, 0.4  # pixels, and how long: around a bump, as drive.js draws it
 DRIVE_CSS = Path(__file__).with_name('drive.css')

@@ -14,14 +14,13 @@ from helpers.replay import Replay, replay
 from helpers.robot.floor import Pose
 from helpers.robot.record import DriveRecord, Event, Scan
 from helpers.robot.sensors import RANGE_MAX
-from helpers.robot.view.picture import DRIVE_CSS, Later, floor_in_words, floor_picture
+from helpers.robot.view.picture import BEAMS, DRIVE_CSS, Later, floor_in_words, floor_picture
 from helpers.robot.view.scans import ScanRecording
 
 # What a notebook keeps of a drive, at most: so it stays below 60 kB.
-POSES, SCANS, COMMANDS, EVENTS = 400, 60, 150, 50
+POSES, SCANS, COMMANDS, EVENTS = 400, 50, 150, 50
 EVERY_S = 0.1  # a pose
 NEAR_M = 2.0  # so near, a robot stands before what it sees
-BEAMS = 46  # of a scan
 TIMES = ['published_s', 'started_s', 'finished_s']
 TIME_LABEL = "time since the robot's start (s)"
 
@@ -70,9 +69,7 @@ class Drive:
         pose = place(record, now)
         before = [scan for scan in record.scans if scan.t_s <= now + 1e-9]
         hits = [(bump.t_s <= now + 1e-9, place(record, bump.t_s)) for bump in bumps(record)]
-        dots = [
-            (second <= now, place(record, second)) for second in range(min(int(end), POSES) + 1)
-        ]
+        dots = [(second <= now, pose) for second, pose in enumerate(seconds(record, end))]
         return floor_picture(
             record.floor,
             [*points[: int(now / step) + 1], pose[:2]],
@@ -186,6 +183,11 @@ def rays(scan: Scan) -> tuple[float, float, list[int]]:
     angles, ranges = scan.drawn(BEAMS, RANGE_MAX)
     whole = (100 * ranges).round().astype(int).tolist()
     return round(float(angles[0]), 4), round(float(angles[-1]), 4), whole
+
+
+def seconds(record: DriveRecord, end_s: float) -> list[Pose]:
+    """Return where the robot was in each second until `end_s`."""
+    return [place(record, second) for second in range(min(int(end_s), POSES) + 1)]
 
 
 def place(record: DriveRecord, t_s: float) -> Pose:
