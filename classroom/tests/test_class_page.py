@@ -116,7 +116,7 @@ def test_a_guess_is_shown_until_it_is_compared(opened):
     for step, questions in enumerate([[], [QUESTION, OTHER], [QUESTION]]):
         opened.go(step)
         assert [one['question'] for one in opened.view()['guesses']] == questions
-    assert opened.bars() == {'41': 1}
+    assert opened.bars() == {'14': 0, '41': 1}
     assert opened.view()['guesses'][0]['cells'] == [STEP, LATER]
     opened.go(1)
     assert opened.bars(OTHER) == {}
