@@ -45,7 +45,7 @@ raise_hand()
     assert [hand['name'] for hand in view['hands']] == ['Ada']
     [task] = view['tasks']
     assert (task['solved'], task['tried']) == (1, 0)
-    assert opened.bars() == {'9': 1}
+    assert opened.bars() == {'9': 1, '14': 0}
     assert opened.view()['guesses'][0]['measured'] == ['14']
     assert opened.events() == [
         ('guess', QUESTION, 7),
