@@ -18,7 +18,7 @@ ASKED = [
     (name, lesson)
     for lesson in LESSONS.values()
     for cell in lesson.notebook.cells
-    for name in sorted(recalled(cell.source) if cell.cell_type == 'code' else ())
+    for name in sorted((cell.cell_type == 'code' and recalled(cell.source)) or ())
 ]
 
 

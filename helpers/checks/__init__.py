@@ -2,7 +2,7 @@
 
 from helpers.checks.classroom import guess, join_class, leave_class, lower_hand, raise_hand
 from helpers.checks.guesses import compare_prediction
-from helpers.checks.memory import remember
+from helpers.checks.memory import questions, remember
 
 __all__ = [
     'compare_prediction',
@@ -10,6 +10,7 @@ __all__ = [
     'join_class',
     'leave_class',
     'lower_hand',
+    'questions',
     'raise_hand',
     'remember',
 ]

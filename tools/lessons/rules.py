@@ -12,7 +12,7 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
-from helpers.checks.memory import questions
+from helpers.checks import questions
 from helpers.checks.verdict import KEY
 from tools.lessons.code import given_away, guess_of, names_of, recalled
 from tools.lessons.comparison import comment_markers, metadata_tags
