@@ -115,7 +115,7 @@ class ClassStore:
         return refused
 
     def remove(self, lesson: str, question: str, answer: str) -> None:
-        """Take an answer that the page shows out of sight, whoever has given it."""
+        """Take an answer that the page shows out of sight, of all students who gave it."""
         self.removed.setdefault((lesson, question), set()).add(_key(_plain(answer)))
 
     def lower(self, seat: int) -> None:
@@ -195,12 +195,13 @@ class ClassStore:
         found = {'question': question, 'cells': cells, 'answered': len(answers)}
         if (lesson, question) not in self.shown:  # what is hidden does not leave the server
             return found | {'shown': False}
-        measured = [value for *_, value in self._latest('outcome', lesson, question)]
+        outcomes = [value for *_, value in self._latest('outcome', lesson, question)]
+        measured = [value for value, _ in _counted(outcomes)][:MEASURED]
         return found | {
             'shown': True,
-            'bars': bars(answers, [value for value, _ in _counted(measured)][:MEASURED]),
-            'measured': [label(value) for value, _ in _counted(measured)][:MEASURED],
-            'by': len(measured),
+            'bars': bars(answers, measured),
+            'measured': [label(value) for value in measured],
+            'by': len(outcomes),
         }
 
     def _task(self, lesson: str, number: int, seats: int) -> dict:

@@ -8,11 +8,10 @@ from __future__ import annotations
 import argparse
 import sys
 
-import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.utilities import remove_ros_args
 
 from helpers.fusion.nodes import EkfNode, NavSatNode
+from helpers.ros import run_program
 
 # The name of a node whose launch file gives it none, as in robot_localization.
 PROGRAMS = {
@@ -26,15 +25,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog='python -m helpers.fusion', description=__doc__)
     parser.add_argument('program', choices=PROGRAMS)
     options = parser.parse_args(remove_ros_args(sys.argv)[1:])
-    rclpy.init(args=sys.argv)
     try:
-        rclpy.spin(PROGRAMS[options.program]())
+        run_program(PROGRAMS[options.program])
     except (KeyError, ValueError) as error:  # a parameter that is missing, or wrong
         sys.exit(f'{options.program}: {error}')
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass  # the end that was asked for
-    finally:
-        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

@@ -7,12 +7,11 @@ import json
 import sys
 from pathlib import Path
 
-import rclpy
-from rclpy.executors import ExternalShutdownException
 from rclpy.utilities import remove_ros_args
 
 from helpers.robot import FLOORS, Floor, Robot
 from helpers.robot.drivers import DRIVERS
+from helpers.ros import run_program
 
 
 def main() -> None:
@@ -45,17 +44,16 @@ def main() -> None:
         floor = FLOORS.get(options.floor) or Floor.from_text(Path(options.floor).read_text())
     except (OSError, ValueError) as error:
         parser.error(str(error))
-    rclpy.init(args=sys.argv)
-    try:
+
+    def make_robot() -> Robot:
         robot = Robot(floor, seed=options.seed, mounting=mounting, driver=driver, spin=False)
         print(f'The robot drives on the floor {floor.name}.', flush=True)
-        rclpy.spin(robot)
+        return robot
+
+    try:
+        run_program(make_robot)
     except ValueError as error:
         parser.error(str(error))
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass  # the end that was asked for
-    finally:
-        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

@@ -124,19 +124,13 @@ def laser_scan(header: Header, scan: Scan, driver: Driver) -> LaserScan:
 def battery(header: Header, t_s: float, driver: Driver) -> BatteryState:
     """Return the battery's state: it is empty after two and a half hours."""
     left = max(0.0, 1 - t_s / LASTS_S)
-    if driver.battery_percent:
-        voltage = EMPTY_V + left * (FULL_V - EMPTY_V)
-        return BatteryState(
-            header=header,
-            present=True,
-            percentage=100 * left,
-            voltage=voltage,
-            design_capacity=CAPACITY_AH,
-        )
-    message = BatteryState(header=header, present=True, percentage=left)
+    message = BatteryState(header=header, present=True, design_capacity=CAPACITY_AH)
     message.voltage = EMPTY_V + left * (FULL_V - EMPTY_V)
+    message.percentage = 100 * left if driver.battery_percent else left
+    if driver.battery_percent:  # such a driver says no more
+        return message
     message.charge, message.current = CAPACITY_AH * left, -CAPACITY_AH * 3600 / LASTS_S
-    message.capacity = message.design_capacity = CAPACITY_AH
+    message.capacity = CAPACITY_AH
     message.temperature = math.nan  # not measured
     message.power_supply_status = BatteryState.POWER_SUPPLY_STATUS_DISCHARGING
     message.power_supply_technology = BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO

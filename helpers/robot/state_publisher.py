@@ -9,14 +9,12 @@ import contextlib
 import io
 import sys
 
-import rclpy
 from geometry_msgs.msg import TransformStamped
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from urdf_parser_py.urdf import URDF
 
-from helpers.ros import quaternion
+from helpers.ros import quaternion, run_program
 
 
 class StatePublisher(Node):
@@ -53,15 +51,10 @@ def _transform(joint) -> TransformStamped:
 
 def main() -> None:
     """Run until Ctrl+C."""
-    rclpy.init(args=sys.argv)
     try:
-        rclpy.spin(StatePublisher())
+        run_program(StatePublisher)
     except ValueError as error:
         sys.exit(f'robot_state_publisher: {error}')
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass  # the end that was asked for
-    finally:
-        rclpy.try_shutdown()
 
 
 if __name__ == '__main__':

@@ -3,6 +3,7 @@
 from helpers.ros.connections import NOT_OF_A_LESSON, nearly
 from helpers.ros.conversions import START_NS, quaternion, seconds_of, stamp_of, yaw_of
 from helpers.ros.domain import one_process_at_a_time, remove_dead_segments
+from helpers.ros.program import run_program
 from helpers.ros.session import (
     Session,
     current_session,
@@ -27,6 +28,7 @@ __all__ = [
     'quaternion',
     'remove_dead_segments',
     'ros_session',
+    'run_program',
     'seconds_of',
     'stamp_of',
     'yaw_of',

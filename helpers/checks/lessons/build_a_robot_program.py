@@ -561,7 +561,10 @@ def a_program(workspace):
             each(lambda end: not drives(end) or robots[end].stopped, 1)
             return {
                 end: how_it_ended(
-                    robots[end], drives(end), programs[end], by_itself=ended[end] and number
+                    robots[end],
+                    drives(end),
+                    programs[end],
+                    by_itself=ended[end] and number is not None,
                 )
                 for end, number in MAIN_ENDS.items()
             }
@@ -1276,6 +1279,16 @@ def the_whole_node(workspace):
     ]
 
 
+def comes_to_each_place(robot):
+    """Return whether a robot has come to each place of its floor, or else which ones it missed."""
+    missed = [
+        name
+        for name, place in sorted(robot.floor.places.items())
+        if min(math.dist((pose.x, pose.y), place) for pose in robot.record.poses) > 0.5
+    ]
+    return not missed or f'it does not come to {", ".join(missed)}'
+
+
 @tasks.add(13, cpu_s=60, limit_s=90)
 def the_route(workspace):
     tour = once(lambda: round_tour(workspace))
@@ -1293,13 +1306,7 @@ def the_route(workspace):
 
     def every_place():
         drive, _ = tour()
-        poses = drive.robot.record.poses
-        missed = [
-            name
-            for name, place in sorted(ROOMS.places.items())
-            if min(math.dist((pose.x, pose.y), place) for pose in poses) > 0.5
-        ]
-        return not missed or f'it does not come to {", ".join(missed)}'
+        return comes_to_each_place(drive.robot)
 
     hint = 'x - 1.25, y - 1.75 of each place; each number with a point.'
     return [
@@ -1799,15 +1806,9 @@ def a_floor_of_your_own(workspace, file):
 
     def comes_everywhere():
         tour, _ = toured()
-        poses = tour.robot.record.poses
-        missed = [
-            name
-            for name, place in sorted(floor().places.items())
-            if min(math.dist((pose.x, pose.y), place) for pose in poses) > 0.5
-        ]
         if not floor().places:
             return 'the floor has no place with a letter'
-        return not missed or f'it does not come to {", ".join(missed)}'
+        return comes_to_each_place(tour.robot)
 
     def interrupted(by):
         def test():

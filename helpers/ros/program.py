@@ -1,0 +1,24 @@
+"""A node of ours as a program of its own, beside those of a student."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+
+
+def run_program(make_node: Callable[[], Node]) -> None:
+    """Initialize rclpy with the arguments of this process, and spin a node until it is ended.
+
+    Raises what `make_node()` raises. No such program drives a robot, so none sends a stop.
+    """
+    rclpy.init(args=sys.argv)
+    try:
+        rclpy.spin(make_node())
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass  # the end that was asked for
+    finally:
+        rclpy.try_shutdown()
