@@ -42,7 +42,7 @@ function guess({ question, answered, shown: open, bars = [], measured = [], by }
   for (const { label, count, right } of bars) {
     const row = element('li', '', { className: right ? 'right' : '' });
     const bar = element('span', count, { className: 'bar' });
-    bar.style.setProperty('--share', count / answered);
+    bar.style.setProperty('--share', count / Math.max(answered, 1)); // of nobody: 0
     row.append(element('span', `${right ? '✓ ' : ''}${label}`, { className: 'label' }), bar);
     if (count && !right && label !== 'other') {
       const remove = button('×', 'remove', { question, answer: label });

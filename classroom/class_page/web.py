@@ -3,7 +3,8 @@
     POST join, events, leave   of students: helpers/checks/classroom.py documents them
     GET  SECRET/               the instructor's page, its files, and `live`, its changes
     POST SECRET/slide          of the deck, when it goes on: events.SLIDE is what it tells
-    POST SECRET/show, hide, remove, go, lower, ...      the buttons of the page
+    POST SECRET/show, hide, remove, go, lower, forget, end
+                               the buttons of the page
 
 The instructor's page is below a secret. It asks for nothing again and again: the server sends it
 each change as a server-sent event, at most four times a second.
