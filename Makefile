@@ -1,103 +1,109 @@
 # `make help` lists the commands. environment.md says what is installed, and why.
 
-help: ## show this list
-	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 23
+## Learn
 
-lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, OUTPUTS=yes (those of the repository), LAB_ARGS=... change how
+help: ## show this list; capitals are options, as in `make lab PORT=8890`
+	@sed -n 's/^## \(.*\)/\n\1/p; s/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 23
+
+lab: set_up ## open JupyterLab on the first notebook: PORT=8890, BROWSER=no, OUTPUTS=yes (saved ones)
 	@exec $(PYTHON) -m tools.lab $(if $(filter yes,$(OUTPUTS)),--outputs) $(server) -- $(LAB_ARGS)
 
-present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02, or PLAN=90, a timetable; NEW=yes makes it anew
+update: set_up ## bring newer lessons, keep what you have written: FROM=ros2_notebooks.tar.gz
+	@$(PYTHON) -m classroom.update $(if $(FROM),"$(FROM)")
+
+site: set_up ## write the lessons as a web site into site/, to read offline
+	@tools/set_up.sh site
+	@$(PYTHON) -m tools.site
+
+lab-container: ## open the lessons in a container: PORT=8890, LESSONS=FOLDER for your notebooks
+	@classroom/container/run.sh lab
+
+clean: ## remove the environment, caches and what lessons built; what you wrote stays
+	if [ -d .jupyter ]; then find .jupyter -mindepth 1 -maxdepth 1 ! -name hub -exec rm -rf {} +; fi
+	rm -rf .venv .uv scratch handout site .site .hypothesis .pytest_cache .ruff_cache
+	find . \( -name .git -o -path ./my_lessons -o -path ./presentation -o -path ./.jupyter/hub \) -prune -o \
+		\( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
+
+## Teach
+
+present: set_up ## show lessons as slides whose cells run: LESSON=02, PLAN=90 (a timetable), NEW=yes
 	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" $(if $(filter yes,$(NEW)),--new) \
 		$(server) -- $(LAB_ARGS)
 
-class: set_up ## see the guesses of a class as they come: LAN=yes lets students join over the network; PORT=8765, BROWSER=no
+class: set_up ## see the guesses of a class as they come: LAN=yes lets students join; PORT=8765, BROWSER=no
 	@exec $(PYTHON) -m classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
 
-test: set_up ## the course: style, tests of the helpers, every notebook compared with its saved outputs; LESSON=02 for one
+handout: set_up ## write a student's edition: SOLUTIONS=no, OFFLINE=yes (with packages, PYTHONS="3.11 3.12")
+	@$(PYTHON) -m classroom.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
+		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
+
+grade: set_up ## judge what students hand in: FOLDER=submissions, LESSON=02, JOBS=2; see teaching.md
+	@$(PYTHON) -m classroom.grade "$(or $(FOLDER),submissions)" --lesson "$(LESSON)" --seed "$(SEED)" --assignment "$(ASSIGNMENT)" \
+		$(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
+
+hub: ## run a JupyterHub for a class: CONTAINERS=yes, HUB_ARGS=...; see classroom/HOSTING.md
+	@classroom/hub/set_up.sh
+	@exec $(PYTHON) -m classroom.hub $(if $(filter yes,$(CONTAINERS)),--containers) -- $(HUB_ARGS)
+
+image: ## build the container image of the lessons: BASE=..., CONTAINER=..., IMAGE_ARGS=...
+	@classroom/container/run.sh image
+
+## Contribute
+
+test: set_up ## test the course, each notebook against its saved outputs: LESSON=02 for one
 	@answers="extend-exclude=[$$($(PYTHON) -m tools.lessons.answers)]" && \
 		.venv/bin/ruff check --config "$$answers" && .venv/bin/ruff format --check --config "$$answers"
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(lesson) $(PYTEST_ARGS)
 
-test-ros2: set_up ## the `ros2` command, a package of its own in ros2/
+notebooks: set_up ## run the notebooks, save their outputs and the tables that follow: LESSON=02 for one
+	@$(PYTHON) -m tools.lessons.run $(LESSON)
+
+lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04; REMOVE=yes takes it out
+	@$(PYTHON) -m tools.lessons.new "$(NAME)" $(if $(AFTER),--after "$(AFTER)") $(if $(filter yes,$(REMOVE)),--remove)
+
+lint: set_up ## check style and format with ruff
+	@.venv/bin/ruff check && .venv/bin/ruff format --check
+
+test-ros2: set_up ## test the `ros2` command
 	@$(PYTHON) -m pytest -n 2 --dist loadscope --max-worker-restart 0 -o faulthandler_timeout=600 ros2 $(PYTEST_ARGS)
 
-test-tools: set_up ## the tools: an installation from nothing, a new lesson, two machines
+test-tools: set_up ## test an installation from nothing, a new lesson, two machines
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/tools $(PYTEST_ARGS)
 
-test-packages: set_up ## each package that a learner ends with, where only what it names is installed; LESSON="09 12"
+test-packages: set_up ## build and test the packages that learners end with: LESSON="09 12"
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/packages $(lesson) $(PYTEST_ARGS)
 
-test-answers: set_up ## each check of the lessons judges the answers in tests/answers; it takes half an hour; LESSON=02 TASK=3
+test-answers: set_up ## let each check judge the answers in tests/answers: LESSON=02, TASK=3
 	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(if $(TASK),-k "$(shell printf task_%02d $(TASK))") $(PYTEST_ARGS)
 
-test-browser: ## the real JupyterLab and the site in Chromium, as students use them; it takes minutes
+test-browser: ## test JupyterLab and the site in Chromium
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/browser $(PYTEST_ARGS)
 
-test-classroom: ## slides, notes and class page; then a class of 12 on a JupyterHub, and the container; it takes minutes
+test-classroom: ## test slides, class page, grading, hub and container
 	@tools/set_up.sh browser && { classroom/hub/set_up.sh || echo 'LEFT OUT: the hub.'; }
 	@failed=0; \
 	$(PYTHON) -m pytest -n 2 $(slow) --ignore classroom/tests/hub classroom/tests $(PYTEST_ARGS) || failed=$$?; \
 	$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 classroom/tests/hub $(PYTEST_ARGS) || failed=$$?; \
 	exit $$failed
 
-image: ## a container image of the lessons, with podman or docker: BASE=, CONTAINER=, IMAGE_ARGS=... change how
-	@classroom/container/run.sh image
-
-lab-container: ## the lessons in a container of that image, your notebooks in my_lessons/: PORT=8890, LESSONS=FOLDER
-	@classroom/container/run.sh lab
-
-hub: ## a JupyterHub for a class on this machine; CONTAINERS=yes, HUB_ARGS=... change how. See classroom/HOSTING.md
-	@classroom/hub/set_up.sh
-	@exec $(PYTHON) -m classroom.hub $(if $(filter yes,$(CONTAINERS)),--containers) -- $(HUB_ARGS)
-
-handout: set_up ## a student's edition as one archive: SOLUTIONS=no leaves the solutions out, OFFLINE=yes (PYTHONS="3.11 3.12") adds the packages
-	@$(PYTHON) -m classroom.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
-		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
-
-grade: set_up ## judge what students hand in, in a container: FOLDER=submissions, as Moodle or Canvas gives it; LESSON=02, JOBS=2. See teaching.md
-	@$(PYTHON) -m classroom.grade "$(or $(FOLDER),submissions)" --lesson "$(LESSON)" --seed "$(SEED)" --assignment "$(ASSIGNMENT)" \
-		$(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
-
-update: set_up ## get newer lessons, keep what you have written; FROM=ros2_notebooks.tar.gz names a newer archive
-	@$(PYTHON) -m classroom.update $(if $(FROM),"$(FROM)")
-
-notebooks: set_up ## run all notebooks, save their outputs, and write what follows from them; LESSON=02 for one
-	@$(PYTHON) -m tools.lessons.run $(LESSON)
-
-lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04 puts it behind that one; REMOVE=yes takes it out
-	@$(PYTHON) -m tools.lessons.new "$(NAME)" $(if $(AFTER),--after "$(AFTER)") $(if $(filter yes,$(REMOVE)),--remove)
-
-site: set_up ## write the lessons and documents as a web site into site/, which needs no network
-	@tools/set_up.sh site
-	@$(PYTHON) -m tools.site
-
-soak: set_up ## before a release, as root: run the notebooks in hard conditions; CONDITIONS="idle busy" LESSON=02
+soak: set_up ## run the notebooks in hard conditions, as root: CONDITIONS="idle busy", LESSON=02
 	@tests/soak/run.sh "$(CONDITIONS)" "$(LESSON)"
 
-bench: set_up ## measure what things cost, on an idle machine, against what they could; ONLY="20 200" for some rates
+bench: set_up ## measure what things cost, on an idle machine: ONLY="20 200" for some rates
 	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks $(ONLY)
 	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks.start
 
-release: set_up ## make handout, site and image of a tagged commit, and say what to publish where
-	@tools/release.sh
-
-lint: set_up ## ruff: style and format of all modules and notebooks
-	@.venv/bin/ruff check && .venv/bin/ruff format --check
-
-lock: ## write tools/locks from pyproject.toml; UPGRADE=yes takes newer versions
+lock: ## write tools/locks from pyproject.toml: UPGRADE=yes takes newer versions
 	@tools/lock.sh $(if $(filter yes,$(UPGRADE)),--upgrade)
 
-licences: set_up ## the licence that each installed package names
+licences: set_up ## list the licence that each installed package names
 	@.venv/bin/pip-licenses --from=mixed --with-system --order=license
 	@echo 'Unknown above, named in package.xml: the packages of ROS 2.'
 	@sed -n 's/.*<license[^>]*>\([^<]*\).*/\1/p' .venv/share/*/package.xml | sort | uniq -c
 
-clean: ## remove the environment, JupyterLab's state, caches and what lessons built; students' files stay
-	if [ -d .jupyter ]; then find .jupyter -mindepth 1 -maxdepth 1 ! -name hub -exec rm -rf {} +; fi
-	rm -rf .venv .uv scratch handout site .site .hypothesis .pytest_cache .ruff_cache
-	find . \( -name .git -o -path ./my_lessons -o -path ./presentation -o -path ./.jupyter/hub \) -prune -o \
-		\( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
+release: set_up ## make handout, site and image of a tagged commit, and say what to publish
+	@tools/release.sh
 
 set_up:
 	@mkdir -p .jupyter && tools/set_up.sh $(groups)
