@@ -2,7 +2,7 @@
 
 ## Learn
 
-help: ## show this list; capitals are options, as in `make lab PORT=8890`
+help: ## show this list. Capitals are options: make lab PORT=8890
 	@sed -n 's/^## \(.*\)/\n\1/p; s/^\([a-z0-9-]*\):.*## /  make \1	/p' Makefile | expand -t 23
 
 lab: set_up ## open JupyterLab on the first notebook: PORT=8890, BROWSER=no, OUTPUTS=yes (saved ones)

@@ -98,7 +98,7 @@ def test_its_commands_work(archive):
     # Without what a `make` around the tests would add.
     make = ['make', '--no-print-directory']
     said = subprocess.run([*make, 'help'], cwd=archive, capture_output=True, text=True).stdout
-    assert re.findall(r'make ([a-z]+)', said)[:3] == ['help', 'lab', 'update']
+    assert re.findall(r'^  make ([a-z]+)', said, re.M) == ['help', 'lab', 'update']
     assert 'OUTPUTS' not in said
     assert 'pytest' not in (archive / 'Makefile').read_text()
     assert len(said.splitlines()) == 3
