@@ -9,7 +9,7 @@ fail() {
 
 version=$(sed -n "s/^version = '\(.*\)'/\1/p" pyproject.toml)
 [ -z "$(git status --porcelain)" ] || fail 'Some files are not committed: commit them, or put them aside with `git stash --all`.'
-[[ "$(sed -n 's/^## //p' CHANGELOG.md | head -n 1)" == "$version, "20[0-9][0-9]-[0-9][0-9]-[0-9][0-9] ]] ||
+sed -n '/^## /{p;q}' CHANGELOG.md | grep -qx "## $version, 20[0-9][0-9]-[0-9][0-9]-[0-9][0-9]" ||
     fail "CHANGELOG.md does not begin with \`## $version, YYYY-MM-DD\`, the version of pyproject.toml: say there what has changed."
 [ "$(git tag --points-at HEAD --list "v$version")" ] ||
     fail "This commit has no tag v$version. After \`make test\` has passed: git tag -a v$version -m $version"
