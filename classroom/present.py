@@ -6,12 +6,14 @@
 A copy in which something was typed or run is kept, and the deck says so.
 """
 
+import os
 import sys
 from pathlib import Path
 
 from jupyter_core.paths import jupyter_config_dir
 
 from classroom.deck.copies import FOLDER, Copies
+from helpers.workspace import BEGIN_EMPTY
 from tools.lab import open_lab, parser
 from tools.lessons import lesson
 
@@ -49,6 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(copies.folder / path.name, state, file=sys.stderr)
     for file in Path(jupyter_config_dir(), 'lab', 'workspaces').glob('present-*'):
         file.unlink()
+    os.environ[BEGIN_EMPTY] = 'yes'  # a lesson is shown from its start, also the second time
     open_lab(
         options,
         f'lab/workspaces/present/tree/{FOLDER}/{wanted[0].name}',

@@ -3,6 +3,7 @@
 import ctypes
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -514,17 +515,76 @@ def test_a_terminal_starts_clean_in_the_workspace(other, monkeypatch):
     assert 'not a git repository' in other.terminal('rm -rf src/.git; cd src; git status')
 
 
-def test_a_new_workspace_is_empty_and_ignored(other):
+def test_a_run_without_a_person_begins_empty(other):
     other.write('src/a/b.txt', 'text')
     other.write('build/made.txt', 'text')
     again = Workspace(other.path.name)
     assert again.path == other.path
     assert list(again.path.rglob('*')) == [again.path / 'src']
-    before = again.path.with_name(f'{again.path.name}.before')
-    assert (before / 'src/a/b.txt').read_text() == 'text'
-    assert not (before / 'build').exists()
     if again.path.is_relative_to(ROOT) and (ROOT / '.git').exists():
         subprocess.run(['git', 'check-ignore', '-q', again.path], cwd=ROOT, check=True)
+
+
+@pytest.fixture
+def mine(built, watched):
+    """Return the workspace of a person, and leave nothing of it."""
+    workspace = Workspace('test_workspace_person')
+    yield workspace
+    workspace.close()
+    for folder in workspace.path.parent.glob(f'{workspace.path.name}*'):
+        shutil.rmtree(folder)
+
+
+@pytest.fixture
+def watched(monkeypatch):
+    monkeypatch.setattr('helpers.workspace.workspace.somebody_watches', lambda: True)
+
+
+def test_a_person_finds_the_workspace_as_it_was_left(mine, capsys):
+    mine.write('src/a.py', 'import os\n', part=1)
+    mine.write('src/a.py', 'def main():\n', part=2)
+    mine.file('src/by_hand.txt').write_text('text')
+    mine.write('install/made.txt', 'text')
+    again = Workspace(mine.path.name)
+    assert 'as you left them: 2 files in scratch/' in capsys.readouterr().out
+    assert again.file('src/by_hand.txt').read_text() == 'text'
+    assert again.file('install/made.txt').exists()
+    again.write('src/a.py', 'def run():\n', part=2)
+    assert again.file('src/a.py').read_text() == 'import os\n\n\ndef run():\n'
+
+
+def test_to_begin_anew_keeps_a_copy_each_time(mine, capsys):
+    for text in ('one', 'two'):
+        mine.write('src/a.txt', text)
+        mine.begin_anew()
+        assert not mine.file('src/a.txt').exists()
+    mine.begin_anew()
+    first, second, nothing = capsys.readouterr().out.splitlines()
+    name = f'scratch/{mine.path.name}.before'
+    assert first.endswith(f'1 file and what was built are gone from it. A copy is in {name}_1.')
+    assert second.endswith(f'{name}_2.')
+    assert nothing.endswith('There was nothing in it.')
+    for number, text in ((1, 'one'), (2, 'two')):
+        kept = mine.path.with_name(f'{mine.path.name}.before_{number}')
+        assert (kept / 'src/a.txt').read_text() == text
+
+
+def test_a_run_without_a_person_puts_aside_what_one_has_left(mine, monkeypatch):
+    mine.write('src/a.txt', 'text')
+    monkeypatch.setattr('helpers.workspace.workspace.somebody_watches', lambda: False)
+    again = Workspace(mine.path.name)
+    assert not again.file('src/a.txt').exists()
+    kept = again.path.with_name(f'{again.path.name}.before_1')
+    assert (kept / 'src/a.txt').read_text() == 'text'
+
+
+def test_an_edit_outside_of_a_cell_is_kept(mine, capsys):
+    mine.write('src/a.txt', 'cell')
+    mine.file('src/a.txt').write_text('editor')
+    mine.write('src/a.txt', 'cell')
+    assert mine.file('src/a.txt').read_text() == 'cell'
+    assert mine.file('edited/src/a.txt').read_text() == 'editor'
+    assert 'kept in edited/src/a.txt' in capsys.readouterr().out
 
 
 def test_two_kernels_do_not_share_a_folder():

@@ -19,9 +19,10 @@ from helpers.workspace.build_output import BuildResult, lines_that_matter, witho
 from helpers.workspace.processes import Process
 from helpers.workspace.tf2_msgs import provide_tf2_msgs
 from helpers.workspace.wheels import fix_wheels
-from helpers.workspace.workspace import COLLEAGUE, SMALL_RCLCPP, Workspace
+from helpers.workspace.workspace import BEGIN_EMPTY, COLLEAGUE, SMALL_RCLCPP, Workspace
 
 __all__ = [
+    'BEGIN_EMPTY',
     'COLLEAGUE',
     'SMALL_RCLCPP',
     'BuildResult',

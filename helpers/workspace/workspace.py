@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
+import json
 import os
 import re
 import shutil
@@ -34,18 +36,30 @@ COLLEAGUE = Path(__file__).with_name('colleague.sh')
 TERMINAL_LIMIT_S = 60.0  # of the commands in a terminal that closes
 CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
 
-EMPTY_AGAIN = 'The workspace is empty again: run the cells below this one again, too. '
-EMPTY_AGAIN += 'What was in it is in {}.'
+# What the cells of a lesson have written, in a workspace: each file with its parts.
+WRITTEN = '.written.json'
+# Marks the workspace of a person: another run puts it aside, and removes nothing.
+OWNED = '.owned'
+BUILT = ('build', 'install', 'log')  # by colcon
+# Set by a program that shows lessons from their start, such as slides: begin each workspace empty.
+BEGIN_EMPTY = 'ROS2_NOTEBOOKS_BEGIN_EMPTY'
+
+AS_LEFT = 'Your files are as you left them: {} in {}. To begin with an empty workspace: '
+AS_LEFT += '`workspace.begin_anew()`. It keeps a copy.'
+EMPTY = 'The workspace is empty: run the cells below its own again. {}'
 
 _open_workspace: Workspace | None = None
 
 
 class Workspace:
-    """A colcon workspace of this notebook, empty when it is made: `Workspace('lesson_09')`.
+    """A colcon workspace of this notebook: `Workspace('lesson_09')`.
 
-    It is in the folder `scratch` of this checkout, which git ignores. If another kernel has a
-    workspace of this name, another folder is taken. `path` is the folder; all paths that this class
-    takes and prints are relative to it. `terminals` are those that `start` has opened, by name.
+    It is in the folder `scratch` of this checkout, which git ignores. A person finds it as it was
+    left; `begin_anew` empties it. A run without a person, as in CI, begins with an empty one. If
+    another kernel has a workspace of this name, another folder is taken.
+
+    `path` is the folder; all paths that this class takes and prints are relative to it.
+    `terminals` are those that `start` has opened, by name.
 
     With `underlay`, another workspace that has been built, this one is an overlay of it: it is in
     a folder of the underlay, is built in a terminal that has sourced the underlay, and is closed
@@ -76,18 +90,57 @@ class Workspace:
         self._ran: list[tuple[str, str | Process]] = []  # in terminals
         # What the last sourcing gave, and the state of the folder `install` then.
         self._sourced: tuple[object, dict[str, str]] | None = None
-        self._parts: dict[Path, list[str]] = {}  # of the files that several cells write
+        self._written: dict[str, list[str]] = {}  # by cells: the parts of each file
+        if underlay is not None:
+            self._empty()
+            underlay._overlays[name] = self
+        else:
+            self._open()
+            _open_workspace = self
+        _register_in_ipython()
+
+    def _open(self) -> None:
+        """Go on with what a person has left, or begin with an empty folder."""
+        is_left = somebody_watches() and not os.environ.get(BEGIN_EMPTY)
+        if not is_left:
+            self._put_aside()
+            self._empty()
+        elif files := _files_below(self.path):
+            print(AS_LEFT.format(_count(files), f'{self.path.parent.name}/{self.path.name}'))
+            with contextlib.suppress(OSError, ValueError):
+                self._written = json.loads((self.path / WRITTEN).read_text(encoding='utf-8'))
+        (self.path / 'src').mkdir(parents=True, exist_ok=True)
+        if is_left:
+            (self.path / OWNED).touch()
+
+    def begin_anew(self) -> None:
+        """End what runs in this workspace and empty it. What was in it is kept beside it."""
+        self.close()
+        count = _count(_files_below(self.path))
+        aside = self._put_aside()
+        self._empty()
+        (self.path / OWNED).touch()
+        said = f'{count} and what was built are gone from it. A copy is in {aside}.'
+        print(EMPTY.format(said if aside else 'There was nothing in it.'))
+
+    def _put_aside(self) -> str | None:
+        """Keep a person's files beside the workspace, and return where they are then."""
+        if not (self.path / OWNED).exists() or not _files_below(self.path):
+            return None
         with uninterrupted():  # rmtree makes an OSError of an Interrupt
-            kept = _put_aside(self.path) if underlay is None else None
+            for built in BUILT:
+                shutil.rmtree(self.path / built, ignore_errors=True)
+            names = (f'{self.path.name}.before_{number}' for number in itertools.count(1))
+            aside = next(path for path in map(self.path.with_name, names) if not path.exists())
+            self.path.rename(aside)
+        return f'{aside.parent.name}/{aside.name}'
+
+    def _empty(self) -> None:
+        with uninterrupted():
             shutil.rmtree(self.path, ignore_errors=True)
             (self.path / 'src').mkdir(parents=True)
-        if underlay is None:
-            if kept and somebody_watches():  # a second run without a student prints the same
-                print(EMPTY_AGAIN.format(f'{kept.parent.name}/{kept.name}'))
-            _open_workspace = self
-        else:
-            underlay._overlays[name] = self
-        _register_in_ipython()
+        self._written = {}
+        self._sourced = None
 
     # --- Files ---
 
@@ -109,16 +162,29 @@ class Workspace:
         before it was not written.
         """
         file = self.file(relative_path)
+        name = file.relative_to(self.path).as_posix()
+        parts = self._written.get(name, []) if part is not None else []
+        if part is not None and not 1 <= part <= len(parts) + 1:
+            raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
+        parts = [*parts[: (part or 1) - 1], text, *parts[part or 1 :]]
         with uninterrupted():  # a file of which one half is written would be lost
-            parts = self._parts.pop(file, [])
-            if part is not None:
-                self._parts[file] = parts
-                if not 1 <= part <= len(parts) + 1:
-                    raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
-                parts[part - 1 : part] = [text]
-                text = parts[0] + ''.join(_line_before(each, file) + each for each in parts[1:])
+            self._keep_edited(file, name)
             file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(text, encoding='utf-8')
+            file.write_text(_joined(parts, file), encoding='utf-8')
+            self._written[name] = parts
+            (self.path / WRITTEN).write_text(json.dumps(self._written), encoding='utf-8')
+
+    def _keep_edited(self, file: Path, name: str) -> None:
+        """Keep what was written over a cell's text, as in an editor, before a cell writes again."""
+        if name not in self._written or not file.is_file() or not somebody_watches():
+            return
+        text = file.read_text(encoding='utf-8', errors='replace')
+        if text == _joined(self._written[name], file):
+            return
+        copy = self.path / 'edited' / name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(file, copy)
+        print(f'{name} was changed since a cell wrote it. That text is kept in edited/{name}.')
 
     def print_tree(self, relative_path: str = 'src', hide: Sequence[str] = ()) -> None:
         """Print the files below a folder of the workspace. `hide` holds patterns such as '*.zsh'.
@@ -333,18 +399,25 @@ class Workspace:
         self.terminals.clear()
 
 
-def _put_aside(folder: Path) -> Path | None:
-    """Keep the files of a workspace beside it, without what was built. Return where they are.
+def _files_below(folder: Path) -> list[Path]:
+    """Return the files of a workspace that a person may have written, in cells or in an editor."""
+    return [
+        file
+        for file in folder.rglob('*')
+        if file.is_file() and not any(_is_made(part) for part in file.relative_to(folder).parts)
+    ]
 
-    A student may have worked on them, also in an editor, before the kernel was restarted.
-    """
-    for built in ('build', 'install', 'log'):
-        shutil.rmtree(folder / built, ignore_errors=True)
-    if not any(path.is_file() for path in folder.rglob('[!.]*')):
-        return None
-    kept = folder.with_name(f'{folder.name}.before')
-    shutil.rmtree(kept, ignore_errors=True)
-    return folder.rename(kept)
+
+def _is_made(name: str) -> bool:
+    return name.startswith('.') or name in (*BUILT, '__pycache__')
+
+
+def _count(files: Sequence[Path]) -> str:
+    return f'{len(files)} file{"" if len(files) == 1 else "s"}'
+
+
+def _joined(parts: Sequence[str], file: Path) -> str:
+    return parts[0] + ''.join(_line_before(each, file) + each for each in parts[1:])
 
 
 def _line_before(part: str, file: Path) -> str:
