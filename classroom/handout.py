@@ -45,7 +45,9 @@ LESSONS = re.compile(
     r'<!-- made by `make notebooks`: lessons -->\n\n(.*?)\n\n<!-- end -->', re.DOTALL
 )
 COMMANDS = ('help', 'lab', 'set_up', 'update')
-NOT_NEEDED = re.compile(r'^## |^(groups|WORKERS|lesson|slow|this_python)\b.*=|: groups :=', re.MULTILINE)
+NOT_NEEDED = re.compile(
+    r'^## |^(groups|WORKERS|lesson|slow|this_python)\b.*=|: groups :=', re.MULTILINE
+)
 FOR_INSTRUCTORS = re.compile(r'## \d+\. For instructors')
 NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', re.DOTALL)
 GLIBC = ('_2_28', '_2_27', '_2_26', '_2_24', '_2_17', '_2_12', '_2_5', '2014', '2010', '1')

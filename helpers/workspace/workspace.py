@@ -90,7 +90,7 @@ class Workspace:
         self._ran: list[tuple[str, str | Process]] = []  # in terminals
         # What the last sourcing gave, and the state of the folder `install` then.
         self._sourced: tuple[object, dict[str, str]] | None = None
-        self._written: dict[str, list[str]] = {}  # by cells: the parts of each file
+        self._written: dict[str, str | list[str]] = {}  # by cells: a whole file, or its parts
         if underlay is not None:
             self._empty()
             underlay._overlays[name] = self
@@ -163,15 +163,18 @@ class Workspace:
         """
         file = self.file(relative_path)
         name = file.relative_to(self.path).as_posix()
-        parts = self._written.get(name, []) if part is not None else []
-        if part is not None and not 1 <= part <= len(parts) + 1:
-            raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
-        parts = [*parts[: (part or 1) - 1], text, *parts[part or 1 :]]
+        written: str | list[str] = text
+        if part is not None:
+            parts = self._written.get(name)
+            parts = parts if isinstance(parts, list) else []  # a whole file has none
+            if not 1 <= part <= len(parts) + 1:
+                raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
+            written = [*parts[: part - 1], text, *parts[part:]]
         with uninterrupted():  # a file of which one half is written would be lost
             self._keep_edited(file, name)
             file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(_joined(parts, file), encoding='utf-8')
-            self._written[name] = parts
+            file.write_text(_joined(written, file), encoding='utf-8')
+            self._written[name] = written
             (self.path / WRITTEN).write_text(json.dumps(self._written), encoding='utf-8')
 
     def _keep_edited(self, file: Path, name: str) -> None:
@@ -416,8 +419,10 @@ def _count(files: Sequence[Path]) -> str:
     return f'{len(files)} file{"" if len(files) == 1 else "s"}'
 
 
-def _joined(parts: Sequence[str], file: Path) -> str:
-    return parts[0] + ''.join(_line_before(each, file) + each for each in parts[1:])
+def _joined(written: str | Sequence[str], file: Path) -> str:
+    if isinstance(written, str):
+        return written
+    return written[0] + ''.join(_line_before(each, file) + each for each in written[1:])
 
 
 def _line_before(part: str, file: Path) -> str:
