@@ -38,7 +38,7 @@ class Offline(Workspace):
     """A folder in which nothing runs."""
 
     def __init__(self, path):
-        self.path, self._written, self._ran = path, {}, []
+        self.path, self._parts, self._ran = path, {}, []
 
     def terminal(self, commands):
         self._ran.append((commands, ''))

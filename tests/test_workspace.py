@@ -578,15 +578,6 @@ def test_a_run_without_a_person_puts_aside_what_one_has_left(mine, monkeypatch):
     assert (kept / 'src/a.txt').read_text() == 'text'
 
 
-def test_an_edit_outside_of_a_cell_is_kept(mine, capsys):
-    mine.write('src/a.txt', 'cell')
-    mine.file('src/a.txt').write_text('editor')
-    mine.write('src/a.txt', 'cell')
-    assert mine.file('src/a.txt').read_text() == 'cell'
-    assert mine.file('edited/src/a.txt').read_text() == 'editor'
-    assert 'kept in edited/src/a.txt' in capsys.readouterr().out
-
-
 def test_two_kernels_do_not_share_a_folder():
     """Not even if the other kernel has been killed, and its build goes on."""
     script = """

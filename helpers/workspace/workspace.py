@@ -36,8 +36,8 @@ COLLEAGUE = Path(__file__).with_name('colleague.sh')
 TERMINAL_LIMIT_S = 60.0  # of the commands in a terminal that closes
 CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
 
-# What the cells of a lesson have written, in a workspace: each file with its parts.
-WRITTEN = '.written.json'
+# The parts of the files that several cells write, in a workspace.
+PARTS = '.parts.json'
 # Marks the workspace of a person: another run puts it aside, and removes nothing.
 OWNED = '.owned'
 BUILT = ('build', 'install', 'log')  # by colcon
@@ -90,7 +90,7 @@ class Workspace:
         self._ran: list[tuple[str, str | Process]] = []  # in terminals
         # What the last sourcing gave, and the state of the folder `install` then.
         self._sourced: tuple[object, dict[str, str]] | None = None
-        self._written: dict[str, str | list[str]] = {}  # by cells: a whole file, or its parts
+        self._parts: dict[str, list[str]] = {}  # of the files that several cells write
         if underlay is not None:
             self._empty()
             underlay._overlays[name] = self
@@ -108,7 +108,7 @@ class Workspace:
         elif files := _files_below(self.path):
             print(AS_LEFT.format(_count(files), f'{self.path.parent.name}/{self.path.name}'))
             with contextlib.suppress(OSError, ValueError):
-                self._written = json.loads((self.path / WRITTEN).read_text(encoding='utf-8'))
+                self._parts = json.loads((self.path / PARTS).read_text(encoding='utf-8'))
         (self.path / 'src').mkdir(parents=True, exist_ok=True)
         if is_left:
             (self.path / OWNED).touch()
@@ -139,7 +139,7 @@ class Workspace:
         with uninterrupted():
             shutil.rmtree(self.path, ignore_errors=True)
             (self.path / 'src').mkdir(parents=True)
-        self._written = {}
+        self._parts = {}
         self._sourced = None
 
     # --- Files ---
@@ -163,31 +163,17 @@ class Workspace:
         """
         file = self.file(relative_path)
         name = file.relative_to(self.path).as_posix()
-        written: str | list[str] = text
+        parts = self._parts.get(name, []) if part is not None else []  # a whole file has none
         if part is not None:
-            parts = self._written.get(name)
-            parts = parts if isinstance(parts, list) else []  # a whole file has none
             if not 1 <= part <= len(parts) + 1:
                 raise ValueError(f'Write part {len(parts) + 1} of {relative_path} first.')
-            written = [*parts[: part - 1], text, *parts[part:]]
+            parts = [*parts[: part - 1], text, *parts[part:]]
+            text = parts[0] + ''.join(_line_before(each, file) + each for each in parts[1:])
         with uninterrupted():  # a file of which one half is written would be lost
-            self._keep_edited(file, name)
             file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_text(_joined(written, file), encoding='utf-8')
-            self._written[name] = written
-            (self.path / WRITTEN).write_text(json.dumps(self._written), encoding='utf-8')
-
-    def _keep_edited(self, file: Path, name: str) -> None:
-        """Keep what was written over a cell's text, as in an editor, before a cell writes again."""
-        if name not in self._written or not file.is_file() or not somebody_watches():
-            return
-        text = file.read_text(encoding='utf-8', errors='replace')
-        if text == _joined(self._written[name], file):
-            return
-        copy = self.path / 'edited' / name
-        copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(file, copy)
-        print(f'{name} was changed since a cell wrote it. That text is kept in edited/{name}.')
+            file.write_text(text, encoding='utf-8')
+            self._parts[name] = parts
+            (self.path / PARTS).write_text(json.dumps(self._parts), encoding='utf-8')
 
     def print_tree(self, relative_path: str = 'src', hide: Sequence[str] = ()) -> None:
         """Print the files below a folder of the workspace. `hide` holds patterns such as '*.zsh'.
@@ -417,12 +403,6 @@ def _is_made(name: str) -> bool:
 
 def _count(files: Sequence[Path]) -> str:
     return f'{len(files)} file{"" if len(files) == 1 else "s"}'
-
-
-def _joined(written: str | Sequence[str], file: Path) -> str:
-    if isinstance(written, str):
-        return written
-    return written[0] + ''.join(_line_before(each, file) + each for each in written[1:])
 
 
 def _line_before(part: str, file: Path) -> str:
