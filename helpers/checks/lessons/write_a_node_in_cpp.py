@@ -20,6 +20,9 @@ check = tasks.check
 
 BUILD_S = 90  # for a point that builds
 FIRST_SCANS = 10  # at most, until a program is known to answer
+ANSWER_S = 0.5  # after each of these
+LATE_S = 1.0  # for an answer to another of these
+STOP_S = 5  # until the last command of a program is here
 START_S = 8  # for a program to start and be known to the others
 CALLS_MY_SPIN = 'brake.cpp calls spin, not my_spin: run the cell above this task again'
 
@@ -127,6 +130,20 @@ def the_nearest_range(workspace):
     ]
 
 
+def wake(bench, process, scans, answers):
+    """Publish scans until the program answers one. Return how many.
+
+    A program that starts may not know yet who listens to it: then its first answers are lost.
+    """
+    scan = LaserScan(range_min=0.1, range_max=3.5, ranges=[3.5])
+    for sent in range(FIRST_SCANS):
+        if answers or not process.running:
+            return sent
+        scans.publish(scan)
+        bench.wait(lambda: answers, ANSWER_S)
+    return FIRST_SCANS
+
+
 def answers_to(workspace, program, kind, topic, *distances, pause_s=0.0):
     """Publish a scan for each distance. Return the node's name, and what it says to each scan."""
     with Bench() as bench, workspace.run(program, program) as process:
@@ -137,15 +154,9 @@ def answers_to(workspace, program, kind, topic, *distances, pause_s=0.0):
             return scans.get_subscription_count() and tester.count_publishers(topic)
 
         bench.wait(lambda: not process.running or is_known(), START_S)
-        # The program may not know yet who listens to it: its first answers would be lost.
-        for _ in range(FIRST_SCANS):
-            if not answers and process.running:
-                scans.publish(LaserScan(range_min=0.1, range_max=3.5, ranges=[3.5]))
-                bench.wait(lambda: answers, 0.3)
-        count = -1
-        while count < len(answers):  # an answer to an earlier one may be on its way
-            count = len(answers)
-            bench.wait(lambda seen=count: len(answers) > seen, 0.5)
+        sent = wake(bench, process, scans, answers)
+        while sent > 1 and bench.wait(lambda: len(answers) > 1, LATE_S):
+            answers.pop()  # to one of the other first scans
         answers.clear()
         for number, distance in enumerate(distances):
             if not process.running:
@@ -222,10 +233,9 @@ def a_node_of_your_own(workspace):
             commands = bench.hear('cmd_vel', Twist)
             scans = bench.publisher('scan', LaserScan)
             bench.wait(lambda: not process.running or scans.get_subscription_count(), START_S)
-            scans.publish(LaserScan(range_min=0.1, range_max=3.5, ranges=[3.0]))
-            bench.wait(lambda: commands)
+            wake(bench, process, scans, commands)
             process.stop()
-            bench.wait(lambda: commands and commands[-1].linear.x == 0.0, 2)
+            bench.wait(lambda: commands and commands[-1].linear.x == 0.0, STOP_S)
         last = commands[-1].linear.x if commands else 'nothing'
         return last == 0.0 or f'the last that the robot hears: {last}'
 
