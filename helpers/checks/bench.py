@@ -35,7 +35,7 @@ from helpers.notebook import frames
 from helpers.ros import ros_session
 
 WAIT_S = 2.0  # for what a right answer does at once
-QUIET_S = 10.0
+QUIET_S = 6.0
 CALLBACK_S = 3.0  # for a callback to end
 POLL_S = 0.005
 ALL = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)  # hears every publisher
