@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 
 from geometry_msgs.msg import Twist
 from rclpy.clock import ClockType
@@ -13,6 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
+from rclpy.time import Time
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Empty, Int32
 
@@ -211,10 +212,28 @@ def how_old_is_a_scan(AgeBrake):
             return 'it noted the ages, and did not look'
         return noted_before_look == [1, 2, 3] or 'the age was not noted before the look'
 
+    def uses_the_clock_of_the_node():
+        with Bench() as bench:
+            brake = AgeBrake(depth=9, look=lambda scan: 2.0)
+            brake.set_parameters([Parameter('use_sim_time', value=True)])
+            bench.spin(brake)
+            bench.advance(20, step_s=20)
+            scan = scan_with(bench, 0)
+            scan.header.stamp = Time(seconds=15).to_msg()
+            bench.say('scan', scan)
+        ages = ', '.join(map(shortly, brake.ages_s)) or 'nothing'
+        is_right = [round(age_s, 3) for age_s in brake.ages_s] == [5.0]
+        return is_right or f'in a simulation, a scan of 15 s came at 20 s, and it noted: {ages}'
+
     hint = 'self.get_clock().now() - Time.from_msg(scan.header.stamp): its nanoseconds / 1e9.'
     return [
         ('scans of 0, 10 and 3600 s', lambda: notes(0, 10, 3600), hint),
         ('scans of 90, 20 and 0 s', lambda: notes(90, 20, 0), hint),
+        (
+            'the time is that of the node, also in a simulation',
+            uses_the_clock_of_the_node,
+            'self.get_clock().now() is the time of the node, time.time() that of the computer.',
+        ),
     ]
 
 
@@ -447,53 +466,6 @@ def stop_while_looking(make_brake):
 
 
 @tasks.add(9)
-def listen_for_two_events(listen):
-    @once
-    def events():
-        """Send one scan and none after it, then take the laser away."""
-        missed, counts, tester_missed = [], [], []
-        qos = QoSProfile(depth=1, deadline=Duration(seconds=0.3))
-        with Bench() as bench:
-            laser, brake = Node('laser'), Node('brake')
-            publisher = laser.create_publisher(LaserScan, 'scan', qos)
-            listen(brake, qos, missed, counts)
-            late = SubscriptionEventCallbacks(deadline=tester_missed.append)
-            bench.tester.create_subscription(
-                LaserScan, 'scan', lambda scan: None, qos, event_callbacks=late
-            )
-            bench.spin(brake)
-            publisher.publish(LaserScan())
-            bench.wait(lambda: len(tester_missed) >= 3, 10)
-            bench.wait(lambda: missed and counts, 1)
-            while_silent = counts[-1:]
-            laser.destroy_node()
-            bench.wait(lambda: counts[-1:] == [0], 4 if counts else 0)
-        return missed, while_silent, counts[-1:]
-
-    def silent():
-        missed, counts, _ = events()
-        if not missed:
-            return 'no deadline event was kept'
-        return counted(counts, 1)
-
-    def gone():
-        return counted(events()[2], 0)
-
-    def counted(counts, right):
-        if not counts:
-            return 'no matched event was kept'
-        if not isinstance(counts[0], int):
-            return f'no number was kept, but {type(counts[0]).__name__}'
-        return counts[0] == right or f'the last count is {counts[0]}, not {right}'
-
-    hint = 'matched gets an event: lambda event: counts.append(event.current_count). missed.append?'
-    return [
-        ('a silent laser', silent, hint),
-        ('a laser that has gone', gone, hint),
-    ]
-
-
-@tasks.add(10)
 def a_watchdog(LaserWatchdog):
     long_s, short_s = 1.3, 0.3
 
@@ -541,8 +513,38 @@ def a_watchdog(LaserWatchdog):
         with Bench() as bench:
             stops = hear_stops(bench)
             bench.spin(LaserWatchdog(short_s))
+            bench.say('scan', scan_with(bench, 0))
             bench.wait(lambda: stops, short_s + LATE_S)
-        return bool(stops) or f'with most_s={short_s}, no stop came in {short_s + LATE_S} s'
+        waited_s = short_s + LATE_S
+        return bool(stops) or f'with most_s={short_s}, {waited_s} s after a scan no stop came'
+
+    def silence_until_a_stop(age_s, set_s):
+        """Return how long after one scan it stopped (s), or None."""
+        with Bench() as bench:
+            stops = hear_stops(bench)
+            bench.spin(LaserWatchdog(long_s))
+            begun_s = time.monotonic()
+            bench.say('scan', scan_with(bench, 0, age_s))
+            with clock_set_by(set_s):
+                bench.wait(lambda: stops, long_s + LATE_S)
+        return stops[0] - begun_s if stops else None
+
+    def counts_when_a_scan_came():
+        """Let a scan come with another stamp, and set the clock of the computer."""
+        without, _, after = trial()
+        if not without and not after:
+            return NEVER
+        for what, age_s, set_s in (
+            ('a scan came that was stamped an hour ago', 3600, 0),
+            ('a scan came that was stamped an hour ahead', -3600, 0),
+            ('a scan came, then somebody set the clock of the computer', 0, 3600),
+        ):
+            waited_s = silence_until_a_stop(age_s, set_s)
+            if waited_s is None:
+                return f'{what}, and in {long_s + LATE_S} s no stop came'
+            if waited_s < long_s:
+                return f'{what}, and with most_s={long_s} it stopped after {waited_s:.1f} s'
+        return True
 
     def needs_no_clock():
         with Bench() as bench:
@@ -550,22 +552,43 @@ def a_watchdog(LaserWatchdog):
             watchdog = LaserWatchdog(short_s)
             watchdog.set_parameters([Parameter('use_sim_time', value=True)])
             bench.spin(watchdog)
+            bench.say('scan', scan_with(bench, 0))
             bench.wait(lambda: stops, short_s + LATE_S)
             clocks = {timer.clock.clock_type for timer in watchdog.timers}
-        waited_s = short_s + LATE_S
         if ClockType.SYSTEM_TIME in clocks:
             return 'its timer is on the system clock, which jumps when somebody sets it'
+        if not stops and clocks == {ClockType.STEADY_TIME}:
+            return 'its timer is steady, but the times that it compares stand still without /clock'
+        waited_s = short_s + LATE_S
         return bool(stops) or f'with use_sim_time and no /clock, no stop came in {waited_s} s'
 
-    steady = 'create_timer(0.1, self.timer_callback, clock=Clock(clock_type=ClockType.STEADY_TIME))'
     since = 'Note time.monotonic() at the start and in each callback of a scan. How long ago is it?'
+    steady = (
+        'The timer: clock=Clock(clock_type=ClockType.STEADY_TIME). The times: time.monotonic().'
+    )
     return [
         ('a laser that never sends: it stops, again and again', stops_without_a_scan, since),
         ('one scan, then silence: it stops', stops_after_a_scan, since),
         ('it does not stop while a scan is fresh', is_quiet_after_a_scan, since),
         ('it waits for most_s seconds, however long', waits_for_most_s, 'Compare with most_s.'),
+        (
+            'it counts when a scan came, not its stamp or the time of day',
+            counts_when_a_scan_came,
+            since,
+        ),
         ('it stops without /clock, too', needs_no_clock, steady),
     ]
+
+
+@contextmanager
+def clock_set_by(seconds):
+    """Let time.time() jump, as if somebody had set the clock of the computer."""
+    real = time.time
+    time.time = lambda: real() + seconds
+    try:
+        yield
+    finally:
+        time.time = real
 
 
 LATE_S = 1.0  # that a stop may come late
@@ -583,6 +606,53 @@ def hear_stops(bench):
 
     bench.tester.create_subscription(Twist, 'cmd_vel', command, 9)
     return stops
+
+
+@tasks.add(10)
+def listen_for_two_events(listen):
+    @once
+    def events():
+        """Send one scan and none after it, then take the laser away."""
+        missed, counts, tester_missed = [], [], []
+        qos = QoSProfile(depth=1, deadline=Duration(seconds=0.3))
+        with Bench() as bench:
+            laser, brake = Node('laser'), Node('brake')
+            publisher = laser.create_publisher(LaserScan, 'scan', qos)
+            listen(brake, qos, missed, counts)
+            late = SubscriptionEventCallbacks(deadline=tester_missed.append)
+            bench.tester.create_subscription(
+                LaserScan, 'scan', lambda scan: None, qos, event_callbacks=late
+            )
+            bench.spin(brake)
+            publisher.publish(LaserScan())
+            bench.wait(lambda: len(tester_missed) >= 3, 10)
+            bench.wait(lambda: missed and counts, 1)
+            while_silent = counts[-1:]
+            laser.destroy_node()
+            bench.wait(lambda: counts[-1:] == [0], 4 if counts else 0)
+        return missed, while_silent, counts[-1:]
+
+    def silent():
+        missed, counts, _ = events()
+        if not missed:
+            return 'no deadline event was kept'
+        return counted(counts, 1)
+
+    def gone():
+        return counted(events()[2], 0)
+
+    def counted(counts, right):
+        if not counts:
+            return 'no matched event was kept'
+        if not isinstance(counts[0], int):
+            return f'no number was kept, but {type(counts[0]).__name__}'
+        return counts[0] == right or f'the last count is {counts[0]}, not {right}'
+
+    hint = 'matched gets an event: lambda event: counts.append(event.current_count). missed.append?'
+    return [
+        ('a silent laser', silent, hint),
+        ('a laser that has gone', gone, hint),
+    ]
 
 
 @tasks.add(11)
