@@ -49,6 +49,14 @@ DOCUMENTS = (
 )
 FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
+# The first picture plays once when it is loaded. To play it again is to load it again.
+PLAY_AGAIN = """<p class="again"><button type="button">▶ Play again</button></p>
+<script>
+document.querySelector('.again button').onclick = () => {
+  const picture = document.querySelector('img[src*="depth_10_hits_depth_1_stops"]');
+  picture.src = `${picture.src.split('?')[0]}?${Date.now()}`;
+};
+</script>"""
 CONTENTS = """
 ```{{toctree}}
 :hidden:
@@ -161,8 +169,9 @@ def _parts(known: list[Lesson]) -> dict[str, list[str]]:
 
 def _first_page() -> str:
     text = (HERE / 'index.md').read_text('utf-8')
-    for place, html in (('{level}', level('save').html()), ('{drive}', free_drive.html())):
-        text = text.replace(place, f'```{{raw}} html\n{html}\n```')
+    parts = {'level': level('save').html(), 'drive': free_drive.html(), 'again': PLAY_AGAIN}
+    for place, html in parts.items():
+        text = text.replace(f'{{{place}}}', f'```{{raw}} html\n{html}\n```')
     return text
 
 
