@@ -1,22 +1,28 @@
-"""The first picture of README and site: two drives of lesson 05, and what their brakes see.
+"""The first pictures: of README and site, and of lessons whose own drive comes late on the page.
 
-    python -m tools.site.first_picture
+    python -m tools.site.first_pictures
 
-It reads the saved replays of lesson 05 and writes `notebooks/images/`: poses, queues and ages are
-those of the records. It plays once, in 4.5 s. Without motion it is its own end.
+It reads the saved replays and writes `notebooks/images/`: poses, queues and ages are those of the
+records. A picture plays once, in 4.5 s. Without motion it is its own end.
 """
 
 import json
+import math
 import re
 from html import unescape
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
+from urllib.parse import unquote
 
 from helpers.notebook import LOOK
 from helpers.robot import CORRIDOR, RADIUS_M
 from tools.lessons.lesson import FOLDER, Lesson, lessons
 
-FILE = FOLDER / 'images' / 'depth_10_hits_depth_1_stops.svg'
+IMAGES = FOLDER / 'images'
+FILE = IMAGES / 'depth_10_hits_depth_1_stops.svg'
+# The cell whose drive a lesson shows first. It is where the lesson leads to, and tells no guess.
+DRIVES = {'14': 'l11-replay', '15': 'cpp-12-drive'}
 CELLS = {10: 'drive-depth-10', 1: 'drive-depth-1'}
 ARRIVE, TAKE, END = range(3)  # moves of a replay
 
@@ -69,12 +75,20 @@ class Drive(NamedTuple):
     hit: bool
 
 
+def output_of(lesson: Lesson, cell_id: str) -> str:
+    """Return the saved replay of a cell, as HTML."""
+    cell = next(cell for cell in lesson.notebook.cells if cell.id == cell_id)
+    pages = (output.get('data', {}).get('text/html', '') for output in cell.outputs)
+    return next(page for page in pages if 'data-record=' in page)
+
+
+def runs_of(page: str) -> list[dict]:
+    return json.loads(unescape(re.search(r"data-record='([^']*)'", page)[1]))['runs']
+
+
 def recorded(lesson: Lesson, depth: int) -> Drive:
     """Return the drive of a brake with this depth, from the saved replay of lesson 05."""
-    cell = next(cell for cell in lesson.notebook.cells if cell.id == CELLS[depth])
-    pages = (output.get('data', {}).get('text/html', '') for output in cell.outputs)
-    found = next(filter(None, (re.search(r"data-record='([^']*)'", page) for page in pages)))
-    drive, queue = json.loads(unescape(found[1]))['runs']
+    drive, queue = runs_of(output_of(lesson, CELLS[depth]))
     step = drive['step']
     poses = [(i * step, pose[0]) for i, pose in enumerate(drive['poses'])]
 
@@ -249,7 +263,7 @@ def picture() -> str:
     text = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 314" {size}>\n'
         '<!-- Two real drives of lesson 05, 1.6 times as fast. Made by '
-        f'tools/site/first_picture.py. -->\n<style>{style}</style>\n'
+        f'tools/site/first_pictures.py. -->\n<style>{style}</style>\n'
         '<path class="ground" d="M0 0H720V314H0z"/>'
         f'<clipPath id="driven"><path d="M{START_X} 0H720V90H{START_X}z"/></clipPath>'
         f'<text {head}" x="{16 + BRAKE_X + 24}">brake</text>'
@@ -264,6 +278,35 @@ def _colour(name: str) -> str:
     return 'light-dark({},{})'.format(*PAIRS[name])
 
 
+def drive_picture(page: str) -> str:
+    """Return the floor of a saved drive, on which its robot moves once."""
+    svg = unquote(re.search(r'src="data:image/svg\+xml,([^"]*)"', page)[1])
+    poses = runs_of(page)[0]['poses']
+    last = len(poses) - 1
+    every = max(1, last // 60)
+    moves = turns = ''
+    for i, (x, y, yaw, *_) in enumerate(poses):
+        if i % every == 0 or i == last:
+            when = f'{100 * i / last:.1f}%'
+            moves += f'{when}{{transform:translate({x:.3g}px,{y:.3g}px)}}'
+            turns += f'{when}{{transform:rotate({math.degrees(yaw):.0f}deg)}}'
+    style = (
+        f'<style>svg{{color-scheme:light dark;color:{_colour("ink")}}}.fan,.old{{display:none}}'
+        f'.robot,.robot>g{{animation:move {PLAYS_S}s linear both}}.robot>g{{animation-name:turn}}'
+        f'@keyframes move{{{moves}}}@keyframes turn{{{turns}}}'
+        '@media(prefers-reduced-motion:reduce){.robot,.robot>g{animation:none}}</style>'
+    )
+    return re.sub(r'(<svg[^>]*>)', rf'\1{style}', svg, count=1) + '\n'
+
+
+def write(file: Path, text: str) -> None:
+    file.write_text(text, encoding='utf-8')
+    print(f'{file.relative_to(FOLDER.parent)} is written.')
+
+
 if __name__ == '__main__':
-    FILE.write_text(picture(), encoding='utf-8')
-    print(f'{FILE.relative_to(FOLDER.parent)} is written.')
+    write(FILE, picture())
+    for known in lessons():
+        if known.number in DRIVES:
+            shown = drive_picture(output_of(known, DRIVES[known.number]))
+            write(IMAGES / f'drive_of_{known.name}.svg', shown)
