@@ -92,6 +92,19 @@ def test_the_first_picture_plays_again(file_page):
         tab.wait_for_function("document.querySelector('img[src*=depth_10]').naturalWidth > 0")
 
 
+def test_check_and_solution_are_one_line_until_one_is_opened(file_page):
+    with file_page(1280, 740) as tab:
+        tab.goto((SITE / LESSONS[5]).as_uri())
+        check, solution = (
+            tab.locator(f'.cell.tag_{kind} > details').first for kind in ('check', 'solution')
+        )
+        assert not check.locator('.cell_output').is_visible()
+        assert check.bounding_box()['y'] == solution.bounding_box()['y']
+        solution.locator('summary').click()
+        assert solution.locator('.cell_output').is_visible()
+        assert check.bounding_box()['y'] < solution.bounding_box()['y']
+
+
 def test_search_finds_a_term_in_each_language(file_page):
     # It also wants a piece of each page that it finds, which a browser does not read from a file.
     with file_page(1280, 740, expected=('Failed to fetch',)) as tab:
