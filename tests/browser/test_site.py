@@ -17,6 +17,14 @@ SERIOUS = """async () => (await axe.run({ resultTypes: ['violations'] })).violat
 CUT_OFF = """[...document.querySelectorAll('pre')]
     .filter(part => part.scrollWidth > part.clientWidth + 1)
     .map(part => part.innerText.slice(0, 80))"""
+# Of the free drive: where the robot is, and where a place of its floor is on the screen.
+DRIVEN = """document.querySelector('.free-drive .robot').getAttribute('transform')
+    .match(/[-\\d.]+/g).map(Number)"""
+ON_SCREEN = """([x, y]) => {
+    const floor = document.querySelector('.free-drive .robot').parentNode.getScreenCTM();
+    const at = new DOMPoint(x, y).matrixTransform(floor);
+    return [at.x, at.y];
+}"""
 SCREENS = {1280: 'light', 360: 'dark'}
 WORDS = ['deadlock', 'KEEP_LAST', 'durabilité', 'قطار', 'hàng đợi']
 
@@ -48,6 +56,53 @@ def test_a_page_fits_its_screens(file_page, artefacts, axe, name):
             assert not tab.evaluate(WIDER)
             assert tab.evaluate(SERIOUS) == []
             tab.screenshot(path=artefacts / f'site_{Path(name).stem}_{width}.png')
+
+
+def test_a_finger_drives_to_a_place_and_two_keys_make_a_curve(file_page, artefacts):
+    with file_page(1280, 900) as tab:
+        tab.goto((SITE / 'index.html').as_uri())
+        drive = tab.get_by_role('group', name='free drive')
+        drive.evaluate("drive => drive.scrollIntoView({ behavior: 'instant' })")
+        drive.focus()
+        for key in ('ArrowUp', 'ArrowLeft'):
+            tab.keyboard.down(key)
+        tab.wait_for_function(f'() => {DRIVEN}[0] > 1.4 && {DRIVEN}[1] > 1.9')
+        for key in ('ArrowUp', 'ArrowLeft'):
+            tab.keyboard.up(key)
+        drive.get_by_role('button', name='Again', exact=True).click()
+        for place in ((2.2, 2.2), (2.2, 3.9), (1.25, 5.75)):  # through the door, to A
+            tab.mouse.move(*tab.evaluate(ON_SCREEN, place))
+            tab.mouse.down()
+            tab.wait_for_function(
+                f'([x, y]) => Math.hypot({DRIVEN}[0] - x, {DRIVEN}[1] - y) < 0.3', arg=place
+            )
+            tab.mouse.up()
+        says = drive.locator('[aria-live=polite]')
+        assert says.inner_text() == 'A is done, B and C to go.'
+        tab.screenshot(path=artefacts / 'free_drive.png')
+
+
+def test_the_first_picture_plays_again(file_page):
+    with file_page(1280, 900) as tab:
+        tab.goto((SITE / 'index.html').as_uri())
+        picture = tab.locator('img[src*=depth_10]')
+        before = picture.get_attribute('src')
+        tab.get_by_role('button', name='▶ Play again').click()
+        assert picture.get_attribute('src') != before
+        tab.wait_for_function("document.querySelector('img[src*=depth_10]').naturalWidth > 0")
+
+
+def test_check_and_solution_are_one_line_until_one_is_opened(file_page):
+    with file_page(1280, 740) as tab:
+        tab.goto((SITE / LESSONS[9]).as_uri())
+        check, solution = (
+            tab.locator(f'.cell.tag_{kind} > details').first for kind in ('check', 'solution')
+        )
+        assert not check.locator('.cell_output').is_visible()
+        assert check.bounding_box()['y'] == solution.bounding_box()['y']
+        solution.locator('summary').click()
+        assert solution.locator('.cell_output').is_visible()
+        assert check.bounding_box()['y'] < solution.bounding_box()['y']
 
 
 def test_search_finds_a_term_in_each_language(file_page):

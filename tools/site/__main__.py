@@ -3,10 +3,11 @@
     python -m tools.site
 
 Sphinx and myst-nb make the pages from the saved outputs: nothing runs. What they read is prepared
-in .site/pages: the documents, and the notebooks without notes for the instructor, with their
-solutions folded, their figures as files, and a link to the lesson as it is.
+in .site/pages: the documents, and the notebooks without notes for the instructor, with
+checks, solutions and imports folded, their figures as files, and a link to the lesson as it is.
 """
 
+import ast
 import hashlib
 import io
 import re
@@ -47,8 +48,18 @@ DOCUMENTS = (
     'ros2/README',
     'tools/UPGRADING',
 )
+IMPORTS = ast.Import, ast.ImportFrom
+FOLDED_IMPORTS = 3  # and more of them in a cell are folded
 FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
+# The first picture plays once when it is loaded. To play it again is to load it again.
+PLAY_AGAIN = """<p class="again"><button type="button">▶ Play again</button></p>
+<script>
+document.querySelector('.again button').onclick = () => {
+  const picture = document.querySelector('img[src*="depth_10_hits_depth_1_stops"]');
+  picture.src = `${picture.src.split('?')[0]}?${Date.now()}`;
+};
+</script>"""
 CONTENTS = """
 ```{{toctree}}
 :hidden:
@@ -88,13 +99,33 @@ def is_widget(output: NotebookNode) -> bool:
 
 
 def _fold(cell: NotebookNode) -> None:
-    """Fold the source of what is folded in JupyterLab, such as a solution."""
-    if cell.metadata.get('jupyter', {}).get('source_hidden'):
-        kind = 'solution' if 'solution' in tags(cell) else 'code'
-        cell.metadata['mystnb'] = {
-            f'code_prompt_{verb}': f'{verb.capitalize()} the {kind}' for verb in ('show', 'hide')
-        }
-        cell.metadata['tags'] = ['hide-input']
+    """Fold what is read by few: the check and the solution of a task, and the imports.
+
+    site.css sets the check and the solution that follows it on one line.
+    """
+    kind = next((tag for tag in ('check', 'solution') if tag in tags(cell)), '')
+    if kind:
+        cell.metadata['tags'] = ['hide-cell', kind]
+    elif _is_plumbing(cell):
+        kind = 'imports'
+        cell.metadata['tags'] = ['hide-input', kind]
+    elif cell.metadata.get('jupyter', {}).get('source_hidden'):
+        kind = 'code'
+        cell.metadata['tags'] = ['hide-input', kind]
+    if kind:
+        words = kind.capitalize()
+        cell.metadata['mystnb'] = {'code_prompt_show': words, 'code_prompt_hide': words}
+
+
+def _is_plumbing(cell: NotebookNode) -> bool:
+    """Return whether a cell only imports, and perhaps names a folder, and has nothing to show."""
+    try:
+        body = ast.parse(cell.source).body
+    except SyntaxError:  # a magic command
+        return False
+    imports = [line for line in body if isinstance(line, IMPORTS)]
+    rest = [line for line in body if not isinstance(line, (*IMPORTS, ast.Assign))]
+    return len(imports) >= FOLDED_IMPORTS and not rest and not cell.outputs
 
 
 def _with_files(text: str, figures: Path) -> str:
@@ -136,6 +167,9 @@ def prepare(pages: Path) -> None:
         (pages / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, pages / file)
     shutil.copy(HERE / 'conf.py', pages)
+    for name in ('icon.svg', 'preview.png'):
+        shutil.copy(HERE / name, static)
+    shutil.copytree(HERE / 'fonts', static / 'fonts')
     (static / 'site.css').write_text(LOOK_CSS + (HERE / 'site.css').read_text('utf-8'), 'utf-8')
     parts = _parts(known)
     toctrees = (CONTENTS.format(part=part, pages='\n'.join(parts[part])) for part in parts)
@@ -161,8 +195,9 @@ def _parts(known: list[Lesson]) -> dict[str, list[str]]:
 
 def _first_page() -> str:
     text = (HERE / 'index.md').read_text('utf-8')
-    for place, html in (('{level}', level('save').html()), ('{drive}', free_drive.html())):
-        text = text.replace(place, f'```{{raw}} html\n{html}\n```')
+    parts = {'level': level('save').html(), 'drive': free_drive.html(), 'again': PLAY_AGAIN}
+    for place, html in parts.items():
+        text = text.replace(f'{{{place}}}', f'```{{raw}} html\n{html}\n```')
     return text
 
 

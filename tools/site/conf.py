@@ -1,5 +1,10 @@
 """Sphinx's settings for `make site`. tools/site/__main__.py prepares what is read here."""
 
+import os
+from html import escape
+
+from docutils import nodes
+
 from tools.site.lexer import CellLexer
 
 project = 'ROS 2 in notebooks'
@@ -15,6 +20,7 @@ html_title = project
 html_static_path = ['static']
 html_css_files = ['site.css']
 html_extra_path = ['downloads']
+html_favicon = 'static/icon.svg'
 html_copy_source = False
 html_show_sphinx = False
 html_show_copyright = False
@@ -34,6 +40,43 @@ REPAIRS = [
 ]
 
 
+# Who shares a link sees these. A preview picture needs an address with a host: SITE_URL, where the
+# site is published.
+ADDRESS = os.environ.get('SITE_URL', '').rstrip('/')
+DESCRIPTION = (
+    'Learn ROS 2 in notebooks: write the programs of a robot, watch why it crashes, mend it.'
+)
+MOST = 200  # letters of a description
+
+
+def description(pagename, doctree):
+    """Return what a page is about, in one line: its first paragraph that is a sentence or more."""
+    if doctree is None or pagename == 'index':
+        return DESCRIPTION
+    texts = (' '.join(part.astext().split()) for part in doctree.findall(nodes.paragraph))
+    text = next((text for text in texts if len(text) > 40 and '. ' in f'{text} '), DESCRIPTION)
+    return text if len(text) <= MOST else f'{text[:MOST].rpartition(" ")[0]} …'
+
+
+def preview(app, pagename, templatename, context, doctree):
+    """Say to who shows a link what is behind it; Sphinx calls this for each page."""
+    title = context.get('title') or app.config.project
+    about = {
+        'og:type': 'website',
+        'og:site_name': app.config.project,
+        'og:title': title if pagename != 'index' else app.config.project,
+        'og:description': description(pagename, doctree),
+        'og:image': f'{ADDRESS}/_static/preview.png' if ADDRESS else '',
+        'og:url': f'{ADDRESS}/{pagename}.html' if ADDRESS else '',
+        'twitter:card': 'summary_large_image' if ADDRESS else '',
+    }
+    found = [f'<meta name="description" content="{escape(about["og:description"])}">']
+    found += [
+        f'<meta property="{name}" content="{escape(text)}">' for name, text in about.items() if text
+    ]
+    context['metatags'] = '\n'.join([context.get('metatags', ''), *found])
+
+
 def repair(app, pagename, templatename, context, doctree):
     """Let assistive technology read a page; Sphinx calls this for each one."""
     for part, text, better in REPAIRS:
@@ -44,4 +87,5 @@ def repair(app, pagename, templatename, context, doctree):
 def setup(app):
     """Colour a cell that writes a file as the file's language."""
     app.add_lexer('cell', CellLexer)
+    app.connect('html-page-context', preview)
     app.connect('html-page-context', repair, priority=900)

@@ -10,7 +10,7 @@ SCRIPT = Path(__file__).with_suffix('.js')
 
 
 def record() -> dict:
-    """Return the floor, where the robot starts, and its limits: metres, radians, seconds."""
+    """Return walls, places, where the robot starts, and its limits: metres, radians, seconds."""
     limits = (
         robot.RADIUS_M,
         robot.MAX_ACCELERATION,
@@ -18,16 +18,16 @@ def record() -> dict:
         1 / robot.RATE_HZ,
     )
     walls = [wall[:4] for wall in ROOMS.walls]
-    return {'walls': walls, 'start': list(ROOMS.start), 'limits': limits}
+    start, places = list(ROOMS.start), dict(ROOMS.places)
+    return {'walls': walls, 'start': start, 'limits': limits, 'places': places}
 
 
 def html() -> str:
     words = robot.floor_in_words(ROOMS)
     svg = robot.floor_picture(ROOMS, [ROOMS.start[:2]], ROOMS.start)
     return (
-        f'<div class="replay" data-drive={attribute(record())}>{style(robot.DRIVE_CSS)}'
-        '<p>Click the floor, and drive with the arrow keys; or hold a button. Come to A, B and C '
-        'without a bump.</p>'
+        f'<div class="replay free-drive" data-drive={attribute(record())}>{style(robot.DRIVE_CSS)}'
+        '<p class="drive-hello">Come to A, B and C without a bump.</p>'
         f'<div class="replay-floor" role="img" aria-label="{words}">{svg}</div>'
         f'<script>(() => {{\n{source("element.js")}{SCRIPT.read_text("utf-8")}'
         "show(document.currentScript.closest('.replay'));})();</script></div>"
