@@ -18,7 +18,7 @@ from itertools import product
 from helpers.notebook import shown
 from helpers.replay.script import played
 
-SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'element.js', 'board.js', 'level.js'
+SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'ring.js', 'element.js', 'board.js', 'level.js'
 ONE = 'SingleThreadedExecutor()'
 
 

@@ -6,7 +6,7 @@ const [RIGHT, LINE, LETTER] = [14, 20, 7.6]; // pixels; letters are about so wid
 const WIDTH = 370; // so letters have 12 pixels on a phone, too
 // Why a message waits, and a callback, as model.js calls it: dashes, and the legend's words.
 const WAITS = {
-  '': ['', 'waits, a thread is free'],
+  '': ['9 2 2 2', 'waits, a thread is free'],
   'thread busy': ['', 'waits, thread busy'],
   'group busy': ['6 2', 'waits, group busy'],
   'no executor': ['2 2', 'waits, no executor'],
@@ -110,6 +110,6 @@ function picture({ messages, names, time }, [from, until], rows, left, cursor, l
   const [top, height] = [down + 12, down + bottom + 60];
   return [`<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 ${WIDTH} ${height}" width="${WIDTH}" `
     + `height="${height}" font-family="system-ui, sans-serif" font-size="14" color="${LOOK.ink}" `
-    + `fill="currentColor" preserveAspectRatio="xMinYMin" data-wide="${wide}">${legend}`
+    + `fill="currentColor" preserveAspectRatio="xMinYMin" data-wide="${wide}" data-left="${left}" data-row="${step}" data-top="${top}" data-rows="${messages.map(({ callback, seq }) => `${callback} ${seq}`)}">${legend}`
     + `<g transform="translate(0 ${top})">${drawn}${axes}</g></svg>`, down];
 }

@@ -49,7 +49,7 @@ class Run:
     def scripts(self) -> tuple[str, ...]:
         """The files that step through it."""
         acts = any('does' in callback for callback in self.setup['callbacks'])
-        return ('model.js', 'walk.js', 'board.js', *(('circle.js',) if acts else ()))
+        return ('model.js', 'walk.js', 'board.js', *(('circle.js', 'ring.js') if acts else ()))
 
     @property
     def span_s(self) -> tuple[float, float]:

@@ -58,7 +58,7 @@ def played(kind: str, record: dict, says: str, *names: str) -> str:
     )
 
 
-def javascript(function: str, *arguments) -> list | dict:
+def javascript(function: str, *arguments) -> list | dict | str:
     """Return what a function of stories.js or picture.js returns, here in Python."""
     context = Context()
     context.eval(COLOURS + ''.join(map(source, ('circle.js', *DRAWN))))
