@@ -1,6 +1,6 @@
 // The boxes and arrows of circle.js, on a ring.
 
-const [RING_WIDE, RING_HIGH] = [340, 250]; // pixels: letters keep their size on a phone
+const [RING_WIDE, RING_HIGH] = [340, 260]; // pixels: letters keep their size on a phone
 const LETTERS = 17; // of a line in a box
 
 // Return the node of the picture, and `draw(now, last)`: what circle.js returns of this state, and of
@@ -64,8 +64,8 @@ function ring() {
       const [w, h] = [Math.max(...words.map(line => line.length)) * 7.3 + 16, 16 * words.length + 10];
       // Of three, two are above each other: there is room for the words of the arrows.
       const turn = 2 * Math.PI * (i / all.length - (all.length === 3 ? 1 / 3 : 1 / 4));
-      const x = RING_WIDE / 2 + 105 * Math.cos(turn);
-      return [box.id, { x, y: RING_HIGH / 2 + (RING_HIGH - 62) / 2 * Math.sin(turn), w, h, words }];
+      const x = all.length === 3 ? [85, 278, 85][i] : RING_WIDE / 2 + 105 * Math.cos(turn);
+      return [box.id, { x, y: RING_HIGH / 2 + (RING_HIGH - 62) / 2 * Math.sin(turn) * (all.length === 3 ? 1.15 : 1), w, h, words }];
     }));
     const here = now.boxes.filter(({ id }) => places.has(id));
     const arrows = now.arrows.filter(({ from, to }) => places.has(from) && places.has(to));
@@ -80,11 +80,22 @@ function ring() {
         ...words.map((line, i) => text(line, x, y + 4 + 16 * (i - (words.length - 1) / 2))));
     });
     const middle = closed ? ['Nobody', 'can go on'].map((line, i) =>
-      text(line, RING_WIDE / 2 + 8, RING_HIGH / 2 + 18 * i - 2, 'ring-closed')) : [];
-    const words = [...arrows.map(({ says }) => says), ...(closed ? ['Nobody can go on'] : [])].join('. ');
+      text(line, all.length === 3 ? 162 : RING_WIDE / 2, RING_HIGH / 2 + 18 * i - 2, 'ring-closed')) : [];
+    const words = [...arrows.map(({ says }) => model.capital(says)), ...(closed ? ['Nobody can go on'] : [])].join('. ');
     node.replaceChildren(seen(draws('svg', { viewBox: `0 0 ${RING_WIDE} ${RING_HIGH}` }, ...drawn, ...boxes, ...middle),
       words ? `${words}.` : 'Nobody holds or waits for anything.'));
   }
 
   return { node, draw };
+}
+
+// Give a run that can never go on its `end`, and the sentence at the step that closes the circle.
+function close(run, { setup }) {
+  if (!setup?.callbacks.some(({ does = [] }) => does.some(step => 'client' in step))) return run;
+  const at = step => circleOf(setup, run.seek(step).state);
+  const end = at(run.times.length);
+  if (!end.stuck.length) return run;
+  const closes = run.times.findIndex((_, step) => at(step + 1).stuck.length) + 1;
+  const says = step => (step === closes ? at(step).says : undefined);
+  return { ...run, end, says, ranks: run.times.map((_, step) => (step + 1 === closes ? 2 : 0)) };
 }

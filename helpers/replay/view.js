@@ -69,20 +69,12 @@ function panel(run, record, image, [from, until], grouped) {
   }
 }
 
-// Give a run that can never go on its `end`, and the sentence at the step that closes the circle.
-function close(run, { setup }) {
-  if (!setup?.callbacks.some(({ does = [] }) => does.some(step => 'client' in step))) return run;
-  const at = step => circleOf(setup, run.seek(step).state);
-  const end = at(run.times.length);
-  if (!end.stuck.length) return run;
-  const closes = run.times.findIndex((_, step) => at(step + 1).stuck.length) + 1;
-  const says = step => (step === closes ? at(step).says : undefined);
-  return { ...run, end, says, ranks: run.times.map((_, step) => (step + 1 === closes ? 2 : 0)) };
-}
-
 function show(root, record) {
   // One that has no setup is the drive of a robot: see drive.js.
-  const runs = record.runs.map(one => close(one.setup ? walk(one) : drive(one), one));
+  const runs = record.runs.map(one => {
+    const run = one.setup ? walk(one) : drive(one);
+    return typeof ring === 'undefined' ? run : close(run, one);
+  });
   const own = runs.map(run => run.scan());
   const ranks = runs.map((run, i) => run.ranks ?? run.times.map((_, step) => +own[i].includes(step + 1)));
   // All steps in the order of time: when, of which run, whether it says something, and whether also
