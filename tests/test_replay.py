@@ -126,15 +126,15 @@ def services(threads, groups, does):
 
 def test_a_circle_is_said(script):
     one_group = script.call('play', services(2, 'one group', {'call': 1, 'client': 2}))
-    assert [it['says'] for it in one_group['circle']] == [
-        'Tick 0 of timer waits for an answer. '
-        'The answer is there, but client is in the group of timer and client, which tick 0 of '
-        'timer holds.'
-    ]
+    assert one_group['circle']['says'] == (
+        'Nobody can go on: timer waits for the answer of look, it waits for the group of timer '
+        'and client, timer holds the group of timer and client.'
+    )
     one_thread = script.call('play', services(1, 'two groups', {'call': 1, 'client': 2}))
-    assert [it['says'] for it in one_thread['circle']] == [
-        'Tick 0 of timer waits for an answer. The request waits for look, but no thread is free.'
-    ]
+    assert one_thread['circle']['says'] == (
+        'Nobody can go on: timer waits for the answer of look, its request waits for the thread, '
+        'timer holds the thread.'
+    )
     said = [move['says'] for move in one_thread['done']]
     assert said[-1] == 'Tick 0 of timer asks look and waits: its thread and its group wait with it.'
     reentrant = script.call('play', services(1, 'Reentrant', {'call': 1, 'client': 2}))
@@ -299,7 +299,7 @@ def test_what_nbval_compares_does_not_move():
 @pytest.mark.parametrize('shown', [replay(predict(0.05, 0.2, 10, 1, 41), 10), FreePlay()])
 def test_size(shown):
     page = html(shown)
-    assert len(page) <= 30_000
+    assert len(page) <= 32_000
     assert not re.search(r'https?://(?!www\.w3\.org)', page)
 
 

@@ -37,23 +37,29 @@ def test_a_replay_waits_where_rclpy_waits(script, threads, groups):
         stuck = answer is None
         assert bool(steps[-1]['circle']) == stuck
         assert any(steps[-1]['held']) == stuck
-        assert ('for an answer' in str(shown)) == stuck
+        assert ('Nobody can go on' in str(shown)) == stuck
         assert ('Nobody waits for ever.' in str(shown)) != stuck
 
 
 def test_the_circle_closes_when_the_question_is_asked(script):
     shown, _ = record(2, 1)
     assert str(shown) == (
-        'Replay: 2 threads. Tick 0 of tick waits for an answer. '
-        'The answer is there, but client is in the group of tick and client, which tick 0 of tick '
-        'holds.'
+        'Replay: 2 threads. Nobody can go on: tick waits for the answer of look, '
+        'it waits for the group of tick and client, tick holds the group of tick and client.'
     )
     steps = script.call('steps', shown.runs[0].record())
     asked = next(i for i, step in enumerate(steps) if 'asks look' in step['says'])
     assert [bool(step['circle']) for step in steps] == [i >= asked for i in range(len(steps))]
-    assert steps[asked]['circle'] == [
-        'Tick 0 of tick waits for an answer. '
-        'client must take it, but is in the group of tick and client, which tick 0 of tick holds.'
+    assert steps[asked]['circle'] == steps[-1]['circle']
+    # The arrows grow, and turn all at once.
+    assert steps[asked - 1]['arrows'] == [
+        ['tick holds thread 1', False],
+        ['tick holds the group of tick and client', False],
+    ]
+    assert [says for says, hot in steps[asked]['arrows'] if hot] == [
+        'tick holds the group of tick and client',
+        'tick waits for the answer of look',
+        'it waits for the group of tick and client',
     ]
     assert steps[-1]['queues'] == [0, 0, 1]
 
@@ -90,9 +96,9 @@ def test_a_chain_of_services_waits_for_a_thread():
         session.wait_until_quiet(executor)
         shown = replay_calls(recording, 2)
     assert str(shown) == (
-        'Replay: 2 threads. Tick 0 of tick waits for an answer. '
-        'Request 0 of plan must give it, and waits itself. '
-        'Request 0 of plan waits for an answer. The request waits for look, but no thread is free.'
+        'Replay: 2 threads. Nobody can go on: tick waits for the answer of plan, '
+        'the answer of plan comes from plan, plan waits for the answer of look, '
+        'its request waits for both threads, tick holds thread 1.'
     )
 
 

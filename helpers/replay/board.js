@@ -4,8 +4,8 @@ const MOST = 27; // of the messages of a list
 const PLACES = 40; // free ones that are drawn
 const MOVES_MS = 250;
 
-// Return the rows of a board, and `draw(state, stuck)`, where `stuck` is what circle.js returns. Names
-// are those of the rows: threads, groups, queue, circle, lost, or a number of the setup. `full` names
+// Return the rows of a board, and `draw(state, stuck)`, where `stuck` are the ids of runs that never go on.
+// Names are those of the rows: threads, groups, queue, lost, or a number of the setup. `full` names
 // each message on a thread in full; `losses` is how many messages will be lost.
 function board(setup, names, { full = false, losses = 0 } = {}) {
   const { callbacks, threads, groups } = setup;
@@ -45,11 +45,10 @@ function board(setup, names, { full = false, losses = 0 } = {}) {
     },
     lost: ({ lost }) => (lost.length > MOST ? [['replay-more', `${lost.length - MOST} before`]] : [])
       .concat(lost.slice(-MOST).map(item => ['', message(item)])),
-    circle: (state, kind, stuck) => stuck.map(({ says }) => ['replay-why', says]),
   };
 
   function fill(state, stuck) {
-    const kind = ({ id }) => (stuck.some(({ run }) => run === id) ? 'replay-stuck' : 'replay-busy');
+    const kind = ({ id }) => (stuck.includes(id) ? 'replay-stuck' : 'replay-busy');
     lists.forEach((list, i) => {
       const items = ITEMS[names[i]]?.(state, kind, stuck) ?? [['', `${state.values[names[i]] ?? 0}`]];
       list.replaceChildren(...items.map(([kind, ...content]) => element('li', { class: kind }, ...content)));

@@ -1,6 +1,9 @@
-// Who waits for whom, of the runs that can never go on: each waits for another, in a circle.
+// Who holds what, and who waits for what, as boxes and arrows. If they close to a circle, and nobody
+// can open it, the runs on it can never go on. ring.js draws it.
 
-// Return of each such run its id, and a sentence that says for what it waits.
+// Return {stuck, boxes, arrows, says}: the ids of the runs that can never go on; {id, name}; {from,
+// to, label, says, hot}, where `hot` is on the circle; and the circle as one sentence, '' if there is
+// none. An arrow goes from who waits, and from what is held to who holds it: so a circle turns.
 function circleOf(setup, state) {
   const runs = model.going(state);
   const free = new Set();
@@ -32,30 +35,66 @@ function circleOf(setup, state) {
     return there || (working ? can(working) : waiting && isOpen(service));
   }
 
-  const name = run => model.named(setup, run);
-  const group = callback => model.groupOf(setup, callback).name;
-  const holder = callback => name(model.holder(setup, state, callback));
-
-  function why(run) {
-    const { client, service, there, working, waiting } = search(run);
-    const what = there ? 'The answer is there' : `The request waits for ${setup.callbacks[service].name}`;
-    const needed = there ? client : service;
-    if (working && !can(working)) return `${model.capital(name(working))} must give it, and waits itself.`;
-    if ((there || waiting) && !hasThread()) return `${what}, but no thread is free.`;
-    if ((there || waiting) && !isOpen(needed))
-      return `${what}, but ${setup.callbacks[needed].name} is in ${group(needed)}, which ${holder(needed)} holds.`;
-    if (working || waiting)
-      return `${setup.callbacks[client].name} must take it, but is in ${group(client)}, which ${holder(client)} holds.`;
-    return 'It never comes.';
-  }
-
   for (let grown = true; grown; ) {
     const before = free.size;
     runs.filter(canGo).forEach(run => free.add(run.id));
     grown = free.size > before;
   }
-  return runs.filter(run => !can(run)).map(run => ({
-    run: run.id,
-    says: `${model.capital(name(run))} waits for an answer. ${why(run)}`,
-  }));
+  const stuck = runs.filter(run => !can(run)).map(({ id }) => id);
+
+  const boxes = new Map();
+  const arrows = [];
+  const box = (id, name) => boxes.set(id, { id, name }).get(id);
+  const called = callback => setup.callbacks[callback].name;
+  const arrow = (from, to, label, says) => arrows.push({ from: from.id, to: to.id, label, says });
+  const alike = run => runs.filter(({ callback }) => callback === run.callback).length > 1;
+  const person = run => box(`run ${run.id}`, alike(run) ? model.named(setup, run) : called(run.callback));
+
+  const pool = box('threads', setup.threads.length > 1 ? ['', '', 'both threads'][setup.threads.length] ?? `all ${setup.threads.length} threads` : setup.threads[0]);
+  const rooms = setup.groups.map(({ name }, i) => box(`group ${i}`, name));
+  const roomOf = callback => rooms[setup.callbacks[callback].group];
+  const holds = (run, what, text) => arrow(what, person(run), 'held by', `${person(run).name} holds ${text}`);
+  runs.forEach(run => {
+    holds(run, pool, setup.threads.length > 1 ? setup.threads[run.thread] : pool.name);
+    if (model.groupOf(setup, run.callback).exclusive) holds(run, roomOf(run.callback), roomOf(run.callback).name);
+  });
+
+  runs.filter(({ waits }) => waits).forEach(run => {
+    const { client, service, taken, there, working, waiting } = search(run);
+    const answer = box(`answer ${run.id}`, `the answer of ${called(service)}`);
+    arrow(person(run), answer, 'waits for', `${person(run).name} waits for ${answer.name}`);
+    const needs = (what, whose) => arrow(answer, what, whose ? 'request waits for' : 'waits for',
+      `${whose ? 'its request' : 'it'} waits for ${what.name}`);
+    const needed = there ? client : service;
+    if (taken) return;
+    if (working) arrow(answer, person(working), 'comes from', `${answer.name} comes from ${person(working).name}`);
+    if (there || waiting) {
+      if (!state.runs.includes(null)) needs(pool, waiting);
+      else if (model.holder(setup, state, needed)) needs(roomOf(needed), waiting);
+      else if (!isOpen(client)) needs(roomOf(client));
+    } else if (working && can(working) && !isOpen(client)) needs(roomOf(client));
+  });
+
+  const on = id => !id.startsWith('run ') || stuck.includes(+id.slice(4));
+  const next = id => arrows.filter(({ from, to }) => from === id && on(from) && on(to));
+
+  // Return the shortest way from a box to another, as arrows.
+  function way(from, to) {
+    const ways = [[from, []]];
+    const been = new Set();
+    for (const [at, gone] of ways) {
+      if (at === to && gone.length) return gone;
+      if (been.has(at) && gone.length) continue;
+      been.add(at);
+      next(at).forEach(one => ways.push([one.to, [...gone, one]]));
+    }
+    return undefined;
+  }
+
+  if (stuck.length) arrows.forEach(one => { one.hot = on(one.from) && on(one.to) && Boolean(way(one.to, one.from)); });
+  const turns = stuck.map(id => way(`run ${id}`, `run ${id}`)).find(Boolean);
+  return {
+    stuck, boxes: [...boxes.values()], arrows,
+    says: stuck.length ? `Nobody can go on: ${(turns ?? []).map(({ says }) => says).join(', ')}.` : '',
+  };
 }

@@ -17,6 +17,7 @@ function show(root, level) {
   let now;
   let state;
   let lists;
+  let waits;
 
   const says = element('div', { 'aria-live': 'polite', class: 'replay-says' });
   const ready = element('ul', { 'aria-label': 'ready', role: 'list', class: 'level-ready' });
@@ -31,7 +32,9 @@ function show(root, level) {
 
   function draw() {
     const over = now.isOver(state);
-    lists.draw(state, over ? circleOf(setup, state) : []);
+    const circle = circleOf(setup, state);
+    lists.draw(state, over ? circle.stuck : []);
+    if (over) waits.draw(circle);
     time.textContent = `${+state.now.toFixed(3)} s`;
 
     const index = [...ready.children].findIndex(item => item.contains(document.activeElement));
@@ -80,10 +83,11 @@ function show(root, level) {
     state = now.start();
     const { threads, groups, arrivals } = setup;
     const grouped = threads.length * groups.length > 1 ? ['groups'] : [];
-    const names = ['threads', ...grouped, 'queue', ...ROWS[level.goal], 'circle'];
+    const names = ['threads', ...grouped, 'queue', ...ROWS[level.goal]];
+    waits = ring();
     lists = board(setup, names, { full: true });
     const timed = arrivals.at(-1).at ? [row('time', time)] : [];
-    shown.replaceChildren(element('div', { class: 'replay-run' }, ...timed, ...lists.rows));
+    shown.replaceChildren(element('div', { class: 'replay-run' }, ...timed, ...lists.rows, waits.node));
     code.textContent = variant.code;
     code.hidden = !variant.code;
     says.textContent = '';

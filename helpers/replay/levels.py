@@ -18,7 +18,8 @@ from itertools import product
 from helpers.notebook import shown
 from helpers.replay.script import played
 
-SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'element.js', 'board.js', 'level.js'
+SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'ring.js', 'element.js', 'board.js'
+SCRIPT += ('level.js',)
 ONE = 'SingleThreadedExecutor()'
 
 

@@ -43,13 +43,21 @@ class Run:
     after_s: float = 0.0
     opens: str = 'last loss'  # else at its end
 
-    styles = ()
-
     @property
     def scripts(self) -> tuple[str, ...]:
         """The files that step through it."""
-        acts = any('does' in callback for callback in self.setup['callbacks'])
-        return ('model.js', 'walk.js', 'board.js', *(('circle.js',) if acts else ()))
+        circle = ('circle.js', 'ring.js') if self.asks else ()
+        return ('model.js', 'walk.js', 'board.js', *circle)
+
+    @property
+    def styles(self) -> tuple[str, ...]:
+        return ('ring.css',) if self.asks else ()
+
+    @property
+    def asks(self) -> bool:
+        """Whether a callback waits for an answer: only then somebody may wait for ever."""
+        does = (step for callback in self.setup['callbacks'] for step in callback.get('does', ()))
+        return any('client' in step for step in does)
 
     @property
     def span_s(self) -> tuple[float, float]:

@@ -50,15 +50,16 @@ def played(kind: str, record: dict, says: str, *names: str) -> str:
 
     `record` is what their script gets.
     """
+    styles = [f'{kind}.css', *(['ring.css'] if 'ring.js' in names else [])]
     return (
         f'<div class="replay {kind}" data-{kind}={attribute(record)}>'
-        f'{style(f"{kind}.css")}<p>{escape(says)}</p>'
+        f'{style(*styles)}<p>{escape(says)}</p>'
         '<p class="replay-static">To play it, run the cell, or trust the notebook.</p>'
         f'<script>{script(*names)}</script></div>'
     )
 
 
-def javascript(function: str, *arguments) -> list | dict:
+def javascript(function: str, *arguments) -> list | dict | str:
     """Return what a function of stories.js or picture.js returns, here in Python."""
     context = Context()
     context.eval(COLOURS + ''.join(map(source, ('circle.js', *DRAWN))))

@@ -50,8 +50,8 @@ function stories(record, most) {
   return [...found.values()];
 }
 
-// Return the sentences of those that can never go on when the run is over.
+// Return the sentence of the circle in which the run ends, '' if there is none.
 function stuck(record) {
   const { state } = walk(record).seek(record.moves.length);
-  return circleOf(record.setup, state).map(({ says }) => says);
+  return circleOf(record.setup, state).says;
 }

@@ -23,22 +23,24 @@ function drawing(image) {
 function panel(run, record, image, [from, until], grouped) {
   const { setup, name } = record;
   const many = setup.callbacks.length > 1;
-  const asks = setup.callbacks.some(({ does = [] }) => does.some(step => 'client' in step));
-  const names = ['threads', ...(grouped ? ['groups'] : []), 'queue', ...(asks ? ['circle'] : many ? [] : ['lost'])];
+  const names = ['threads', ...(grouped ? ['groups'] : []), 'queue', ...(many ? [] : ['lost'])];
   const { rows, draw } = board(setup, names, { losses: run.scan().length });
   const time = element('span', { class: 'replay-time' });
+  const circle = run.end && ring();
   const svg = drawing(image);
   const cursor = svg.querySelector('.cursor');
   // No section: the deck takes each for a slide.
   const node = element('div', { class: 'replay-run', role: name ? 'group' : undefined, 'aria-label': name || undefined },
-    row(name || 'time', time), ...rows, element('div', { class: 'replay-picture' }, svg));
+    row(name || 'time', time), ...rows, ...(circle ? [circle.node] : []), element('div', { class: 'replay-picture' }, svg));
 
   return { node, draw(position, us) {
     const { state, says } = run.seek(position);
-    draw(state, asks ? circleOf(setup, state) : []);
+    const now = circle ? circleOf(setup, state) : { stuck: [] };
+    draw(state, now.stuck);
+    circle?.draw(now, run.end);
     point(us ?? 1e6 * state.now);
-    return says;
-  }, point };
+    return run.says?.(position) ?? says;
+  }, point, timeAt, light };
 
   // Put the clock and the cursor to a time.
   function point(us) {
@@ -46,11 +48,33 @@ function panel(run, record, image, [from, until], grouped) {
     const part = Math.min(Math.max((us / 1e6 - from) / (until - from), 0), 1);
     cursor.setAttribute('transform', `translate(${(part * svg.dataset.wide).toFixed(1)})`);
   }
+
+  function light(is) {
+    svg.querySelector('.same')?.remove();
+    const at = svg.dataset.rows.split(',').indexOf(is);
+    if (at < 0) return;
+    const band = document.createElementNS(svg.namespaceURI, 'rect');
+    const { row, top } = svg.dataset;
+    const looks = { class: 'same', x: 0, y: +top + row * at, width: '100%', height: Math.max(row, 4) };
+    Object.entries(looks).forEach(([name, value]) => band.setAttribute(name, value));
+    svg.prepend(band);
+  }
+
+  // Return where a pointer is in the picture: microseconds, and the message of that row, if any.
+  function timeAt({ clientX, clientY }) {
+    const { x, y } = new DOMPoint(clientX, clientY).matrixTransform(svg.getScreenCTM().inverse());
+    const { wide, left, row, top, rows } = svg.dataset;
+    const part = Math.min(Math.max((x - left) / wide, 0), 1);
+    return { us: 1e6 * (from + part * (until - from)), is: rows.split(',')[Math.floor((y - top) / row)] };
+  }
 }
 
 function show(root, record) {
   // One that has no setup is the drive of a robot: see drive.js.
-  const runs = record.runs.map(one => (one.setup ? walk(one) : drive(one)));
+  const runs = record.runs.map(one => {
+    const run = one.setup ? walk(one) : drive(one);
+    return typeof ring === 'undefined' ? run : close(run, one);
+  });
   const own = runs.map(run => run.scan());
   const ranks = runs.map((run, i) => run.ranks ?? run.times.map((_, step) => +own[i].includes(step + 1)));
   // All steps in the order of time: when, of which run, whether it says something, and whether also
@@ -65,9 +89,8 @@ function show(root, record) {
   // The steps after which a message is lost, or the robot hits something.
   const stops = own.map((found, i) => found.map(step => counts[i].indexOf(step)));
   const losses = stops.flat().sort((a, b) => a - b);
-  const lists = record.runs.some(({ setup }) => setup?.callbacks.length === 1);
   const named = (who, text) => (record.runs[who].name ? `${record.runs[who].name}: ` : '') + text;
-  const outcome = record.runs.flatMap((one, who) => (one.outcome ? [named(who, one.outcome)] : [])).join(' ');
+  const outcome = record.runs.flatMap((one, who) => (one.outcome ?? runs[who].end ? [named(who, one.outcome ?? runs[who].end.says)] : [])).join(' ');
   // It opens where it tells most: at the bump of the drive, else at the last loss, else at the end.
   const drives = record.runs.flatMap((one, who) => (one.setup ? [] : [who]));
   const bump = drives.length === 1 && record.opens !== 'end' ? stops[drives[0]][0] : undefined;
@@ -97,11 +120,6 @@ function show(root, record) {
     speed = (speed + 1) % SPEEDS.length;
     nameSpeed();
   }, undefined, 'replay-rate');
-  const loss = button('Next loss', () => {
-    const step = losses.find(step => fresh || step > position);
-    if (step === undefined) says.textContent = 'No message is lost after this.';
-    else rest(step);
-  });
   const back = button('‹', () => step(-1), 'back');
   const forth = button('›', () => step(1), 'forward');
   const shown = element('div', { class: 'replay-runs' }, ...panels.map(({ node }) => node));
@@ -240,12 +258,41 @@ function show(root, record) {
     rest(losses.slice(0, 1).find(first => first !== position && (fresh || first > position)) ?? last);
   }
 
+  // The picture is the slider, too: a pointer that is pressed takes the time with it.
+  function drag(panel, event) {
+    if (event.type === 'pointerdown') event.currentTarget.setPointerCapture(event.pointerId);
+    else if (!event.buttons) return;
+    const { us } = panel.timeAt(event);
+    const to = steps.findLastIndex(one => one.us <= us) + 1;
+    stop();
+    speak(false);
+    if (to !== position) go(to);
+  }
+
+  // One message lights up wherever it is: in a queue, on a thread, among the lost, in the picture.
+  function light(panel, is) {
+    panel.node.querySelectorAll('[data-is]').forEach(one => one.classList.toggle('replay-same', one.dataset.is === is));
+    panel.light(is);
+  }
+
+  panels.filter(({ timeAt }) => timeAt).forEach(panel => {
+    const svg = panel.node.querySelector('.replay-picture svg');
+    ['pointerdown', 'pointermove'].forEach(kind => svg.addEventListener(kind, event => {
+      drag(panel, event);
+      light(panel, panel.timeAt(event).is);
+    }));
+    ['pointerup', 'pointercancel'].forEach(kind => svg.addEventListener(kind, () => speak(true)));
+    ['pointerover', 'pointerdown'].forEach(kind => panel.node.addEventListener(kind, ({ target }) => {
+      if (!svg.contains(target)) light(panel, target.closest('[data-is]')?.dataset.is);
+    }));
+    panel.node.addEventListener('pointerleave', () => light(panel));
+  });
+
   wake(root, 'replay');
   root.addEventListener('keydown', onKey);
   root.addEventListener('next-stop', onStop);
   root.querySelectorAll('figure').forEach(figure => figure.remove());
-  const controls = element('div', { class: 'replay-controls' }, back, forth, play, faster, slider,
-    ...(lists && losses.length ? [loss] : []));
+  const controls = element('div', { class: 'replay-controls' }, back, forth, play, faster, slider);
   root.querySelector('.replay-on > p').before(controls, says, shown); // which is then below
   nameSpeed();
   rest(telling);

@@ -26,7 +26,7 @@ function states(record) {
 }
 
 // Of each step what a page shows: the sentence, who runs, who waits and why, which groups are held
-// and by whom, and the circle that can never go on.
+// and by whom, and the circle that can never go on: its sentence, and who waits for or holds what.
 function steps(record) {
   const { setup } = record;
   const run = walk(record);
@@ -39,7 +39,8 @@ function steps(record) {
       queues: state.queues.map(queue => queue.length),
       causes: state.queues.map((queue, i) => queue.length && model.cause(setup, state, i)),
       held: setup.groups.map((_, group) => named(model.holderOf(setup, state, group))),
-      circle: circleOf(setup, state).map(({ says: why }) => why),
+      circle: circleOf(setup, state).says,
+      arrows: circleOf(setup, state).arrows.map(({ says, hot }) => [says, Boolean(hot)]),
     };
   });
 }

@@ -48,7 +48,7 @@ function drive({ step, poses, commands, scans, events, bumps }) {
     const taken = command && command[3] >= 0 ? scans.findLast(([, seq]) => seq <= command[3]) : undefined;
     const now = latest(scans, ms);
     return {
-      ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]),
+      ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]), age: taken && (ms - taken[0]) / 1000,
       told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}, ${seconds(command[4])} s old`) : 'nothing yet',
     };
   }
@@ -86,6 +86,20 @@ function floor(run, record, svg) {
   });
   const radius = +find('robot').querySelector('circle').getAttribute('r');
   let hits = 0;
+  const wide = svg.viewBox.baseVal.width;
+  const ghost = document.createElementNS(svg.namespaceURI, 'text');
+  ghost.setAttribute('class', 'ghost');
+  svg.append(ghost);
+
+  // What the dashed robot is, beside it: the real age of what the brake acts on.
+  function label({ old, was, age }, r) {
+    ghost.textContent = old ? `the brake sees this, ${age.toFixed(1)} s ago` : '';
+    if (!old) return;
+    const { x, y } = new DOMPoint(was.x, was.y + 1.3 * r).matrixTransform(find('robot').parentNode.transform.baseVal.consolidate().matrix);
+    const half = ghost.getComputedTextLength() / 2;
+    ghost.setAttribute('x', Math.min(Math.max(x, half + 8), wide - half - 8).toFixed(1));
+    ghost.setAttribute('y', Math.max(y - 6, 30).toFixed(1));
+  }
   const [time, robot, told] = Array.from({ length: 3 }, () => element('span', { class: 'replay-time' }));
 
   function draw(position, us, plays) {
@@ -98,6 +112,7 @@ function floor(run, record, svg) {
     find('fan').setAttribute('d', now.fan);
     const r = radius;
     find('old').setAttribute('d', now.old && `${now.old}M${now.was.x - r} ${now.was.y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`);
+    label(now, r);
     const counts = [Math.floor(ms / 1000), record.bumps.filter(at => at <= ms).length];
     if (plays && counts[1] > hits) ringAt(svg, now, radius);
     [, hits] = counts;
