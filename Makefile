@@ -6,8 +6,8 @@ help: ## show this list
 lab: set_up ## open JupyterLab on the first notebook; PORT=8890, BROWSER=no, OUTPUTS=yes (those of the repository), LAB_ARGS=... change how
 	@exec $(PYTHON) -m tools.lab $(if $(filter yes,$(OUTPUTS)),--outputs) $(server) -- $(LAB_ARGS)
 
-present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02, or PLAN=90, a timetable; NEW=yes makes it anew
-	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" $(if $(filter yes,$(NEW)),--new) \
+present: set_up ## show a copy of a lesson as slides whose cells run: LESSON=02, or PLAN=90, a timetable; NEW=yes makes it anew; CLASS= names the class of a hub
+	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" --class "$(CLASS)" $(if $(filter yes,$(NEW)),--new) \
 		$(server) -- $(LAB_ARGS)
 
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join over the network; PORT=8765, BROWSER=no
@@ -41,15 +41,15 @@ test-classroom: ## slides, notes and class page; then a class of 12 on a Jupyter
 	$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 classroom/tests/hub $(PYTEST_ARGS) || failed=$$?; \
 	exit $$failed
 
-image: ## a container image of the lessons, with podman or docker: BASE=, CONTAINER=, IMAGE_ARGS=... change how
-	@classroom/container/run.sh image
+image: ## a container image of the lessons, with podman or docker: SOLUTIONS=no, BASE=, CONTAINER=, IMAGE_ARGS=... change how
+	@SOLUTIONS=$(SOLUTIONS) classroom/container/run.sh image
 
 lab-container: ## the lessons in a container of that image, your notebooks in my_lessons/: PORT=8890, LESSONS=FOLDER
 	@classroom/container/run.sh lab
 
-hub: ## a JupyterHub for a class on this machine; CONTAINERS=yes, HUB_ARGS=... change how. See classroom/HOSTING.md
+hub: ## a JupyterHub for a class on this machine; SOLUTIONS=no, CONTAINERS=yes, HUB_ARGS=... change how. See classroom/HOSTING.md
 	@classroom/hub/set_up.sh
-	@exec $(PYTHON) -m classroom.hub $(if $(filter yes,$(CONTAINERS)),--containers) -- $(HUB_ARGS)
+	@CONTAINERS=$(CONTAINERS) SOLUTIONS=$(SOLUTIONS) exec $(PYTHON) -m jupyterhub --config classroom/hub/jupyterhub_config.py $(HUB_ARGS)
 
 handout: set_up ## a student's edition as one archive: SOLUTIONS=no leaves the solutions out, OFFLINE=yes (PYTHONS="3.11 3.12") adds the packages
 	@$(PYTHON) -m classroom.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
