@@ -62,13 +62,20 @@ c.Spawner.environment = {
 
 # --- The class page, and what ends a server that nobody has used for an hour ---------------------
 
+# Not by `url` of the service: then the hub would end if the page needed more than ten seconds to
+# start, as it may on a busy machine.
+c.Proxy.extra_routes = {'/services/class/': CLASS_URL}
 c.JupyterHub.services = [
     {
         'name': 'class',
-        'url': CLASS_URL,
         'command': [*WITH_HUB, 'classroom.class_page.on_hub'],
         'cwd': str(ROOT),
-        'environment': {'CLASS_FOLDER': str(STATE)},
+        'environment': {
+            'CLASS_FOLDER': str(STATE),
+            'JUPYTERHUB_SERVICE_URL': CLASS_URL,
+            'JUPYTERHUB_SERVICE_PREFIX': '/services/class/',
+        },
+        'oauth_redirect_uri': '/services/class/oauth_callback',
         'oauth_no_confirm': True,
     },
     {'name': 'idle-culler', 'command': [*WITH_HUB, 'jupyterhub_idle_culler', '--timeout=3600']},

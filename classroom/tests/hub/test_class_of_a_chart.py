@@ -19,8 +19,8 @@ pytestmark = needs_hub
 VALUES = yaml.safe_load((ROOT / 'classroom/hub/values.yaml').read_text())['hub']
 TOKEN = 'token-of-the-class'
 CONFIG = """
-port = c.JupyterHub.services[0]['url']
-c.JupyterHub.services[0] = dict({service!r}, name='class', api_token={token!r}, url=port)
+c.Proxy.extra_routes = {{}}
+c.JupyterHub.services[0] = dict({service!r}, name='class', api_token={token!r}, url=CLASS_URL)
 c.JupyterHub.spawner_class = 'simple'
 """
 

@@ -53,7 +53,9 @@ for one in (c.JupyterHub, c.Spawner):
         if name in one:
             setattr(one, name, getattr(one, name).replace('8081', '{ports[0]}'))
 c.ConfigurableHTTPProxy.api_url = 'http://127.0.0.1:{ports[1]}'
-c.JupyterHub.services[0]['url'] = 'http://127.0.0.1:{ports[2]}'
+CLASS_URL = 'http://127.0.0.1:{ports[2]}'
+c.JupyterHub.services[0]['environment']['JUPYTERHUB_SERVICE_URL'] = CLASS_URL
+c.Proxy.extra_routes = {{'/services/class/': CLASS_URL}}
 in_class = c.Spawner.environment['ROS2_NOTEBOOKS_CLASS']
 c.Spawner.environment['ROS2_NOTEBOOKS_CLASS'] = in_class.replace('8764', '{ports[2]}')
 c.ConfigurableHTTPProxy.pid_file = str(folder / 'proxy.pid')
