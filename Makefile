@@ -26,8 +26,8 @@ clean: ## remove the environment, caches and what lessons built; what you wrote 
 
 ## Teach
 
-present: set_up ## show lessons as slides whose cells run: LESSON=02, PLAN=90 (a timetable), NEW=yes
-	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" $(if $(filter yes,$(NEW)),--new) \
+present: set_up ## show lessons as slides whose cells run: LESSON=02, PLAN=90 (a timetable), NEW=yes, CLASS=
+	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" --class "$(CLASS)" $(if $(filter yes,$(NEW)),--new) \
 		$(server) -- $(LAB_ARGS)
 
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join; PORT=8765, BROWSER=no
@@ -41,12 +41,12 @@ grade: set_up ## judge what students hand in: FOLDER=submissions, LESSON=02, JOB
 	@$(PYTHON) -m classroom.grade "$(or $(FOLDER),submissions)" --lesson "$(LESSON)" --seed "$(SEED)" --assignment "$(ASSIGNMENT)" \
 		$(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
 
-hub: ## run a JupyterHub for a class: CONTAINERS=yes, HUB_ARGS=...; see classroom/HOSTING.md
+hub: ## run a JupyterHub for a class: CONTAINERS=yes, SOLUTIONS=no, HUB_ARGS=...; see classroom/HOSTING.md
 	@classroom/hub/set_up.sh
-	@exec $(PYTHON) -m classroom.hub $(if $(filter yes,$(CONTAINERS)),--containers) -- $(HUB_ARGS)
+	@CONTAINERS=$(CONTAINERS) SOLUTIONS=$(SOLUTIONS) exec $(PYTHON) -m jupyterhub --config classroom/hub/jupyterhub_config.py $(HUB_ARGS)
 
-image: ## build the container image of the lessons: BASE=..., CONTAINER=..., IMAGE_ARGS=...
-	@classroom/container/run.sh image
+image: ## build the container image of the lessons: SOLUTIONS=no, BASE=, CONTAINER=, IMAGE_ARGS=
+	@SOLUTIONS=$(SOLUTIONS) classroom/container/run.sh image
 
 ## Contribute
 

@@ -3,6 +3,7 @@
     python -m classroom.handout                       without notes for the instructor
     python -m classroom.handout --no-solutions        and without solutions
     python -m classroom.handout --wheels 3.11 3.12    with all packages for these Pythons
+    python -m classroom.handout --lessons FOLDER      the lessons only, into this folder
 
 It is a student's: KEPT, with students.md as its README and a Makefile of COMMANDS.
 environment.md is without what is between `<!-- not in the handout -->` and `<!-- end -->`. The
@@ -68,10 +69,7 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
                 texts[name] = change((course / name).read_text(encoding='utf-8'))
         for name, text in texts.items():
             (course / name).write_text(text, encoding='utf-8')
-        left_out = {'notes'} if solutions else {'notes', 'solution'}
-        for path in course.glob('notebooks/*.ipynb'):
-            notebook = nbformat.read(path, as_version=4)
-            path.write_text(text_of(lesson_for_students(notebook, left_out)), encoding='utf-8')
+        write_lessons(course / 'notebooks', course / 'notebooks', solutions=solutions)
         shutil.copytree(course, Path(folder, BASE))
         Path(folder, BASE).rename(course / BASE)
         if pythons:
@@ -82,6 +80,20 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
             archive.add(course, NAME)
         new.replace(output)
     return output
+
+
+def write_lessons(source: Path, to: Path, *, solutions: bool = True) -> None:
+    """Write the lessons of a folder as students get them: all may read them, and no others stay."""
+    left_out = {'notes'} if solutions else {'notes', 'solution'}
+    paths = sorted(source.glob('*.ipynb'))
+    to.mkdir(parents=True, exist_ok=True)
+    to.chmod(0o755)
+    for other in {path.name for path in to.glob('*.ipynb')} - {path.name for path in paths}:
+        (to / other).unlink()
+    for path in paths:
+        lesson = lesson_for_students(nbformat.read(path, as_version=4), left_out)
+        (to / path.name).write_text(text_of(lesson), encoding='utf-8')
+        (to / path.name).chmod(0o644)
 
 
 def not_committed(root: Path) -> list[str]:
@@ -184,8 +196,14 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Make a student's edition of this course.")
     parser.add_argument('--no-solutions', action='store_true')
     parser.add_argument('--wheels', nargs='+', default=(), metavar='PYTHON', help='such as 3.12')
+    parser.add_argument('--lessons', type=Path, metavar='FOLDER', help='no archive: lessons only')
     parser.add_argument('--root', type=Path, default=ROOT)
     options = parser.parse_args(arguments)
+    if options.lessons:
+        write_lessons(
+            options.root / 'notebooks', options.lessons, solutions=not options.no_solutions
+        )
+        return 0
     output = options.root / 'handout' / f'{NAME}.tar.gz'
     try:
         solutions, pythons = not options.no_solutions, tuple(options.wheels)

@@ -31,6 +31,9 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser('Show copies of lessons as a deck, slides whose cells run.')
     options.add_argument('--lessons', default='', help="numbers such as '2 3', the first is shown")
     options.add_argument('--plan', default='', help='a timetable of teaching.md, such as 90')
+    options.add_argument(
+        '--class', dest='page', default='', help='the class of a hub, as its page says'
+    )
     options.add_argument('--new', action='store_true', help='throw away what was typed')
     options = options.parse_args(arguments)
     root = options.root
@@ -59,6 +62,7 @@ def main(arguments: list[str] | None = None) -> int:
             f'--LabApp.extra_labextensions_path={EXTENSIONS}',
             '--ServerApp.jpserver_extensions=classroom.deck.server=True',
             f'--Deck.plan={options.plan}',
+            f'--Deck.page={options.page}',
         ),
         name='presenter',
         settings=SETTINGS,

@@ -100,6 +100,8 @@ function show(state) {
   put('about', state.about, ({ about, tasks }) =>
     element('li', `${about}: ${tasks.map(({ number, who }) => `task ${number}: ${who.join(', ')}`).join('; ')}`));
   find('joins').textContent = state.joins.join('\n');
+  const here = location.href.replace(/[?#].*/, '');
+  find('slides').textContent = state.secret && `Slides on your machine: make present LESSON=02 CLASS=${here}${state.secret}/`;
   if (cell) parent.postMessage(document.documentElement.offsetHeight, '*'); // to the deck
   if (shown.notes !== state.notes) find('notes').innerHTML = shown.notes = state.notes; // the lesson's
 }
@@ -113,8 +115,6 @@ onhashchange = () => {
   show(last);
 };
 find('lessons').onchange = event => ask('go', { lesson: event.target.value, step: 0 });
-find('forget').onclick = () =>
-  confirm('Delete all guesses, tasks, hands and names?') && ask('forget');
 find('end').onclick = async () => {
   if (!confirm('End the class, and delete what it was told?')) return;
   await ask('end');

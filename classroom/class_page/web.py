@@ -3,7 +3,7 @@
     POST join, events, leave   of students: helpers/checks/classroom.py documents them
     GET  SECRET/               the instructor's page, its files, and `live`, its changes
     POST SECRET/slide          of the deck, when it goes on: events.SLIDE is what it tells
-    POST SECRET/show, hide, remove, go, lower, forget, end
+    POST SECRET/show, hide, remove, go, lower, end
                                the buttons of the page
 
 The instructor's page is below a secret. It asks for nothing again and again: the server sends it
@@ -52,6 +52,7 @@ class Room:
         self.store, self.stop = store, stop
         self.over = False  # the pages say it
         self.joins: list[str] = []  # what students type, for the wall
+        self.deck_asks = False  # for the address of the page: it cannot find it by itself
         self.present = next(iter(store.lessons)), 0
         self.follows_students = True  # until the deck or the instructor says where the class is
         self._minutes: dict[tuple[str, int], dict] = {}  # of the step that the deck shows
@@ -88,7 +89,8 @@ class Room:
         gone = int(time.time() - began_s) // 60 if began_s else 0
         shown = self.store.view(lesson, step) | self.store.lessons[lesson].notes[step]
         shown |= self._minutes.get(self.present, {})
-        return shown | {'gone': gone, 'joins': self.joins, 'over': self.over}
+        secret = self.store.secret if self.deck_asks else ''
+        return shown | {'gone': gone, 'joins': self.joins, 'secret': secret, 'over': self.over}
 
 
 class Handler(web.RequestHandler):
@@ -214,8 +216,6 @@ class Instructor(Handler):
                     self.room.show_slide(parse(self.request.body, events.SLIDE))
                 case 'lower':
                     store.lower(int(wanted['seat']))
-                case 'forget':
-                    store.forget()
                 case 'end':
                     self.room.stop()
                 case _:

@@ -3,7 +3,7 @@
 # and macOS.
 # usage: classroom/container/run.sh image|lab|label|ready|judge NAME|end NAME
 # CONTAINER is podman or docker, with options if it needs some; IMAGE_ARGS and RUN_ARGS are added to
-# its build and its run; BASE, PORT and LESSONS are those of the Makefile.
+# its build and its run; SOLUTIONS, BASE, PORT and LESSONS are those of the Makefile.
 set -eu
 cd "$(dirname "$0")/../.."
 image=localhost/ros2_notebooks
@@ -27,7 +27,8 @@ $container version > /dev/null 2>&1 ||
     fail "${name##*/} does not answer: start it (podman machine start, Docker Desktop, or sudo systemctl start docker), then try again."
 
 make_image() {
-    set -- --file classroom/container/Containerfile --tag "$image" --label "lessons=$inside" ${BASE:+--build-arg "BASE=$BASE"}
+    set -- --file classroom/container/Containerfile --tag "$image" --label "lessons=$inside" \
+        --label "solutions=${SOLUTIONS:-yes}" --build-arg "SOLUTIONS=${SOLUTIONS:-yes}" ${BASE:+--build-arg "BASE=$BASE"}
     # The wheels of ROS 2 are for x86-64; a base with ROS 2 is for the machine that it is on.
     case ${BASE-} in *ros:*) ;; *) [ "$(uname -m)" = x86_64 ] || set -- "$@" --platform linux/amd64 ;; esac
     # Podman's own format of images has no health check.

@@ -5,8 +5,10 @@ set -eu
 root=$(dirname "$0")/../..
 mine=$HOME/ros2_notebooks
 mkdir -p "$mine" "${TMPDIR:-/tmp}"
+# On a hub, others on this machine must not read what a student writes. A volume belongs to nobody else.
+[ -z "${JUPYTERHUB_API_TOKEN-}" ] || chmod go-rwx "$HOME" 2> /dev/null || true
 # Without newer lessons, too, a student can work.
-(cd "$root" && exec .venv/bin/python -m classroom.update notebooks --to "$mine") || true
+(cd "$root" && exec .venv/bin/python -m classroom.update "${LESSONS:-notebooks}" --to "$mine") || true
 
 # The path of a socket file is limited to 107 bytes, and a home folder may have a long name.
 JUPYTER_RUNTIME_DIR=${TMPDIR:-/tmp}/jupyter-$(id -u)

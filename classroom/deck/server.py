@@ -1,7 +1,8 @@
 """What the server of `make present` does for the deck in the browser.
 
 POST deck/fresh     {"path": "presentation/02_lose_messages.ipynb"}: makes a copy anew
-GET deck/class      the address of the page of the class that is open here, or nothing
+GET deck/class      the address of the page of the class: of a hub's, if one was named, else of the
+                    one that is open here, or nothing
 GET deck/look.css   colours and fonts of the lessons
 """
 
@@ -35,12 +36,17 @@ class Fresh(JupyterHandler):
 class PageOfClass(JupyterHandler):
     """Give the deck the address of the class page; nothing if no class is open."""
 
+    def initialize(self, page: str) -> None:
+        """Take over the address of a hub's."""
+        self.page = page
+
     @web.authenticated
     def get(self) -> None:
         """Answer with the address."""
         self.set_header('Content-Type', 'text/plain')
         self.set_header('Cache-Control', 'no-store')
-        self.finish(page_file().read_text() if page_file().is_file() else '')
+        here = page_file().read_text() if page_file().is_file() else ''
+        self.finish(self.page or here)
 
 
 class Look(JupyterHandler):
@@ -57,11 +63,12 @@ def _load_jupyter_server_extension(server: ServerApp) -> None:
     """Let the server of `make present` answer the deck."""
     base = server.web_app.settings['base_url']
     copies = Copies(Path(server.root_dir), server.config.Deck.get('plan', ''))
+    page = server.config.Deck.get('page', '')
     server.web_app.add_handlers(
         '.*',
         [
             (url_path_join(base, 'deck/fresh'), Fresh, {'copies': copies}),
-            (url_path_join(base, 'deck/class'), PageOfClass),
+            (url_path_join(base, 'deck/class'), PageOfClass, {'page': page}),
             (url_path_join(base, 'deck/look.css'), Look),
         ],
     )

@@ -28,6 +28,8 @@ from classroom.grade.submissions import ARCHIVES, Submission, submissions_of, wo
 from tools.lessons.lesson import FOLDER, chosen
 
 LIMIT_MIN = 20.0
+# A browser, or a system that hides endings, adds one.
+NOTEBOOKS = ('.ipynb', '.ipynb.txt', '.ipynb.json', '.json')
 
 
 @dataclass
@@ -51,23 +53,34 @@ class Read:
 
 def read(student: Submission, known: list[Handed]) -> tuple[Work, list[Read]]:
     """Return what can be read of a submission, with one sentence for each file that cannot."""
-    work, notebooks = Work(tables.Row(student)), []
+    work, notebooks, others = Work(tables.Row(student)), [], []
     said = work.row.said
+
+    def take(path: str, data: bytes) -> None:
+        cells = cells_of(data)
+        notebooks.append(Read(path, cells, lesson_of(cells, known)))
+
     for file in student.files:
         name = file.name.lower()
         try:
-            if name.endswith('.ipynb'):
-                cells = cells_of(file.read())
-                notebooks.append(Read(file.path, cells, lesson_of(cells, known)))
+            if name.endswith(NOTEBOOKS):
+                take(file.path, file.read())
             elif name.endswith(ARCHIVES):
-                work.files |= workspace_files(file)
+                for inside, data in workspace_files(file).items():
+                    if inside.endswith(NOTEBOOKS):
+                        # What goes back has a name of the download: so its owner is known.
+                        take(f'{file.path}-{Path(inside).name}', data)
+                    else:
+                        work.files[inside] = data
+            elif name:
+                others.append(Path(file.name).name)
         except (OSError, RuntimeError, NotImplementedError, ValueError, zipfile.BadZipFile) as why:
             said.append(f'{file.name} cannot be read: {why}')
     for one in notebooks:
         if one.lesson is None:
             said.append(f'{Path(one.path).name} is no lesson of this course')
     if not notebooks and not said:
-        said.append('no notebook')
+        said.append(', but '.join(['no notebook', *(', '.join(others[:3]) for _ in others[:1])]))
     return work, [one for one in notebooks if one.lesson]
 
 

@@ -98,11 +98,20 @@ def cells_of(data: bytes) -> list[Cell]:
     try:
         notebook = json.loads(data)
     except (ValueError, RecursionError):
-        raise ValueError('it is broken: it is no JSON') from None
+        raise ValueError(_why_no_json(data)) from None
     cells = notebook.get('cells') if isinstance(notebook, dict) else None
     if not isinstance(cells, list):
         raise ValueError('it is no notebook: it has no cells')
     return [_cell(cell) for cell in cells if isinstance(cell, dict)]
+
+
+def _why_no_json(data: bytes) -> str:
+    start = data.lstrip()[:1000].lower()
+    if start.startswith((b'<!doctype', b'<html')):
+        return 'it is a web page, no notebook'
+    if re.search(rb'^(<{7}|>{7}) ', data, re.MULTILINE):
+        return 'it is broken: git has left its marks of a conflict in it'
+    return 'it is broken: it is no JSON'
 
 
 def _cell(cell: dict) -> Cell:
@@ -151,7 +160,7 @@ def _plain(source: str) -> str:
 def answers_of(cells: list[Cell], handed: Handed) -> Answers:
     """Return what a student has written in the exercise cells of a lesson."""
     answers = Answers()
-    doubled, missing, looked_at = [], [], []
+    doubled, missing, looked_at, beside = [], [], [], []
     by_id: dict[str, list[Cell]] = {}
     for cell in cells:
         if cell.kind == 'code':
@@ -162,8 +171,9 @@ def answers_of(cells: list[Cell], handed: Handed) -> Answers:
             same = by_id.get(exercise.id, [])
             if len(same) > 1:
                 doubled.append(str(task.number))
+            written = [cell for cell in same if _plain(cell.source) != _plain(exercise.source)]
             if same:
-                source = same[-1].source
+                source = (written or same)[-1].source
             elif place < len(in_order):
                 source = in_order[place].source
             else:
@@ -176,9 +186,15 @@ def answers_of(cells: list[Cell], handed: Handed) -> Answers:
             taught = '\n'.join(cell.source for cell in (*task.exercises, *task.solutions))
             if set(MACHINERY.findall(source)) - set(MACHINERY.findall(taught)):
                 looked_at.append(str(task.number))
+        known = {cell.id for cell in handed.cells}
+        added = [cell for cell in _inside(cells, task.number) if cell.id not in known]
+        has_ids = any(cell.id in known for cell in cells)
+        if has_ids and not answers.changed(task) and any(cell.source.strip() for cell in added):
+            beside.append(str(task.number))
     for numbers, what in (
         (missing, 'has no cell'),
-        (doubled, 'has its cell twice: the last one counts'),
+        (doubled, 'has its cell twice: the last one that was changed counts'),
+        (beside, 'is as it was handed out, but a cell was added to it: read that yourself'),
         (looked_at, 'reaches for what judges it: read it yourself'),
     ):
         if numbers:
@@ -192,15 +208,7 @@ def answers_of(cells: list[Cell], handed: Handed) -> Answers:
 
 def _below_heading(cells: list[Cell], task: int) -> list[Cell]:
     """Return the exercise cells below the heading of a task, by their tag, else by their place."""
-    inside, found = False, []
-    for cell in cells:
-        heading = HEADING.search(cell.source) if cell.kind == 'markdown' else None
-        if heading:
-            inside = int(heading[1]) == task
-        elif inside and cell.kind == 'markdown' and cell.source.startswith('#'):
-            inside = False
-        elif inside and cell.kind == 'code':
-            found.append(cell)
+    found = _inside(cells, task)
     tagged = [cell for cell in found if 'exercise' in cell.tags]
     if tagged:
         return tagged
@@ -210,3 +218,17 @@ def _below_heading(cells: list[Cell], task: int) -> list[Cell]:
             break
         above.append(cell)
     return above
+
+
+def _inside(cells: list[Cell], task: int) -> list[Cell]:
+    """Return the code cells between the heading of a task and the next heading."""
+    inside, found = False, []
+    for cell in cells:
+        heading = HEADING.search(cell.source) if cell.kind == 'markdown' else None
+        if heading:
+            inside = int(heading[1]) == task
+        elif inside and cell.kind == 'markdown' and cell.source.startswith('#'):
+            inside = False
+        elif inside and cell.kind == 'code':
+            found.append(cell)
+    return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -13,7 +14,10 @@ from classroom.grade.runner import LATE, Said
 from helpers.checks.verdict import KEY
 from tools.lessons.lesson import ROOT, tags
 
-FORM = 1  # of the files
+FORM = 2  # of the files
+INTERRUPTED = re.compile(r'Interrupted after (\d+) s\.')  # as judge.py says it
+UNKNOWN = re.compile(r"NameError: name '(\w+)' is not defined")
+FILE = re.compile(r'\((\d+\.py|<tokenize>), line')  # a cell of a kernel is no file for a reader
 CELL_S = 100.0  # as `make notebooks` gives a cell
 
 
@@ -141,12 +145,16 @@ def _verdict(task: int, outputs: list[dict]) -> dict | None:
 def _error(task: Task, outputs: dict[str, list[dict]]) -> str:
     """Return the error of a task's own cells, or else that of its check."""
     for cell in (*task.exercises, *task.checks):
+        whose = 'its check' if cell in task.checks else 'its cell'
         for output in outputs.get(cell.id, []):
+            if late := INTERRUPTED.match(str(output.get('text', ''))):
+                return f'{whose} did not end in {late[1]} s'
             if output.get('output_type') == 'error':
                 said = f'{output.get("ename")}: {output.get("evalue")}'.strip(': ').splitlines()[0]
-                return (
-                    f'{"its check" if cell in task.checks else "its cell"} ended with {said[:200]}'
-                )
+                unknown = UNKNOWN.match(said)
+                if unknown and cell in task.checks:
+                    return f'its cell defines no {unknown[1]}'
+                return f'{whose} ended with {FILE.sub("(line", said)[:200]}'
     return ''
 
 

@@ -1,75 +1,34 @@
-"""JupyterHub for a class on one machine, started by `make hub`. HOSTING.md says how to use it.
-
-Everybody who has an account on this machine may log in, with its password. With CONTAINERS=yes each
-student's server runs in a container of the image of `make image`, with limits of its own.
-"""
+"""JupyterHub for a class on one machine, started by `make hub`. HOSTING.md says how to use it."""
 
 import os
-import socket
 import sys
-from contextlib import suppress
 from pathlib import Path
-from urllib.parse import urlsplit
 
-from jupyterhub.proxy import ConfigurableHTTPProxy
-
+from classroom.handout import write_lessons
 from helpers.checks.classroom import HUB_VARIABLE
 
 ROOT = Path(__file__).resolve().parents[2]
 STATE = ROOT / '.jupyter/hub'
-FIRST_PORT, LAST_PORT = 20000, 32767  # of the students' servers
-
-
-def is_free(port: int, address: str = '') -> bool:
-    """Return whether a server could have this port now; 0 stands for any."""
-    with suppress(OSError), socket.create_server((address, port)):
-        return True
-    return False
-
-
-def port_of(wanted: int) -> int:
-    """Return a port that is free: the wanted one, or one of those that follow."""
-    return next(filter(is_free, range(wanted, LAST_PORT)))
-
-
 STATE.mkdir(mode=0o700, parents=True, exist_ok=True)
+# A service ends with the hub, also if that is killed: the next hub needs its port.
+WITH_HUB = ['setpriv', '--pdeathsig', 'KILL', sys.executable, '-m']
+
 c = get_config()  # noqa: F821
 
+# --- Everybody who has an account on this machine logs in with its password ----------------------
+
+c.Authenticator.allow_all = True
 c.JupyterHub.bind_url = 'http://127.0.0.1:8000'
-HUB_PORT, CLASS_PORT = port_of(8081), port_of(8764)
-c.JupyterHub.hub_bind_url = f'http://127.0.0.1:{HUB_PORT}'
-c.ConfigurableHTTPProxy.api_url = f'http://127.0.0.1:{port_of(8001)}'
+c.JupyterHub.hub_bind_url = 'http://127.0.0.1:8081'
 c.JupyterHub.db_url = f'sqlite:///{STATE}/jupyterhub.sqlite'
 c.JupyterHub.cookie_secret_file = str(STATE / 'cookie_secret')
+c.JupyterHub.proxy_class = 'classroom.hub.proxy.Proxy'
 c.ConfigurableHTTPProxy.pid_file = str(STATE / 'proxy.pid')
 c.ConfigurableHTTPProxy.command = (
     f'{sys.prefix}/hub_proxy/node_modules/.bin/configurable-http-proxy'
 )
-c.Authenticator.allow_all = True
 
-
-class Proxy(ConfigurableHTTPProxy):
-    """The proxy, which says so where its port is in use. By itself it would go on without one."""
-
-    async def start(self) -> None:
-        """Start it, or end the hub with a sentence."""
-        self._check_previous_process()  # one that a hub has left, which was killed
-        where = urlsplit(self.public_url)
-        port = where.port or (443 if where.scheme == 'https' else 80)
-        try:
-            socket.create_server((where.hostname, port)).close()
-        except OSError as problem:
-            self.log.critical(
-                'The port of %s cannot be used (%s): choose another one, for example '
-                "`make hub HUB_ARGS='--url=http://127.0.0.1:8001'`.",
-                self.public_url,
-                os.strerror(problem.errno),
-            )
-            self.app.exit(1)
-        await super().start()
-
-
-c.JupyterHub.proxy_class = Proxy
+# --- Each student has a server, as that account --------------------------------------------------
 
 c.Spawner.cmd = [str(ROOT / 'classroom/container/start_student.sh')]
 c.Spawner.notebook_dir = '~/ros2_notebooks'
@@ -86,73 +45,66 @@ c.Spawner.args = [
 ]
 
 
-def choose_port(spawner) -> None:
-    """Give each student's server a port of its own: many start at the same moment."""
-    ports = range(FIRST_PORT + spawner.user.id % 1000, LAST_PORT, 1000)
-    spawner.port = next(filter(is_free, ports))
+def own_port(spawner) -> None:
+    """Give each student's server a port of its own, for the same reason."""
+    spawner.port = 20000 + spawner.user.id % 10000
 
 
-c.Spawner.pre_spawn_hook = choose_port
+c.Spawner.pre_spawn_hook = own_port
+CLASS_URL = 'http://127.0.0.1:8764'
+LESSONS = ROOT / '.jupyter/lessons'  # without notes, and without solutions if SOLUTIONS=no
+SOLUTIONS = os.environ.get('SOLUTIONS') != 'no'
+write_lessons(ROOT / 'notebooks', LESSONS, solutions=SOLUTIONS)
+c.Spawner.environment = {
+    HUB_VARIABLE: f'{CLASS_URL}/services/class',
+    'LESSONS': str(LESSONS),
+}
 
-# The class that sees itself. The kernels of the students tell it; its page is for administrators.
-CLASS_URL = f'http://127.0.0.1:{CLASS_PORT}'
+# --- The class page, and what ends a server that nobody has used for an hour ---------------------
+
+# Not by `url` of the service: then the hub would end if the page needed more than ten seconds to
+# start, as it may on a busy machine.
+c.Proxy.extra_routes = {'/services/class/': CLASS_URL}
 c.JupyterHub.services = [
     {
         'name': 'class',
-        'url': CLASS_URL,
-        # It ends with the hub, also if that is killed.
-        'command': ['setpriv', '--pdeathsig', 'TERM', sys.executable]
-        + ['-m', 'classroom.hub.class_service'],
+        'command': [*WITH_HUB, 'classroom.class_page.on_hub'],
         'cwd': str(ROOT),
-        'environment': {'CLASS_FOLDER': str(STATE)},
+        'environment': {
+            'CLASS_FOLDER': str(STATE),
+            'JUPYTERHUB_SERVICE_URL': CLASS_URL,
+            'JUPYTERHUB_SERVICE_PREFIX': '/services/class/',
+        },
+        'oauth_redirect_uri': '/services/class/oauth_callback',
         'oauth_no_confirm': True,
-        'timeout': 180,  # the hub ends where a service takes longer to start
-    }
+    },
+    {'name': 'idle-culler', 'command': [*WITH_HUB, 'jupyterhub_idle_culler', '--timeout=3600']},
 ]
-c.Spawner.environment = {HUB_VARIABLE: f'{CLASS_URL}/services/class'}
-
-# --- A server that nobody has used for an hour is ended ------------------------------------------
-
-c.JupyterHub.services.append(
-    {
-        'name': 'idle-culler',
-        'command': [sys.executable, '-m', 'jupyterhub_idle_culler', '--timeout=3600'],
-    }
-)
-c.JupyterHub.load_roles.append(
+c.JupyterHub.load_roles = [
     {
         'name': 'idle-culler',
         'services': ['idle-culler'],
         'scopes': ['list:users', 'read:users:activity', 'read:servers', 'delete:servers'],
     }
-)
+]
 
-# --- Each student in a container -----------------------------------------------------------------
+# --- CONTAINERS=yes: each student's server is in a container of the image of `make image` --------
 
 if os.environ.get('CONTAINERS') == 'yes':
     from docker.types import Ulimit
 
-    from classroom.hub.service import IMAGE, gateway
+    from classroom.hub.containers import IMAGE, use_service
 
-    # The address of this machine in the network of the containers. Podman has it only while one of
-    # them runs: then the hub listens at all addresses.
-    HOST = gateway(os.environ['DOCKER_HOST'])
-    LISTEN, LOCAL = (HOST, HOST) if is_free(0, HOST) else ('0.0.0.0', '127.0.0.1')
-    c.JupyterHub.hub_bind_url = f'http://{LISTEN}:{HUB_PORT}'
-    c.JupyterHub.hub_connect_url = f'http://{LOCAL}:{HUB_PORT}'
-    c.Spawner.hub_connect_url = f'http://{HOST}:{HUB_PORT}'
-    c.JupyterHub.services[0]['url'] = f'http://{LOCAL}:{CLASS_PORT}'
-    c.JupyterHub.services[0]['environment']['CLASS_LISTEN'] = LISTEN
+    host, more_hosts = use_service(solutions=SOLUTIONS)
     c.JupyterHub.spawner_class = 'dockerspawner.DockerSpawner'
-    c.Spawner.pre_spawn_hook = None
-    c.Spawner.port = 8888
-    c.Spawner.cmd = ['/opt/ros2_notebooks/classroom/container/start_student.sh']
-    c.Spawner.notebook_dir = '/home/student/ros2_notebooks'
-    c.Spawner.mem_limit, c.Spawner.cpu_limit = '2G', 2
     c.DockerSpawner.image = IMAGE
     c.DockerSpawner.pull_policy = 'never'
     c.DockerSpawner.remove = True
     c.DockerSpawner.volumes = {'ros2_notebooks_{username}': '/home/student'}
+    c.Spawner.cmd = ['/opt/ros2_notebooks/classroom/container/start_student.sh']
+    c.Spawner.notebook_dir = '/home/student/ros2_notebooks'
+    c.Spawner.pre_spawn_hook, c.Spawner.port = None, 8888
+    c.Spawner.mem_limit, c.Spawner.cpu_limit = '2G', 2
     c.DockerSpawner.extra_host_config = {
         'shm_size': '256m',
         'pids_limit': 400,
@@ -167,8 +119,14 @@ if os.environ.get('CONTAINERS') == 'yes':
         # What is neither the home nor in memory cannot be written.
         'read_only': True,
         'tmpfs': {'/tmp': 'size=64m,mode=1777'},
+        'extra_hosts': more_hosts,
     }
+    # A container reaches the hub and the class by the name of this machine in its network.
+    c.JupyterHub.hub_bind_url = 'http://0.0.0.0:8081'
+    c.JupyterHub.hub_connect_url = 'http://127.0.0.1:8081'
+    c.Spawner.hub_connect_url = f'http://{host}:8081'
+    c.JupyterHub.services[0]['environment']['CLASS_LISTEN'] = '0.0.0.0'
     c.Spawner.environment = {
-        HUB_VARIABLE: f'http://{HOST}:{CLASS_PORT}/services/class',
+        HUB_VARIABLE: f'http://{host}:8764/services/class',
         'TMPDIR': '/home/student/.tmp',  # builds and temporary files go to the student's volume
     }

@@ -10,19 +10,12 @@ from classroom.tests.support.classes import running_class
 from classroom.tests.support.deck_page import DeckPage
 
 
-@pytest.fixture(scope='module')
-def one_class(tmp_path_factory):
-    """Yield a class, open at the first step of its lesson."""
-    with running_class(tmp_path_factory.mktemp('class')) as one:
+@pytest.fixture
+def opened(tmp_path):
+    """Yield a class that was told nothing, open at the first step of its lesson."""
+    with running_class(tmp_path) as one:
         one.go(1)
         yield one
-
-
-@pytest.fixture
-def opened(one_class):
-    """Yield a class that was told nothing."""
-    one_class.do('forget')
-    return one_class
 
 
 @pytest.fixture(scope='session')

@@ -220,11 +220,50 @@ def test_missing_and_doubled_cells_are_named(lessons):
     content['cells'].append(cell | {'source': RIGHT})
     _, answers = read(content, lessons)
     assert answers.sources[STARTER] == RIGHT
-    assert answers.said == ['task 1 has its cell twice: the last one counts']
+    assert answers.said == ['task 1 has its cell twice: the last one that was changed counts']
     content['cells'] = [one for one in content['cells'] if one['id'] != STARTER]
     _, answers = read(content, lessons)
     assert answers.said == ['task 1 has no cell']
     assert job_of(lessons['00'], answers, {}) is None
+
+
+def test_an_answer_beside_its_cell_is_named(lessons):
+    content = notebook()
+    [at] = [n for n, one in enumerate(content['cells']) if one['id'] == STARTER]
+    content['cells'].insert(at + 1, {'cell_type': 'code', 'source': RIGHT, 'id': 'new'})
+    _, answers = read(content, lessons)
+    assert answers.said == [
+        'task 1 is as it was handed out, but a cell was added to it: read that yourself'
+    ]
+
+
+def test_a_notebook_in_an_archive_or_with_another_ending_is_read(submit, capsys):
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, 'w') as archive:
+        archive.writestr('homework/00.ipynb', with_answer(RIGHT))
+    owners = 'Ada_1_assignsubmission_file_', 'Bob_2_assignsubmission_file_'
+    names = f'{owners[0]}/homework.zip', f'{owners[1]}/00.ipynb.txt'
+    folder = submit(**{names[0]: data.getvalue(), names[1]: with_answer(RIGHT)})
+    assert main([str(folder)], Stand()) == 0
+    assert [row['points'] for row in rows_of(folder)] == ['1', '1']
+    with zipfile.ZipFile(folder.with_name('submissions_graded') / 'feedback.zip') as archive:
+        assert archive.namelist() == [f'{names[0]}-00.ipynb', names[1]]
+
+
+@pytest.mark.parametrize(
+    ('output', 'why'),
+    [
+        ({'text': 'Interrupted after 100 s.\n'}, 'its cell did not end in 100 s'),
+        (
+            {'output_type': 'error', 'ename': 'SyntaxError', 'evalue': 'no (3538.py, line 2)'},
+            'its cell ended with SyntaxError: no (line 2)',
+        ),
+    ],
+)
+def test_why_there_is_no_verdict_is_said_in_words(lessons, output, why):
+    _, answers = read(notebook(**{STARTER: 'x = 1'}), lessons)
+    said = runner.Said({STARTER: [output]}, begun=True, ended=True)
+    assert result_of(lessons['00'], answers, {}, said, '').tasks[1].why == why
 
 
 def test_only_exercise_cells_are_taken(lessons):
@@ -248,6 +287,8 @@ def test_what_reaches_for_the_checks_is_named(lessons):
         (b'{"cells": [', 'it is broken: it is no JSON'),
         (b'\xff\xfe', 'it is broken: it is no JSON'),
         (b'[' * 100_000, 'it is broken: it is no JSON'),
+        (b'<!doctype html><title>Log in</title>', 'it is a web page, no notebook'),
+        (b'{\n<<<<<<< HEAD\n', 'git has left its marks of a conflict in it'),
         (b'{"worksheets": []}', 'it is no notebook: it has no cells'),
     ],
 )
@@ -389,7 +430,7 @@ def test_a_line_for_each_strange_submission(submit, capsys):
         '=cmd(): lesson 00: 0 of 1',
         'Ada: lesson 00: 1 of 1',
         'Bob: 02.ipynb is lesson 02, not asked for; lesson 00 is not there',
-        'Cy: no notebook',
+        'Cy: no notebook, but notes.txt',
         'Di: lesson 00: 0 of 1; nothing is written in lesson 00',
         'Eve: lesson 00: 0 of 1; lesson 00 is there twice: the one with more answers counts',
         'Fay: own.ipynb is no lesson of this course',

@@ -38,7 +38,7 @@ from tools.site import free_drive
 
 HERE = Path(__file__).parent
 WORK = ROOT / '.site'
-CLASSROOM = ('classroom/README', 'classroom/HOSTING')
+CLASSROOM = ('classroom/README', 'classroom/HOSTING', 'classroom/UNIVERSITY')
 DOCUMENTS = (
     'README',
     'environment',

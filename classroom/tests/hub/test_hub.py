@@ -12,6 +12,7 @@ from pathlib import Path
 from support.processes import segments
 from support.waits import wait_for
 
+from classroom.class_page.lessons import Known
 from classroom.tests.support.hubs import (
     END_S,
     LESSONS,
@@ -24,6 +25,7 @@ from classroom.tests.support.hubs import (
     run_lessons,
     talk,
 )
+from tools.lessons.lesson import read
 
 pytestmark = needs_hub
 # The accounts are folders, and all run as the user of this test.
@@ -74,6 +76,50 @@ def test_a_class_of_twelve():
     short = tempfile.TemporaryDirectory(prefix='hub-', dir='/tmp', ignore_cleanup_errors=True)
     with short as folder, Hub(Path(folder), CONFIG) as hub:
         asyncio.run(teach(hub))
+
+
+async def survive(hub: Hub) -> None:
+    """Six are at work when the hub is killed, and started again: all of it answers."""
+    students = await log_in(hub, STUDENTS[:6])
+    for student in students:
+        await student.open(LESSONS[0])
+    await guess(hub, students, 41)
+    teacher = await hub.token_of('teacher')
+    running = {process.pid for process in hub.processes()}
+
+    hub.process.kill()
+    hub.process.wait()
+    hub.start()
+    await hub.until_ready()
+    assert (await hub.answer('/services/class/', teacher)).code == 200
+    assert hub.last_guesses() == [41] * len(students)  # what was told is kept
+    assert {process.pid for process in hub.processes()} >= running  # the kernels go on
+    for student in students:
+        for kernel in student.kernels.values():
+            await kernel.connect()
+            assert await kernel.text('print(my_guess)') == '41\n'
+    await guess(hub, students, 14)
+
+    # The deck is on another machine: the address with the secret opens the page, and no other one.
+    secret = hub.ask_class('SELECT secret FROM class')[0]
+    for wanted, code in ((secret, 200), ('0' * 16, 404)):
+        assert (await hub.answer(f'/services/class/{wanted}/', 'no token')).code == code
+
+
+async def guess(hub: Hub, students: list, number: int) -> None:
+    """Let everybody guess a number, and wait until the class has been told."""
+    question = next(iter(Known(read(LESSONS[0].read_text(), LESSONS[0].name)).guesses))
+    code = f'from helpers.checks import *\nmy_guess = guess({question!r}, {number})'
+    kernels = [kernel for student in students for kernel in student.kernels.values()]
+    await asyncio.gather(*(kernel.text(code) for kernel in kernels))
+    everybody = [number] * len(kernels)
+    await asyncio.to_thread(wait_for, hub.last_guesses, lambda told: told == everybody, END_S)
+
+
+def test_a_hub_that_was_killed():
+    short = tempfile.TemporaryDirectory(prefix='hub-', dir='/tmp', ignore_cleanup_errors=True)
+    with short as folder, Hub(Path(folder), CONFIG) as hub:
+        asyncio.run(survive(hub))
 
 
 def test_a_port_in_use(tmp_path):

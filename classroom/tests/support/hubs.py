@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import json
 import os
+import random
 import secrets
 import signal
 import socket
@@ -46,13 +47,22 @@ load_subconfig({config!r})
 folder = Path({folder!r})
 c.JupyterHub.authenticator_class = 'dummy'
 c.Spawner.start_timeout = c.Spawner.http_timeout = {limit}
-(folder / 'port').write_text(c.JupyterHub.hub_bind_url.rpartition(':')[2])
+# Ports of its own: another hub may run on this machine.
+for one in (c.JupyterHub, c.Spawner):
+    for name in ('hub_bind_url', 'hub_connect_url'):
+        if name in one:
+            setattr(one, name, getattr(one, name).replace('8081', '{ports[0]}'))
+c.ConfigurableHTTPProxy.api_url = 'http://127.0.0.1:{ports[1]}'
+CLASS_URL = 'http://127.0.0.1:{ports[2]}'
+c.JupyterHub.services[0]['environment']['JUPYTERHUB_SERVICE_URL'] = CLASS_URL
+c.Proxy.extra_routes = {{'/services/class/': CLASS_URL}}
+in_class = c.Spawner.environment['ROS2_NOTEBOOKS_CLASS']
+c.Spawner.environment['ROS2_NOTEBOOKS_CLASS'] = in_class.replace('8764', '{ports[2]}')
 c.ConfigurableHTTPProxy.pid_file = str(folder / 'proxy.pid')
 c.JupyterHub.db_url = f'sqlite:///{{folder}}/hub.sqlite'
 c.JupyterHub.cookie_secret_file = str(folder / 'cookie_secret')
 c.Authenticator.admin_users = {{'teacher'}}
-in_class = c.JupyterHub.services[0]
-in_class['environment']['CLASS_FOLDER'] = str(folder)
+c.JupyterHub.services[0]['environment']['CLASS_FOLDER'] = str(folder)
 c.JupyterHub.services.append(dict(name='test', api_token={token!r}))
 c.JupyterHub.load_roles.append(
     dict(name='test', services=['test'], scopes=['admin:users', 'admin:servers', 'tokens'])
@@ -61,11 +71,14 @@ c.JupyterHub.load_roles.append(
 
 
 def free_ports(count: int) -> list[int]:
-    with contextlib.ExitStack() as stack:
-        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
-        for one in sockets:
-            one.bind(('127.0.0.1', 0))
-        return [one.getsockname()[1] for one in sockets]
+    """Return ports that no kernel takes meanwhile: the system gives those from 32768 on."""
+    found = []
+    for port in random.sample(range(10000, 20000), 1000):
+        with contextlib.suppress(OSError), socket.create_server(('127.0.0.1', port)):
+            found.append(port)
+        if len(found) == count:
+            return found
+    raise OSError('no port is free')
 
 
 class Hub:
@@ -87,22 +100,29 @@ class Hub:
         self.log = folder / 'hub.log'
         self.token = secrets.token_hex(16)
         self.url = f'http://127.0.0.1:{port or free_ports(1)[0]}'
-        file = folder / 'config.py'
-        file.write_text(
+        self.ports = free_ports(3)
+        self.file = folder / 'config.py'
+        self.variables = variables
+        self.file.write_text(
             CONFIG.format(
                 config=str(root / 'classroom/hub/jupyterhub_config.py'),
                 folder=str(folder),
                 token=self.token,
                 limit=START_S,
+                ports=self.ports,
             )
             + config
         )
+        self.start()
+
+    def start(self) -> None:
+        """Start it, or start it again after it was killed."""
         self.process = subprocess.Popen(
             # If this test is killed, the hub is told, and ends the servers and the proxy.
             ['setpriv', '--pdeathsig', 'TERM', sys.executable, '-m', 'jupyterhub']
-            + ['--config', file, '--url', self.url],
-            cwd=folder,
-            env=os.environ | variables,
+            + ['--config', self.file, '--url', self.url],
+            cwd=self.folder,
+            env=os.environ | self.variables,
             stdout=self.log.open('a'),
             stderr=subprocess.STDOUT,
         )
@@ -137,14 +157,22 @@ class Hub:
             await self.ask(f'/hub/api/users/{name}', 'POST')
         return (await self.ask(f'/hub/api/users/{name}/tokens', 'POST', {}))['token']
 
+    def ask_class(self, query: str) -> list:
+        """Return the first column of what the class keeps."""
+        with contextlib.closing(sqlite3.connect(self.folder / 'class.sqlite')) as db:
+            return [first for first, *_ in db.execute(query)]
+
+    def last_guesses(self) -> list[int]:
+        """Return the last guess of each seat."""
+        last = "SELECT value, max(n) FROM events WHERE kind = 'guess' GROUP BY seat"
+        return [json.loads(value) for value in self.ask_class(last)]
+
     def guesses(self) -> list[int]:
         """Return how many questions each seat has answered, the most first."""
-        with contextlib.closing(sqlite3.connect(self.folder / 'class.sqlite')) as db:
-            names = db.execute('SELECT DISTINCT name FROM seats').fetchall()
-            assert names == [('',)]  # nobody has given one
-            questions = "SELECT DISTINCT seat, lesson, what FROM events WHERE kind = 'guess'"
-            answered = f'SELECT count(*) AS n FROM ({questions}) GROUP BY seat ORDER BY n DESC'
-            return [count for (count,) in db.execute(answered)]
+        assert self.ask_class('SELECT DISTINCT name FROM seats') == ['']  # nobody has given one
+        questions = "SELECT DISTINCT seat, lesson, what FROM events WHERE kind = 'guess'"
+        answered = f'SELECT count(*) AS n FROM ({questions}) GROUP BY seat ORDER BY n DESC'
+        return self.ask_class(answered)
 
     async def until_ready(self) -> None:
         async with asyncio.timeout(START_S):
@@ -158,11 +186,10 @@ class Hub:
     def processes(self) -> list[psutil.Process]:
         """Return all processes of the students that are alive, in containers or not."""
         found = []
-        port = (self.folder / 'port').read_text()
         for process in psutil.process_iter():
             with contextlib.suppress(psutil.Error):
                 variables = process.environ()
-                mine = f':{port}/' in variables.get('JUPYTERHUB_API_URL', '')
+                mine = f':{self.ports[0]}/' in variables.get('JUPYTERHUB_API_URL', '')
                 if mine and variables.get('JUPYTERHUB_USER'):  # empty in the hub's services
                     found.append(process)
         return found
@@ -193,9 +220,9 @@ class Kernel:
     def __init__(self, student: 'Student', id_: str) -> None:
         self.student, self.id = student, id_
         self._session = Session(username=student.name)
-        self._messages = asyncio.Queue()
 
     async def connect(self) -> None:
+        self._messages = asyncio.Queue()  # an earlier connection fills another one
         url = f'{self.student.hub.url}/user/{self.student.name}/api/kernels/{self.id}/channels'
         self._socket = await websocket_connect(
             HTTPRequest(
@@ -296,10 +323,10 @@ async def run_lessons(students: list[Student]) -> list[int]:
     return sorted((QUESTIONS[lesson] for lesson in lessons), reverse=True)
 
 
-async def log_in(hub: Hub) -> list[Student]:
+async def log_in(hub: Hub, names: list[str] = STUDENTS) -> list[Student]:
     """Log in all students at once, as soon as the hub answers."""
     await hub.until_ready()
-    students = [Student(hub, name) for name in STUDENTS]
+    students = [Student(hub, name) for name in names]
     await asyncio.gather(*(student.log_in() for student in students))
     return students
 

@@ -2,7 +2,8 @@
 
 The hub knows from the token of a server which student it belongs to. A seat is known by the hash of
 that name. The page is for people with the scope `access:services!service=class`, which
-administrators have.
+administrators have. The deck runs on another machine, where nobody has logged in: its address holds
+the secret of the class, as without a hub.
 """
 
 import asyncio
@@ -78,10 +79,12 @@ async def hold(store: ClassStore) -> None:
         asyncio.get_running_loop().add_signal_handler(number, over.set)
     room = Room(store, stop=store.forget)
     room.joins = ['On this hub you are in the class.']
+    room.deck_asks = True
     application = web.Application(
         [
             (f'{PREFIX}oauth_callback', HubOAuthCallbackHandler),
             (f'{PREFIX}(join|events|leave)', HubStudent, {'room': room}),
+            (f'{PREFIX}([0-9a-f]{{16}})/(.*)', Instructor, {'room': room}),
             (f'{PREFIX}()(.*)', HubInstructor, {'room': room}),
         ],
         cookie_secret=secrets.token_bytes(32),
