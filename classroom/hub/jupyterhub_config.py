@@ -1,7 +1,9 @@
 """JupyterHub for a class on one machine, started by `make hub`. HOSTING.md says how to use it."""
 
 import os
+import socket
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from classroom.handout import write_lessons
@@ -46,8 +48,11 @@ c.Spawner.args = [
 
 
 def own_port(spawner) -> None:
-    """Give each student's server a port of its own, for the same reason."""
-    spawner.port = 20000 + spawner.user.id % 10000
+    """Give each student's server a free port of its own, for the same reason."""
+    for port in range(20000 + spawner.user.id % 1000, 32768, 1000):
+        with suppress(OSError), socket.create_server(('127.0.0.1', port)):
+            spawner.port = port
+            return
 
 
 c.Spawner.pre_spawn_hook = own_port
