@@ -386,9 +386,8 @@ def ended_by(workspace, end):
         # It must stand before the other programs end, which stop it, too.
         limit_s = 2.0 if end == 'the guard crashes' else LIMIT_S
         stands = robot.run(limit_s, until=lambda: robot.stopped)
-        seconds = robot.t_s - since_s
-        metres = sum(step.v for step in robot.record.poses if step.t_s > since_s) / RATE_HZ
-    return Ended(robot, stands, metres, seconds)
+        moves = [step for step in robot.record.poses if step.t_s > since_s and (step.v or step.w)]
+    return Ended(robot, stands, sum(step.v for step in moves) / RATE_HZ, len(moves) / RATE_HZ)
 
 
 def driven_live(workspace, file):
