@@ -12,6 +12,7 @@ import re
 import signal
 import sys
 import time
+from typing import NamedTuple
 
 import numpy as np
 import yaml
@@ -33,7 +34,18 @@ from helpers.checks.builds import build, builds
 from helpers.checks.planted import planted, run_tests
 from helpers.checks.programs import DIED, error_of_launch, started
 from helpers.checks.tasks import Tasks, once
-from helpers.robot import CORRIDOR, EMPTY, KIND, ROOMS, TURTLEBOT3, Floor, Pose, Robot, watch
+from helpers.robot import (
+    CORRIDOR,
+    EMPTY,
+    KIND,
+    RATE_HZ,
+    ROOMS,
+    TURTLEBOT3,
+    Floor,
+    Pose,
+    Robot,
+    watch,
+)
 from helpers.ros import ros_session
 from helpers.workspace import without_folders
 
@@ -330,11 +342,20 @@ ON_A_TURTLEBOT = [
 LIMIT_S = 20.0
 
 
-def ended_by(workspace, end):
-    """Drive a TurtleBot 3 with patrol and guard, end something, and return the robot.
+class Ended(NamedTuple):
+    """What a robot did after an end: whether it stands, and how far and how long it went on."""
 
-    `end` is one of `ENDS`. What drives on is watched for two seconds. Raises RuntimeError if the
-    robot does not come to drive.
+    robot: Robot
+    stands: bool
+    metres: float
+    seconds: float
+
+
+def ended_by(workspace, end):
+    """Drive a TurtleBot 3 with patrol and guard, end something, and return what the robot did.
+
+    `end` is one of `ENDS`. Without a guard it is watched for two seconds. Raises RuntimeError if
+    the robot does not come to drive.
     """
     with ros_session() as session, contextlib.ExitStack() as programs:
         robot, client = Robot(CORRIDOR, driver=TURTLEBOT3), Node('client')
@@ -355,17 +376,18 @@ def ended_by(workspace, end):
                 lines = [*guard.lines, *patrol.lines, 'nothing'][-1]
                 raise RuntimeError(f'The robot does not drive. The programs printed: {lines}')
             robot.run(0.2)
+        since_s = robot.t_s
         if end == 'the laser is blind':
             robot.blind = True
         elif end == 'the guard crashes':
             os.kill(guard.pid, signal.SIGKILL)
         else:
             os.kill(patrol.pid, signal.SIGINT if end == 'Ctrl+C' else signal.SIGKILL)
-        if end == 'the guard crashes':
-            robot.run(2.0)
-        else:
-            robot.run(LIMIT_S, until=lambda: robot.stopped)
-    return robot
+        # It must stand before the other programs end, which stop it, too.
+        limit_s = 2.0 if end == 'the guard crashes' else LIMIT_S
+        stands = robot.run(limit_s, until=lambda: robot.stopped)
+        moves = [step for step in robot.record.poses if step.t_s > since_s and (step.v or step.w)]
+    return Ended(robot, stands, sum(step.v for step in moves) / RATE_HZ, len(moves) / RATE_HZ)
 
 
 def driven_live(workspace, file):
@@ -875,6 +897,16 @@ def steer_to_a_place(workspace):
     turn = 'Speed times cos(heading), and 1.5 * heading. The heading 0.0 is a heading, too.'
     other = 'The speed for straight ahead, with full_mps: safe_speed(reach(..., 0.0), full_mps).'
     door = comes_to(ROOMS, (4.75, 1.75), ROOMS.places['C'])
+    unknown = {f'{side}{degrees}': math.nan for side in 'lr' for degrees in range(91)}
+    on_the_right = {f'r{degrees}': math.nan for degrees in range(30, 91)}
+
+    def stands_blind():
+        blind = returns(0, 3, 0.0, 0.0, **unknown)()
+        if blind is not True:
+            return f'with all beams unknown {blind}'
+        partly = returns(0, 3, 0.5, 0.0, **on_the_right)()
+        return partly is True or f'with 61 of 181 beams unknown {partly}'
+
     return [
         ('nothing in sight: straight on', returns(0, 3, 0.5, 0.0), turn),
         ('nothing in sight: 60 degrees', returns(60, 3, 0.25, 1.571), turn),
@@ -885,6 +917,7 @@ def steer_to_a_place(workspace):
             returns(0, 0.3, 0.1, 0, l0=0.4),
             'min(0.5, distance_m)',
         ),
+        ('a blind laser: it stands', stands_blind, 'np.isnan(ranges).sum(), of len(ranges)'),
         ('no way: it turns', returns(-57, 3, 0.0, 0.9, l0=-math.inf), 'if heading is None:'),
         ('around two boxes', comes_to(LAST, LAST.places['A']), 'free_heading, then cos(heading)'),
         ('through a door', door, 'The speed for straight ahead.'),
@@ -1493,6 +1526,8 @@ def free_heading(ranges, angles, wanted, far_m):
 
 
 def steer(ranges, angles, wanted, distance_m, full_mps):
+    if np.count_nonzero(np.isnan(ranges)) >= len(ranges) / 2:
+        return 0.0, 0.0
     heading = free_heading(ranges, angles, wanted, min(0.5, distance_m))
     if heading is None:
         return 0.0, 0.9
@@ -1826,7 +1861,10 @@ def a_floor_of_your_own(workspace, file):
                 else:
                     tour.robot.blind = True
                 tour.run(1.5)
-                return tour.robot.record.poses[-1].v == 0 or f'after {by} it drives on'
+                end = tour.robot.record.poses[-1]
+                if end.v:
+                    return f'after {by} it drives on'
+                return end.w == 0 or f'after {by} it turns'
 
         return test
 

@@ -154,7 +154,7 @@ def cancel_in_time(CancellingOperator):
 
 @tasks.add(4)
 def obey(ObedientPatroller):
-    def patrol(places, cancelled_at=None):
+    def patrol(places, cancelled_at=None, fails=False):
         """Cancel while the robot drives to a place. Return how the job ended, and its log."""
         log, there, gate = [], threading.Event(), threading.Event()
 
@@ -163,6 +163,8 @@ def obey(ObedientPatroller):
             if log.count('go on') - 1 == cancelled_at:
                 there.set()
                 gate.wait(10)
+            if fails:
+                raise WheelStuckError
 
         def publish(message):
             log.append('stop' if message == Twist() else 'drive')
@@ -193,18 +195,28 @@ def obey(ObedientPatroller):
         return log[-1] == 'stop' or 'the robot was not stopped'
 
     def still_succeeds():
-        status, visited, _ = patrol(3)
-        return (status, visited) == ('SUCCEEDED', [0, 1, 2]) or f'it ended {status} {visited}'
+        status, visited, log = patrol(3)
+        if (status, visited) != ('SUCCEEDED', [0, 1, 2]):
+            return f'it ended {status} {visited}'
+        return log[-1] == 'stop' or 'after the third place the robot was not stopped'
 
-    hint = 'if goal_handle.is_cancel_requested: stop, canceled(), return the result. In the loop.'
+    def fails_and_stops():
+        status, _, log = patrol(3, fails=True)
+        if status != 'ABORTED':
+            return f'go_on raised an error, and the job ended {status}'
+        return log[-1] == 'stop' or 'go_on raised an error, and the robot was not stopped'
+
+    hint = 'if goal_handle.is_cancel_requested: canceled(), return the result. In the loop.'
+    stop = 'try: all that you have. finally: self.publisher.publish(Twist())'
     return [
         (
-            'without a cancel: three places',
+            'without a cancel: three places, and a stop',
             still_succeeds,
-            'The job of task 1, with an if in it.',
+            f'The job of task 1, with an if in it. {stop}',
         ),
         ('a cancel on the way to place 1', lambda: obeys(5, 1), hint),
         ('a cancel on the way to place 0', lambda: obeys(3, 0), hint),
+        ('a job that fails stops the robot, too', fails_and_stops, stop),
     ]
 
 

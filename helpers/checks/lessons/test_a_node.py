@@ -101,6 +101,7 @@ BRAKE = """from geometry_msgs.msg import Twist
 from rclpy.node import Node
 from sensor_msgs.msg import Range
 
+from brake_pkg.distance import distance
 from brake_pkg.speed import safe_speed
 
 
@@ -112,7 +113,7 @@ class Brake(Node):
 
     def range_callback(self, message):
         twist = Twist()
-        twist.linear.x = safe_speed(message.range)
+        twist.linear.x = safe_speed(distance(message))
         self.publisher.publish(twist)
 """
 ALONE = """import os, pytest, rclpy
@@ -269,7 +270,7 @@ def fix_the_flaky_test(workspace, tests):
         versions = {
             'busy': BUSY.replace('0.4', '2'),
             'late': LATE,
-            'wrong': planted(BRAKE, 'message.range', '9.0'),
+            'wrong': planted(BRAKE, 'distance(message)', '9.0'),
         }
         return run_tests(workspace, PACKAGE, tests, 'brake_pkg.brake', versions, most_failures=9)
 
@@ -378,6 +379,13 @@ def test_active(bench):
         wait_until(bench.executor, lambda: len(bench.speeds) >= count)
     assert bench.speeds == [0.125, 0.0]
 
+def test_unknown(bench):
+    up(bench)
+    for count, distance in enumerate((11.0, 0.01, float('inf')), 1):
+        say(bench, distance)
+        wait_until(bench.executor, lambda: len(bench.speeds) >= count)
+    assert bench.speeds == [0.0, 0.0, 0.25], 'of 11 m, 0.01 m and inf it makes other speeds'
+
 def test_stop(bench):
     up(bench)
     say(bench, 9.0)
@@ -403,6 +411,10 @@ OUR_TESTS = {
     'it publishes in the state active only': (
         'active',
         'self.create_lifecycle_publisher(...), and publish safe_speed(...) in range_callback.',
+    ),
+    'it stops for what the sensor cannot measure': (
+        'unknown',
+        'safe_speed(distance(message), ...)',
     ),
     'deactivate stops the robot': ('stop', 'Publish Twist() before super().on_deactivate(state).'),
     'after cleanup it can begin again': ('again', 'Destroy both, and return SUCCESS.'),
@@ -544,6 +556,7 @@ RIGHT_NODE = """from geometry_msgs.msg import Twist
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from sensor_msgs.msg import Range
 
+from brake_pkg.distance import distance
 from brake_pkg.speed import safe_speed
 
 
@@ -563,7 +576,7 @@ class Brake(LifecycleNode):
 
     def range_callback(self, message):
         twist = Twist()
-        twist.linear.x = safe_speed(message.range, self.full_mps)
+        twist.linear.x = safe_speed(distance(message), self.full_mps)
         self.publisher.publish(twist)
 
     def on_deactivate(self, state):
@@ -578,7 +591,7 @@ class Brake(LifecycleNode):
 OTHER_NODE = """from geometry_msgs.msg import Twist, Vector3
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn as Return
 from sensor_msgs.msg import Range
-from brake_pkg import speed
+from brake_pkg import distance, speed
 
 
 class Brake(LifecycleNode):
@@ -598,7 +611,7 @@ class Brake(LifecycleNode):
 
     def hear(self, message):
         if self.active:
-            self.say(float(speed.safe_speed(message.range, self.full)))
+            self.say(float(speed.safe_speed(distance.distance(message), self.full)))
 
     def on_activate(self, state):
         self.active = True
@@ -615,8 +628,8 @@ class Brake(LifecycleNode):
         return Return.SUCCESS
 """
 BUGS = {
-    'drives on before a wall': ('safe_speed(message.range, self.full_mps)', 'self.full_mps'),
-    'ignores full_mps': ('message.range, self.full_mps', 'message.range'),
+    'drives on before a wall': ('safe_speed(distance(message), self.full_mps)', 'self.full_mps'),
+    'ignores full_mps': ('distance(message), self.full_mps', 'distance(message)'),
     'publishes while it is inactive': ('create_lifecycle_publisher', 'create_publisher'),
     'does not stop at deactivate': ('        self.publisher.publish(Twist())\n', ''),
     'takes a negative full_mps': ('self.full_mps <= 0', 'self.full_mps == 0'),
