@@ -179,7 +179,10 @@ class Hub:
             while self.process.poll() is None:
                 # The proxy answers before the hub does.
                 with contextlib.suppress(OSError, HTTPClientError):
-                    return await self.ask('/hub/api/')
+                    await self.ask('/hub/api/')
+                    # The class page comes after the hub, which does not wait for it.
+                    if (await self.answer('/services/class/', 'no token')).code != 503:
+                        return
                 await asyncio.sleep(0.1)
         raise RuntimeError(f'JupyterHub ended: {self.process.returncode}\n{self.log.read_text()}')
 
