@@ -175,3 +175,10 @@ def test_a_build_raises_the_first_error_and_can_begin_anew(package):
         with pytest.raises(Failed, match=r'robot: .*missing\.txt'):
             build(package, 'robot', anew=anew)
         assert old.exists() != anew
+
+
+@pytest.mark.parametrize('asked', [['camera'], ['robot', 'camera']])
+def test_a_package_that_is_not_there_is_named(package, asked):
+    setup(package, "packages=['robot']")
+    with pytest.raises(Failed, match='there is no package camera in src'):
+        build(package, *asked)

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
-import yaml
+from support.answers import answers_of, source_of
 
 from helpers.checks import progress
 from tools.lessons import rules, tables
-from tools.lessons.lesson import lessons
+from tools.lessons.lesson import lessons, tags
 
 LESSONS = lessons()
 ANSWERS = Path(__file__).parent / 'answers'
@@ -36,7 +36,7 @@ def test_lesson_00_shows_the_tasks_that_there_are():
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
 def test_each_task_has_answers_that_try_its_check(lesson):
     file = ANSWERS / f'{lesson.name}.yaml'
-    answers = yaml.load(file.read_text(), yaml.BaseLoader) if file.exists() else {}
+    answers = answers_of(file) if file.exists() else {}
     numbers = range(1, len(lesson.tasks) + 1)
     wanted = {f'{number} {kind}' for number in numbers for kind in ('wrong', 'right')}
     differ = ', '.join(sorted(answers.keys() ^ wanted))
@@ -44,6 +44,23 @@ def test_each_task_has_answers_that_try_its_check(lesson):
         f'tests/answers/{file.name} lacks these, or has too many: {differ}. The top of '
         'tests/answers/test_answers.py says how answers are written.'
     )
+
+
+@pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
+def test_each_answer_can_still_be_made_from_its_task(lesson):
+    file = ANSWERS / f'{lesson.name}.yaml'
+    answers = answers_of(file) if file.exists() else {}
+    problems = []
+    for number, cells in enumerate(rules.tasks(lesson).values(), 1):
+        starters = [cell.source for cell in cells if 'exercise' in tags(cell)]
+        [solution] = [cell.source for cell in cells if 'solution' in tags(cell)]
+        for kind in ('wrong', 'right'):
+            for answer in answers.get(f'{number} {kind}', []):
+                try:
+                    source_of(answer, solution.partition('\n')[2], *starters)
+                except ValueError as error:
+                    problems.append(f'Below `{number} {kind}:` of {file.name}. {error}')
+    assert not problems, '\n'.join(problems)
 
 
 def test_kernels_and_rules_read_the_same_tasks():

@@ -52,6 +52,10 @@ def why_it_failed(result: BuildResult) -> str:
     """Return the package of a build that failed, and its first error: what, file, line."""
     if result.ok:
         return 'nothing: the build has finished'
+    said = ' '.join([*result.errors, *result.warnings])
+    unknown = re.findall(r"ignoring unknown package '(.+?)'", said)  # which ends no build
+    if unknown and not result.failed:
+        return f'there is no package {unknown[0]} in src: has it a package.xml?'
     error = first_error(result.errors)
     return f'{result.failed}: {error}' if result.failed else error
 

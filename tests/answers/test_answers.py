@@ -20,27 +20,36 @@ YAML wants quotes around text that begins with a quote, a bracket or another sig
 that has a colon with a space behind it, or a # with a space before it.
 """
 
+import os
 import re
-from collections import defaultdict
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import nbformat
 import pytest
-import yaml
+from support.answers import answers_of, source_of
 from support.kernel import NOTEBOOKS, Kernel
 
 from helpers.checks.progress import with_tasks
 
 HERE = Path(__file__).parent
 RUNS_COMMANDS = re.compile(r'check\(\d+, workspace, [A-Z]')  # a text of commands
+KEEP_NAMES = 'get_ipython().names_before = dict(get_ipython().user_ns)'
+PUT_NAMES_BACK = """
+def put_back(names, before):
+    names.clear()
+    names.update(before)
+
+
+put_back(get_ipython().user_ns, get_ipython().names_before)
+"""
 LEAST = {'wrong': 5, 'right': 3}  # answers of a task
 
 FILES = sorted(HERE.glob('*.yaml'))
-
-
-def answers_of(path: Path) -> dict[str, list]:
-    """Return the answers in a file, by their task and kind: '3 wrong'."""
-    return yaml.load(path.read_text(encoding='utf-8'), yaml.BaseLoader)
 
 
 def tasks_of(path: Path) -> set[int]:
@@ -48,46 +57,77 @@ def tasks_of(path: Path) -> set[int]:
     return {int(key.split()[0]) for key in answers_of(path)}
 
 
-def source_of(answer: str | dict[str, str], *sources: str) -> str:
-    """Return the source of an answer: its own text, or the first source that it can edit.
-
-    Raises ValueError with one sentence if no source has each old text exactly once.
-    """
-    if isinstance(answer, str):
-        return answer
-    for source in sources:
-        found = [list(re.finditer(pattern(old), source)) for old in answer]
-        if all(len(places) == 1 for places in found):
-            edits = zip((place.span() for [place] in found), answer.values(), strict=True)
-            return edited(source, list(edits))
-    counts = {old: [len(re.findall(pattern(old), source)) for source in sources] for old in answer}
-    found = [
-        f'`{old}` is {in_solution} times in the solution and {" or ".join(map(str, in_starter))} '
-        'times in the starter'
-        for old, (in_solution, *in_starter) in counts.items()
-    ]
-    raise ValueError(f'An old text must be there exactly once, but {"; ".join(found)}.')
-
-
-def pattern(old: str) -> str:
-    """Return the regular expression that finds the old text of an edit."""
-    parts = [r'\s+'.join(map(re.escape, part.split())) for part in old.split(' ... ')]
-    return '(?s)' + '.*?'.join(parts)
-
-
-def edited(source: str, edits: list[tuple[tuple[int, int], str]]) -> str:
-    """Return the source with new text from one place to another, as often as there are edits."""
-    result = source
-    for (start, end), new in sorted(edits, reverse=True):
-        indent = re.match(' *', source[source.rfind('\n', 0, start) + 1 :]).group()
-        result = result[:start] + new.replace('\n', '\n' + indent) + result[end:]
-    return result
-
-
 def tag_of(cell: nbformat.NotebookNode) -> str:
     """Return 'exercise', 'check' or 'solution', or nothing for another cell."""
     tags = {'exercise', 'check', 'solution'}.intersection(cell.metadata.get('tags', []))
     return tags.pop() if tags else ''
+
+
+class Lesson:
+    """A lesson in a kernel: its tasks are judged in their order, in one pass through its cells.
+
+    `go_to` runs the cells above a task, with the solutions of the tasks before it, and `go_on`
+    leaves the task as if only its solution had been written.
+    """
+
+    def __init__(self, name: str) -> None:
+        [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{name}.ipynb')
+        self.name, self.kernel = name, Kernel()
+        self._cells = [cell for cell in nbformat.read(path, 4).cells if cell.cell_type == 'code']
+        self._position = 0
+        self._folder: Path | None = None  # of its workspace
+        self.reached = 0  # the task whose cells are `cells`
+        self.cells: dict[str, list[str]] = {}  # by their tag
+
+    def go_to(self, task: int) -> None:
+        """Run the cells above a task."""
+        while self.reached < task:
+            if self.reached:
+                # Some solutions change the files that their starters have written.
+                run_all(self.kernel, self.cells['exercise'], self.cells['solution'])
+                self._run_commands()
+            self._read_task()
+
+    @contextmanager
+    def undone(self) -> Iterator[None]:
+        """Undo what cells do to files of the workspace and to names of the kernel."""
+        self.kernel.run(KEEP_NAMES)
+        with tempfile.TemporaryDirectory() as aside:
+            kept = Path(aside, 'kept')
+            if self._folder:
+                shutil.copytree(self._folder, kept, symlinks=True)
+            yield
+            if self._folder:
+                for path in self._folder.iterdir():
+                    (shutil.rmtree if path.is_dir() and not path.is_symlink() else os.remove)(path)
+                shutil.copytree(kept, self._folder, symlinks=True, dirs_exist_ok=True)
+        self.kernel.run(PUT_NAMES_BACK)
+
+    def _read_task(self) -> None:
+        """Run the cells above the next task, and collect those of the task."""
+        self.cells = {'exercise': [], 'check': [], 'solution': []}
+        self.reached += 1
+        while not self.cells['solution']:
+            assert self._position < len(self._cells), (
+                f'The lesson {self.name} has no task {self.reached}.'
+            )
+            cell = self._cells[self._position]
+            self._position += 1
+            tag, source = tag_of(cell), cell.source
+            if tag:
+                source = source.split('\n', 1)[1] if tag == 'solution' else source
+                self.cells[tag].append(source)
+            else:
+                self.kernel.run(source)
+        path = self.kernel.run("print(globals()['workspace'].path)") if self._folder is None else ''
+        if path.startswith('/'):
+            self._folder = Path(path.strip())
+
+    def _run_commands(self) -> None:
+        """Clone or build what the next tasks need, if the check does it with given commands."""
+        for source in self.cells['check']:
+            if RUNS_COMMANDS.match(source):
+                self.kernel.run(source)
 
 
 def run_all(kernel: Kernel, *sources: list[str]) -> str:
@@ -122,48 +162,60 @@ def judge(kernel: Kernel, answers: list, key: str, cells: dict[str, list[str]]) 
                 )
 
 
+@pytest.fixture(scope='module')
+def open_lesson():
+    """Return a function that returns a lesson in a kernel in which a task was not reached yet.
+
+    The tasks of a lesson come in their order, so the next one goes on in the kernel of the last.
+    """
+    lessons: list[Lesson] = []  # at most one
+
+    def close() -> None:
+        while lessons:
+            lessons.pop().kernel.__exit__(None, None, None)
+
+    @contextmanager
+    def open_at(name: str, task: int) -> Iterator[Lesson]:
+        if not lessons or lessons[0].name != name or lessons[0].reached >= task:
+            close()
+            lesson = Lesson(name)
+            lesson.kernel.__enter__()
+            lessons.append(lesson)
+        lesson = lessons[0]
+        try:
+            lesson.go_to(task)
+            with lesson.undone():
+                yield lesson
+        except BaseException:
+            close()  # what a wrong verdict has left is not what the next task begins with
+            raise
+
+    yield open_at
+    close()
+
+
 @pytest.mark.parametrize(
     ('lesson', 'task'),
     [(path.stem, task) for path in FILES for task in sorted(tasks_of(path))],
     ids=lambda value: value if isinstance(value, str) else f'task_{value:02d}',
 )
-def test_check_judges_right_and_wrong_answers(lesson, task):
-    [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{lesson}.ipynb')
+def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson):
     answers = answers_of(HERE / f'{lesson}.yaml')
-    cells = defaultdict(list)  # the cells of this task, by their tag
-    number, check = 1, ''  # of the task that comes next
-    with Kernel() as kernel:
-        for cell in nbformat.read(path, 4).cells:
-            [tag] = {'exercise', 'check', 'solution'}.intersection(
-                cell.metadata.get('tags', [])
-            ) or {''}
-            if cell.cell_type != 'code':
-                continue
-            if number == task and tag:
-                cells[tag].append(
-                    cell.source.split('\n', 1)[1] if tag == 'solution' else cell.source
-                )
-            elif tag == 'check' and RUNS_COMMANDS.match(cell.source):
-                check = cell.source
-            elif tag == 'solution':
-                kernel.run(cell.source.split('\n', 1)[1])
-                if check:  # it clones or builds what the next tasks need
-                    kernel.run(check)
-                check = ''
-            elif not tag:
-                kernel.run(cell.source)
-            if tag == 'solution':
-                if number == task:
-                    break
-                number += 1
-        assert cells['solution'], f'The lesson {lesson} has no task {task}.'
-        said = run_all(kernel, cells['exercise'], cells['check'])
+    with open_lesson(lesson, task) as opened:
+        kernel, cells = opened.kernel, opened.cells
+        run_all(kernel, cells['exercise'])
+        started = time.monotonic()
+        said = run_all(kernel, cells['check'])
+        times = f'A verdict took {time.monotonic() - started:.1f} s for the starter'
         assert [verdict['solved'] for verdict in kernel.verdicts] == [False], (
             f'The starter must be wrong. Its check said:\n{said}'
         )
         judge(kernel, answers.get(f'{task} wrong', []), f'{task} wrong', cells)
         # What a right answer builds stays, so the solution comes after the wrong ones.
-        said = run_all(kernel, cells['exercise'], [f'%%solution {task}\n{cells["solution"][0]}'])
+        run_all(kernel, cells['exercise'])
+        started = time.monotonic()
+        said = kernel.run(f'%%solution {task}\n{cells["solution"][0]}')
+        print(f'{times}, and {time.monotonic() - started:.1f} s for the solution.')  # with -rP
         assert [(verdict['of'], verdict['solved']) for verdict in kernel.verdicts] == [
             ('solution', True)
         ], said

@@ -1612,7 +1612,12 @@ WRONG_NODES = {
     'drives without a goal': planted(NODE, 'place is None or', 'False or').replace(
         'place = self.job.place()', 'place = self.job.place() or (9.0, 0.0)'
     ),
-    'does not look': planted(NODE, '*beams(scan)', '[9.0] * 101, [0.0] * 101'),
+    # All beams are long ones for it: it must drive on, and not end in an error.
+    'does not look': planted(
+        NODE,
+        'wanted, distance =',
+        'scan.ranges = [9.0] * len(scan.ranges)\n        wanted, distance =',
+    ),
     'takes any speed': planted(NODE, 'not 0 < parameter.value <= 1', 'False'),
     'trusts an old scan': planted(NODE, ' or not self.is_fresh(scan)', ''),
     'keeps its first speed': planted(NODE, "self.get_parameter('speed').value", '0.5'),

@@ -169,8 +169,14 @@ def answers_to(workspace, program, kind, topic, *distances, pause_s=0.0):
             if len(answers) != number + 1:
                 raise Failed(f'scans: {number + 1}, messages on {topic}: {len(answers)}')
             time.sleep(pause_s)
-        names = [name for name in tester.get_node_names() if name != 'tester' and name[0] != '_']
-    return names, answers[: len(distances)]  # when it ends, it stops the robot
+
+        def names():
+            return [name for name in tester.get_node_names() if name != 'tester' and name[0] != '_']
+
+        # A program says how its nodes are called after the topics that they use.
+        bench.wait(lambda: names() or not process.running, START_S)
+        seen = names()
+    return seen, answers[: len(distances)]  # when it ends, it stops the robot
 
 
 def code_of(workspace, file):

@@ -1,0 +1,50 @@
+"""Answers of students: read from their file, and made from a lesson's cells.
+
+The top of tests/answers/test_answers.py says how they are written.
+"""
+
+import re
+from pathlib import Path
+
+import yaml
+
+
+def answers_of(path: Path) -> dict[str, list]:
+    """Return the answers in a file, by their task and kind: '3 wrong'."""
+    return yaml.load(path.read_text(encoding='utf-8'), yaml.BaseLoader)
+
+
+def source_of(answer: str | dict[str, str], *sources: str) -> str:
+    """Return the source of an answer: its own text, or the first source that it can edit.
+
+    Raises ValueError with one sentence if no source has each old text exactly once.
+    """
+    if isinstance(answer, str):
+        return answer
+    for source in sources:
+        found = [list(re.finditer(pattern(old), source)) for old in answer]
+        if all(len(places) == 1 for places in found):
+            edits = zip((place.span() for [place] in found), answer.values(), strict=True)
+            return edited(source, list(edits))
+    counts = {old: [len(re.findall(pattern(old), source)) for source in sources] for old in answer}
+    found = [
+        f'`{old}` is {in_solution} times in the solution and {" or ".join(map(str, in_starter))} '
+        'times in the starter'
+        for old, (in_solution, *in_starter) in counts.items()
+    ]
+    raise ValueError(f'An old text must be there exactly once, but {"; ".join(found)}.')
+
+
+def pattern(old: str) -> str:
+    """Return the regular expression that finds the old text of an edit."""
+    parts = [r'\s+'.join(map(re.escape, part.split())) for part in old.split(' ... ')]
+    return '(?s)' + '.*?'.join(parts)
+
+
+def edited(source: str, edits: list[tuple[tuple[int, int], str]]) -> str:
+    """Return the source with new text from one place to another, as often as there are edits."""
+    result = source
+    for (start, end), new in sorted(edits, reverse=True):
+        indent = re.match(' *', source[source.rfind('\n', 0, start) + 1 :]).group()
+        result = result[:start] + new.replace('\n', '\n' + indent) + result[end:]
+    return result
