@@ -335,7 +335,7 @@ def test_who_can_reach_it(opened, tmp_path):
     assert 'Only this machine can join. LAN=yes lets' in opened.said
     if not in_networks():
         pytest.skip('This machine is in no network.')
-    with running_class(tmp_path, '--lan') as wide:
+    with running_class(tmp_path / 'wide', '--lan') as wide:
         assert 'Only this machine' not in wide.said
         host = wide.address.partition(':')[0]
         assert not host.startswith('127.')
