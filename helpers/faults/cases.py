@@ -47,7 +47,7 @@ class Mend:
 
     Of a wrong mend, `says` tells what it does. It is known by the pattern `sees`, in the lines that
     were added or, if it has a `run`, in the commands; or by a text that no file has any more,
-    `lacks`.
+    `lacks`. With `ends` it is said only if the drive has ended so (see `Drive.how`).
     """
 
     edit: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
@@ -55,6 +55,7 @@ class Mend:
     sees: str = ''
     lacks: str = ''
     says: str = ''
+    ends: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -133,11 +134,15 @@ def _files(folder: Path) -> dict[str, str]:
     }
 
 
+def _mend(told: dict) -> Mend:
+    return Mend(**told | {'ends': tuple(told.get('ends', ()))})
+
+
 def read(folder: Path) -> Fault:
     """Return the fault of a folder. Raises ValueError if its file does not say what it must."""
     try:
         told = yaml.safe_load((folder / FILE).read_text(encoding='utf-8'))
-        mends = {key: tuple(Mend(**mend) for mend in told.pop(key)) for key in ('right', 'wrong')}
+        mends = {key: tuple(map(_mend, told.pop(key))) for key in ('right', 'wrong')}
         evidence = tuple(Evidence(**pair) for pair in told.pop('evidence'))
         told |= {key: tuple(told.get(key, ())) for key in ('fails', 'also')}
         fault = Fault(name=folder.name, evidence=evidence, **mends, **told)

@@ -73,6 +73,7 @@ class Drive:
     braked: bool | None  # while its laser saw nothing; None: it did not come so far
     went_on: bool  # after that
     stands_at_exit: bool  # its last command, after Ctrl+C, was to stop
+    voices: int  # publishers on cmd_vel while it drove
 
 
 def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', params='') -> Drive:
@@ -108,6 +109,7 @@ def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', pa
             braked=watcher.braked,
             went_on=watcher.went_on,
             stands_at_exit=not last or last[0].v == last[0].w == 0,
+            voices=watcher.voices,
         )
 
 
@@ -116,7 +118,7 @@ class Watcher:
 
     def __init__(self, session: Session, robot: Robot, program: Process, trouble: str) -> None:
         self.session, self.robot, self.program, self.trouble = session, robot, program, trouble
-        self.how, self.braked, self.went_on = '', None, False
+        self.how, self.braked, self.went_on, self.voices = '', None, False, 0
         self._begun_s, self._ready_s = time.monotonic(), None
         self._moved_at_s = self._still_at_s = self._trouble_at_s = None
         self._trouble_at_m = 0.0
@@ -144,6 +146,7 @@ class Watcher:
             if is_still:
                 return 'stands' if self._waited_enough() else ''
             self._moved_at_s = now_s
+        self.voices = max(self.voices, self.session.node.count_publishers('cmd_vel'))
         if self.trouble and self._is_in_trouble(now_s, is_still):
             return ''
         if self.braked is not None and self.moved_m > self._trouble_at_m + 0.1:

@@ -118,7 +118,8 @@ def found(case, kind, command, line):
         if wanted in ('', 'None'):
             raise Failed('no line yet')
         printed = [words(one) for said in outputs() for one in said.splitlines()]
-        same = [one for one in printed if wanted == one or (wanted in one and len(wanted) >= LEAST)]
+        same = [one for one in printed if wanted == one]
+        same = same or [one for one in printed if wanted in one and len(wanted) >= LEAST]
         if not same:
             raise Failed(f'{words(command)} has printed no line with: {wanted}')
         return same
@@ -136,64 +137,73 @@ def found(case, kind, command, line):
             ):
                 return True
         lines()
-        return 'a robot without a fault could print this, too'
+        return 'this line alone does not show it: a good robot could print it, too'
 
     def is_of_this_kind():
-        if kind not in KINDS:
+        if kind in (None, ...):
+            return 'no kind yet'
+        if word not in KINDS:
             return f'{kind!r} is none of the kinds'
-        return kind in (case.fault.kind, *case.fault.also) or f'{kind}: no'
+        if shown() is not True:
+            return 'it is judged when the line shows the fault'
+        return word in (case.fault.kind, *case.fault.also) or f'{kind}: no'
 
+    word, shown = words(kind).lower(), once(shows_the_fault)
     return [
         ('the command was run', was_run, 'Run it in a cell that begins with %%terminal.'),
         ('it has printed the line', was_printed, 'Copy the line from its output.'),
-        ('the line shows the fault', shows_the_fault, case.fault.hint),
+        ('the line shows the fault', shown, case.fault.hint),
         ('the kind of the fault', is_of_this_kind, case.fault.hint),
     ]
 
 
 def mended(case):
     """Judge a robot that somebody has mended, on another floor and with another limit."""
+    title = f'on another floor {case.name} drives off'
+    missing = case.lost() if case.is_changed else f'the files of {case.name} are as you got them'
+    if missing:  # nothing to drive for
+        return [(title, lambda: missing, '')]
 
     @once
     def driven():
-        if not case.is_changed:
-            raise Failed(f'the files of {case.name} are as you got them')
-        if lost := case.lost():
-            raise Failed(lost)
         return drive_apart(case, OTHER, trouble=case.fault.trouble, params=params(case))
 
     def drives_off():
         end = driven()
         if end.how == 'died':
             raise Failed(error_of_launch(end.said) or 'the launch has ended, and said nothing')
-        return end.how != 'stands' or with_mends(case, 'it does not move')
+        return end.how != 'stands' or with_mends(case, end, 'it does not move')
 
     def minds_its_laser():
         end = driven()
         if end.braked is None:
             return 'it did not come so far'
         if not end.braked:
-            return with_mends(case, 'it drives on')
-        return end.went_on or with_mends(case, 'it stops, and never goes on')
+            return with_mends(case, end, 'it drives on')
+        return end.went_on or with_mends(case, end, 'it stops, and never goes on')
 
     def arrives():
         end = driven()
         if end.how in ('stands', 'died'):
             return 'it did not come so far'
         if end.how == 'hits':
-            return with_mends(case, 'it hits something')
+            return with_mends(case, end, 'it hits something')
+        if end.voices > 1:
+            return with_mends(case, end, f'{end.voices} programs publish on cmd_vel')
         if end.how == 'goes on':
-            return with_mends(case, 'it does not come to an end')
+            return with_mends(case, end, 'it does not come to an end')
         if abs(end.turned) > TURNED:
-            return with_mends(case, 'it does not keep its direction')
+            return with_mends(case, end, 'it does not keep its direction')
         away_m = end.free_m - STOP_M
         if -NEARER_M <= away_m <= FARTHER_M:
             return True
         found = f'it stops {end.free_m:.1f} m before something, and stop_m was {STOP_M}'
-        return with_mends(case, found)
+        return with_mends(case, end, found)
 
     def rests():
         end = driven()
+        if end.how in ('stands', 'died'):
+            return 'it did not come so far'
         return end.stands_at_exit or 'its last command was to drive'
 
     trouble = {
@@ -202,7 +212,7 @@ def mended(case):
         'clock': 'while the stamps of its scans are wrong it stops, then it goes on',
     }[case.fault.trouble]
     return [
-        (f'on another floor {case.name} drives off', drives_off, case.fault.hint),
+        (title, drives_off, case.fault.hint),
         (trouble, minds_its_laser, case.fault.hint),
         ('it stops where its file says, and hits nothing', arrives, case.fault.hint),
         ('Ctrl+C leaves it at rest', rests, 'How does brake.py end?'),
@@ -238,7 +248,8 @@ def params(case):
     return 'params_file:=judged.yaml'
 
 
-def with_mends(case, found):
+def with_mends(case, end, found):
     """Return what was found, and what is said of each tempting mend that is seen."""
-    said = [mend.says for mend in case.wrong_mends()]
+    mends = case.wrong_mends()
+    said = [mend.says for mend in mends if not mend.ends or end.how in mend.ends]
     return ' '.join([f'{found}.', *said]) if said else found
