@@ -80,9 +80,22 @@ def seen(case):
     fault, look = case.fault, case.named(case.fault.look)
     if look.startswith('ros2 launch'):
         case.workspace.terminals[case.name].wait_for(fault.line, UP_S)
-    else:
-        case.workspace.terminal(f'source install/setup.bash\n{look}')
+        return fault.kind, look, fault.line
+    end_s = time.monotonic() + UP_S
+    while time.monotonic() < end_s:  # what a robot commands takes some time to show it
+        said = case.workspace.terminal(f'source install/setup.bash\n{look}').splitlines()
+        for one in said:
+            if fault.line in one or proves(case, look, words(one)):
+                return fault.kind, look, one
     return fault.kind, look, fault.line
+
+
+def proves(case, command, line):
+    """Return whether a line of what a command printed shows the fault."""
+    return any(
+        re.search(case.named(pair.command), command) and re.search(pair.line, line)
+        for pair in case.fault.evidence
+    )
 
 
 def mend(case):
@@ -131,12 +144,8 @@ def found(case, kind, command, line):
         return bool(lines())
 
     def shows_the_fault():
-        for pair in case.fault.evidence:
-            if re.search(case.named(pair.command), words(command)) and any(
-                re.search(pair.line, one) for one in lines()
-            ):
-                return True
-        lines()
+        if any(proves(case, words(command), one) for one in lines()):
+            return True
         return 'this line alone does not show it: a good robot could print it, too'
 
     def is_of_this_kind():
