@@ -20,7 +20,7 @@ addEventListener('message', ({ origin, source, data }) => {
 function follow() {
   opener?.postMessage('notes?', location.origin);
   find('trouble').textContent = trouble();
-  find('clock').textContent = new Date().toLocaleTimeString([], { timeStyle: 'short' });
+  find('clock').textContent = new Date().toLocaleTimeString([], { hour: '2-digit', minute: '2-digit', hourCycle: 'h23' });
   if (shown.lesson) showMinutes();
 }
 
