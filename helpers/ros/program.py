@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Callable
 
@@ -21,4 +22,7 @@ def run_program(make_node: Callable[[], Node]) -> None:
     except (KeyboardInterrupt, ExternalShutdownException):
         pass  # the end that was asked for
     finally:
-        rclpy.try_shutdown()
+        # At a signal rclpy shuts down in a thread of its own, also between the question of
+        # `try_shutdown`, whether it is done, and its own call: then that is an RCLError.
+        with contextlib.suppress(RuntimeError):
+            rclpy.try_shutdown()
