@@ -9,6 +9,7 @@ keeps its place there (`place`, `began`), and whether it was used before (`used`
 
 import hashlib
 import json
+import shutil
 import time
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from tools.lessons import lesson
 from tools.lessons.clean import text_of, write
 
 FOLDER = 'presentation'
+PICTURES = 'images'  # of the lessons, beside them
 KEY = 'deck'  # in the metadata of a copy
 
 
@@ -36,6 +38,9 @@ class Copies:
     def make(self, wanted: list[Path], new: bool = False) -> None:
         """Make or keep all copies. `new` makes those of the wanted lessons anew."""
         self.folder.mkdir(exist_ok=True)
+        pictures = self.root / 'notebooks' / PICTURES
+        if pictures.is_dir():
+            shutil.copytree(pictures, self.folder / PICTURES, dirs_exist_ok=True)
         for path in lesson.paths(self.root / 'notebooks'):
             if new and path in wanted:
                 self._make(path)
