@@ -228,8 +228,8 @@ def into_a_cell(deck):
     deck.key('Space')
     place = deck.page.active()
     assert place > 0
-    deck.tab.wait_for_function(SAVED)
-    deck.tab.reload()
+    with deck.tab.expect_navigation():
+        deck.key('Control+R')
     deck.page.wait_for_notebook(f'presentation/{following.file}')
     deck.page.wait_for_slide(place)
 
