@@ -1,5 +1,6 @@
 """A timetable of teaching.md: its lessons, and their steps."""
 
+import itertools
 import re
 from typing import NamedTuple
 
@@ -7,6 +8,14 @@ from tools.lessons.lesson import ROOT
 from tools.lessons.tables import BLOCK, LINK, ROW
 
 HEADING = re.compile(r'^### (.+)$', re.MULTILINE)
+
+
+class Row(NamedTuple):
+    """A row of a timetable. Without a file it is no lesson; without steps it is all of them."""
+
+    minutes: int
+    file: str
+    steps: tuple[int, int] | None
 
 
 class Plan(NamedTuple):
@@ -24,6 +33,12 @@ class Plan(NamedTuple):
             if file:  # a lesson may come again, with later steps
                 found[file] = steps and (found.get(file, steps)[0], steps[1])
         return found
+
+    @property
+    def from_first_lesson(self) -> list[Row]:
+        """The rows without what comes before the first lesson."""
+        rows = [Row(int(minutes), *lesson_of(what)) for minutes, what in self.rows]
+        return list(itertools.dropwhile(lambda row: not row.file, rows))
 
 
 def lesson_of(what: str) -> tuple[str, tuple[int, int] | None]:

@@ -1,6 +1,7 @@
 // Shows what the server sends. What students wrote is put into the page as text, never as HTML.
 //
-// #wall shows how to join only. #cell=ID shows the guesses of one cell, for a slide.
+// #wall shows how to join only. #cell=ID shows the guesses of one cell, for a slide, which says 'show'
+// to have its button pressed.
 
 const find = id => document.getElementById(id);
 const shown = {}; // by the id of an element: what was put there last, as JSON
@@ -113,6 +114,9 @@ live.onerror = () => (find('trouble').textContent = 'No connection to the class:
 onhashchange = () => {
   for (const id in shown) delete shown[id];
   show(last);
+};
+onmessage = ({ source, data }) => {
+  if (source === parent && data === 'show') document.querySelector('.count button')?.click();
 };
 find('lessons').onchange = event => ask('go', { lesson: event.target.value, step: 0 });
 find('end').onclick = async () => {

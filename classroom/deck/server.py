@@ -3,9 +3,13 @@
 POST deck/fresh     {"path": "presentation/02_lose_messages.ipynb"}: makes a copy anew
 GET deck/class      the address of the page of the class: of a hub's, if one was named, else of the
                     one that is open here, or nothing
+GET deck/plan       the rows of the timetable from its first lesson on, as JSON; none without one:
+                    [{"minutes": 15, "file": "01_publish_and_subscribe.ipynb", "steps": [1, 3]},
+                     {"minutes": 10, "file": "", "steps": null}]
 GET deck/look.css   colours and fonts of the lessons
 """
 
+import json
 from pathlib import Path
 
 from jupyter_server.base.handlers import JupyterHandler
@@ -15,6 +19,7 @@ from tornado import web
 
 from classroom.class_page import page_file
 from classroom.deck.copies import Copies
+from classroom.plan import Plan
 from helpers.notebook import LOOK_CSS
 
 
@@ -49,6 +54,19 @@ class PageOfClass(JupyterHandler):
         self.finish(self.page or here)
 
 
+class Rows(JupyterHandler):
+    """Give the deck its timetable."""
+
+    def initialize(self, plan: Plan) -> None:
+        """Take over the timetable."""
+        self.plan = plan
+
+    @web.authenticated
+    def get(self) -> None:
+        """Answer with its rows."""
+        self.finish(json.dumps([row._asdict() for row in self.plan.from_first_lesson]))
+
+
 class Look(JupyterHandler):
     """Give the deck and the notes window their colours and fonts."""
 
@@ -69,6 +87,7 @@ def _load_jupyter_server_extension(server: ServerApp) -> None:
         [
             (url_path_join(base, 'deck/fresh'), Fresh, {'copies': copies}),
             (url_path_join(base, 'deck/class'), PageOfClass, {'page': page}),
+            (url_path_join(base, 'deck/plan'), Rows, {'plan': copies.plan}),
             (url_path_join(base, 'deck/look.css'), Look),
         ],
     )

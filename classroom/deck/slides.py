@@ -2,7 +2,8 @@
 
 A title and a step (`#`, `##`) start a slide. A text starts one below it if code follows, and so
 does a task or a question (`### ✎`, `### Question`); a text without code joins what it is about.
-Code joins its text, as long as the slide shows not too much of it. A cell with the tag `deck-break`
+Code joins its text, as long as the slide shows not too much of it. The check and the solution of a
+task join the cell that they are about, whatever its length. A cell with the tag `deck-break`
 always starts a slide (JupyterLab, Property Inspector). A raw cell is a note for the instructor, and
 left out.
 
@@ -40,6 +41,8 @@ def _starts(cell: NotebookNode, slide: list[NotebookNode], code_follows: bool) -
     """Return whether a cell starts a slide below the one that holds these cells."""
     if 'deck-break' in tags(cell):
         return True
+    if {'check', 'solution'}.intersection(tags(cell)):
+        return slide[-1].cell_type != 'code'
     if cell.cell_type == 'code':
         lines = sum(_lines(other) for other in [*slide, cell])
         return _lines(cell) > 0 and lines > LINES and slide[-1].cell_type == 'code'

@@ -4,7 +4,7 @@ import re
 
 import nbformat
 from support.lab_server import ROOT, made, server
-from support.processes import run_python
+from support.processes import running
 from support.students import student
 
 from classroom.tests.support.deck_page import DeckPage
@@ -96,23 +96,29 @@ def test_from_join_to_the_end(lab_page, tabs, student_server, artefacts):
 
 def test_a_slide_shows_the_guesses_of_the_class(lab_page, tmp_path):
     with (
-        server(tmp_path, 'present', 'LESSON=02') as running,
+        server(tmp_path, 'present', 'LESSON=02') as presenter,
         made(tmp_path, STARTED, 'class') as (_, started),
     ):
         tell = f"""
-import time
+import sys
 from helpers.checks import *
 {started[1]}
 guess({QUESTION!r}, 14)
-time.sleep(2)
+sys.stdin.read()
 """
-        run_python(tell, **student(tmp_path / 'ada', LESSON))
-        with lab_page(running, 'class_deck', DeckPage) as deck:
+        with (
+            running(tell, **student(tmp_path / 'ada', LESSON)),
+            lab_page(presenter, 'class_deck', DeckPage) as deck,
+        ):
             deck.present(LESSON)
             deck.walk_to(GUESS)
             frame = deck.page.frame_locator('#deck-guesses')
             frame.get_by_text('1 of 1 have answered').wait_for()
             deck.screenshot('class_deck_hidden')
+            deck.page.keyboard.press('s')
+            frame.locator('.bars').wait_for()
+            deck.page.keyboard.press('s')
+            frame.locator('.bars').wait_for(state='detached')
             frame.get_by_role('button', name='Show').click()
             frame.locator('.bars').wait_for()
             deck.page.wait_for_function(
@@ -120,6 +126,11 @@ time.sleep(2)
                 " && document.querySelector('#deck-guesses').clientHeight > 80"
             )
             deck.screenshot('class_deck_shown')
+            deck.page.keyboard.press('j')
+            deck.page.frame_locator('#deck-joins').get_by_text(started[1]).wait_for()
+            deck.screenshot('class_deck_joins')
+            deck.page.keyboard.press('Space')
+            assert deck.page.locator('#deck-joins').count() == 0
             deck.press('Home')
             assert deck.page.locator('#deck-guesses').count() == 0
             deck.walk_to(COMPARED)

@@ -190,6 +190,22 @@ def runs(deck):
     assert deck.tab.evaluate(SLIDES_SHOWN)
 
 
+def runs_above(deck):
+    deck.walk_to_code()
+    deck.page.write('above = 41')
+    deck.key('Escape')
+    code = deck.page.go_on()
+    deck.page.write('print(above + 1)')
+    deck.key('Escape')
+    deck.key('a')
+    deck.says('A again')
+    deck.key('a')
+    deck.says('The cells above have run.')
+    deck.key('Control+Enter')
+    deck.page.wait_until_ran(code)
+    assert printed(deck.page.cells()[code]).strip() == '42'
+
+
 def stops(deck):
     code = deck.walk_to_code()
     deck.page.write('import time\nheld = 1\ntime.sleep(60)')
@@ -234,6 +250,14 @@ def into_a_cell(deck):
     deck.page.wait_for_slide(place)
 
 
+def without_a_class(deck):
+    """With one: see test_class_in_browser.py."""
+    deck.key('s')
+    deck.says('No guesses of a class on this slide.')
+    deck.key('j')
+    deck.says('No class is open')
+
+
 def black(deck):
     for key in ('b', 'Shift+B', '.'):
         deck.key(key)
@@ -255,10 +279,13 @@ def opens_notes(deck):
 
 
 def a_fresh_copy(deck):
-    """Only a new start of the server finds that a copy was used: see test_notes_window.py."""
+    code = deck.walk_to_code()
+    deck.page.write('typed = 1')
+    deck.page.run_here()
     deck.key('r')
     deck.key('r')
-    assert deck.slide == 1
+    deck.page.wait_for_slide(0)
+    assert 'typed' not in ''.join(deck.page.cells()[code]['source'])
 
 
 def leave(deck):
@@ -292,8 +319,10 @@ ROWS = {
     'Home, End': ends,
     'Space or PageDown at a replay': in_a_replay,
     'Ctrl+Enter, Shift+Enter': runs,
+    'A A': runs_above,
     'I I, 0 0': stops,
     'Enter, or a click': into_a_cell,
+    'S, J': without_a_class,
     'B, or .': black,
     'N': opens_notes,
     'R R': a_fresh_copy,
@@ -318,7 +347,7 @@ def test_other_letters_do_nothing(deck):
     deck.present(LESSON)
     code = Deck(deck).walk_to_code()
     before = deck.cells()
-    for key in [*'acdefghjklmopqstuvwxyzdd123456', 'Shift+M', 'Shift+V', 'Shift+L', 'Alt+Enter']:
+    for key in [*'cdefghklmopqtuvwxyzdd123456', 'Shift+M', 'Shift+V', 'Shift+L', 'Alt+Enter']:
         deck.page.keyboard.press(key)
     deck.page.keyboard.press('Control+Z')
     assert deck.cells() == before

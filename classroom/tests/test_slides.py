@@ -41,6 +41,11 @@ def code(lines=3, *tags, **metadata):
             [STEP, code(), TASK, code(9), code(1, 'check'), code(40, jupyter=FOLDED)],
             ['slide', '', 'subslide', '', '', ''],
         ),
+        # Its check does so however long its code is.
+        (
+            [STEP, code(), TASK, code(LINES + 9), code(1, 'check'), code(40, 'solution')],
+            ['slide', '', 'subslide', '', '', ''],
+        ),
         # Questions start slides, also without code between them.
         ([STEP, QUESTION, new_markdown_cell('### Question 2')], ['slide', '', 'subslide']),
         # Much code is on two slides; what is folded does not count.

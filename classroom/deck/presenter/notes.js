@@ -34,7 +34,8 @@ function showMinutes() {
   const { began, planned } = shown;
   const gone = began ? Math.floor((Date.now() / 1000 - began) / 60) : 0;
   find('gone').textContent = gone;
-  find('gone').classList.toggle('late', gone > planned);
+  find('behind').textContent = Math.max(gone - planned, 0);
+  find('behind').classList.toggle('late', gone > planned);
 }
 
 function show(state) {

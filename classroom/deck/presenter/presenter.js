@@ -6,16 +6,20 @@
 // JupyterLab loads this file as it is, in the form of a prebuilt extension. It hands over its own
 // packages, so that neither webpack nor npm is needed, and nothing of it that is not public.
 
+const COPIES = 'presentation/';
 const LESSON_S = 4 * 3600; // a deck that was left open longer begins anew
+const PLAN_S = 12 * 3600;
 const TWICE_MS = 2000; // I I, 0 0, R R and Escape Escape come within this time
 const SAVE_MS = 300;
-const SCALES = [1, 0.95, 0.9]; // of a slide: what does not fit in the smallest letters is scrolled
+// Of the letters of a slide: what does not fit in the smallest ones is scrolled.
+const SCALES = { texts: [1.6, 1.45, 1.3, 1.15, 1, 0.95, 0.9], code: [1.25, 1.1, 1, 0.95, 0.9] };
 const TYPED = 'textarea, select, [contenteditable], input:not([type=range], [type=number], [type=button])';
 // What works with the focus in a replay, a level or a list, too: its other keys are its own.
 const EVERYWHERE = ['pagedown', 'pageup', 'b', '.', 'n', 'escape', 'f5', 'Control s', 'Control r'];
 
 let packages; // of JupyterLab, by name
 let server; // { baseUrl, ask, open }
+let plan = []; // the rows of the timetable from its first lesson on: { minutes, file, steps }
 let markdown; // JupyterLab's parser
 let deck; // the notebook's panel that is shown as slides, or nothing
 let twice = {}; // a key that does something at its second press
@@ -60,11 +64,12 @@ function begin(app, tracker, actions, { makeRequest }, dialogs) {
   server = { baseUrl, ask, open: path => app.commands.execute('docmanager:open', { path }) };
   for (const file of ['deck/look.css', 'lab/extensions/presenter/deck.css'])
     document.head.append(element('link', { rel: 'stylesheet', href: baseUrl + file }));
+  const planKnown = ask('deck/plan').then(async answer => (plan = await answer.json()));
   document.body.append(head, line, back);
   back.onclick = () => show(tracker.currentWidget);
   const open = async panel => {
-    if (!panel?.context.path.startsWith('presentation/')) return;
-    await Promise.all([panel.context.ready, panel.revealed]);
+    if (!panel?.context.path.startsWith(COPIES)) return;
+    await Promise.all([planKnown, panel.context.ready, panel.revealed]);
     if (!panel.isDisposed && tracker.currentWidget === panel && deck !== panel) {
       prepare(panel);
       show(panel);
@@ -151,6 +156,24 @@ function keep(changes) {
   deck.model.setMetadata('deck', JSON.parse(JSON.stringify({ ...kept(), ...changes })));
 }
 
+let walks = null; // to another lesson: { file, began, atEnd }
+
+// Open another lesson, at its first slide or at its last. The minutes of a timetable go on.
+function walk(file, atEnd = false) {
+  walks = { file, atEnd, began: plan.length ? kept().began : undefined };
+  say(`Opens ${file}`);
+  void server.open(COPIES + file);
+}
+
+// The file that is so many lessons further in the timetable, if there is one.
+function further(way) {
+  const files = [...new Set(plan.map(({ file }) => file))].filter(Boolean);
+  const at = files.indexOf(fileOf(deck));
+  return at < 0 ? undefined : files[at + way];
+}
+
+const fileOf = panel => panel.context.path.replace(COPIES, '');
+
 function show(panel) {
   if (!panel) return;
   if (deck && deck !== panel) deck.removeClass('jp-Deck');
@@ -159,9 +182,17 @@ function show(panel) {
   document.body.dataset.jpDeckMode = 'presenting';
   panel.fit();
   const { place, used } = kept();
-  const saved = panel.content.widgets.findIndex(({ model }) => model.id === place);
-  const index = panel.content.activeCellIndex || Math.max(saved, 0);
-  goTo(slideOf(index), index);
+  const arrives = walks?.file === fileOf(panel) ? walks : null;
+  walks = null;
+  say('');
+  if (arrives) {
+    keep({ began: arrives.began });
+    goTo(arrives.atEnd ? Infinity : 0);
+  } else {
+    const saved = panel.content.widgets.findIndex(({ model }) => model.id === place);
+    const index = panel.content.activeCellIndex || Math.max(saved, 0);
+    goTo(slideOf(index), index);
+  }
   if (used) say(`Used on ${used}, with what was typed and run. R R: a fresh one.`);
 }
 
@@ -250,6 +281,7 @@ function update() {
   const sourceOf = index => widgets[index].model.sharedModel.getSource();
   const step = all.slice(0, number + 1).map(([first]) => first).findLast(first => widgets[first].model.type === 'markdown' && /^##? /.test(sourceOf(first)));
   const [title, count, progress] = head.children;
+  head.classList.toggle('deck-title', number === 0); // the slide says it, larger
   title.textContent = step === undefined ? '' : sourceOf(step).split('\n')[0].replace(/^#+ |[`*]/g, '');
   count.textContent = `${number + 1} / ${all.length}`;
   Object.assign(progress, { max: all.length, value: number + 1 });
@@ -259,8 +291,9 @@ function update() {
   shownPlace = place;
   const now = Date.now() / 1000;
   const { began } = kept();
-  const begins = number > 0 && !(now - began < LESSON_S);
-  keep({ place: widgets[activeCellIndex].model.id, ...(begins ? { began: now } : {}) });
+  const begins = number > 0 && !(now - began < (plan.length ? PLAN_S : LESSON_S));
+  const inPlan = 60 * sumOf(plan.slice(0, rowOf(0))); // later lessons begin later
+  keep({ place: widgets[activeCellIndex].model.id, ...(begins ? { began: now - inPlan } : {}) });
   void tell(place);
   const about = [activeCellIndex, ...slide].map(index => widgets[index]).find(hasGuess);
   document.getElementById('deck-guesses')?.remove();
@@ -269,12 +302,17 @@ function update() {
 
 // The letters are as large as the slide has room for. What grows below it comes into view.
 function fit() {
-  const { node, viewportNode } = deck.content;
+  const { node, viewportNode, widgets } = deck.content;
   const outer = scroller();
-  for (const scale of SCALES) {
+  const hasCode = widgets.some(cell => cell.node.classList.contains('deck-on') && cell.model.type === 'code');
+  let room = 0;
+  viewportNode.style.marginTop = 0;
+  for (const scale of SCALES[hasCode ? 'code' : 'texts']) {
     node.style.setProperty('--deck-scale', scale);
-    if (viewportNode.getBoundingClientRect().height <= outer.clientHeight) break;
+    room = outer.clientHeight - viewportNode.getBoundingClientRect().height;
+    if (room >= 0) break;
   }
+  if (!hasCode) viewportNode.style.marginTop = `${Math.max(room / 2, 0)}px`;
   showMore();
   const cell = deck.content.activeCell?.node;
   const end = cell && cell.getBoundingClientRect().bottom - outer.getBoundingClientRect().bottom;
@@ -298,6 +336,16 @@ function onNotesWindow({ origin, source, data }) {
   if (origin !== location.origin || data !== 'notes?') return;
   notesWindow = source;
   source.postMessage(told, origin);
+}
+
+// --- The minutes of a timetable ------------------------------------------------------------------
+
+const sumOf = rows => rows.reduce((sum, { minutes }) => sum + minutes, 0);
+
+// The index of the row that holds a step of this lesson; 0 for a lesson that is in none.
+function rowOf(step) {
+  const file = fileOf(deck);
+  return Math.max(plan.findIndex(row => row.file === file && (!row.steps || step <= row.steps[1])), 0);
 }
 
 const minutesOf = source => Number(/^For the instructor: (\d+) minutes/.exec(source)?.[1] ?? 0);
@@ -327,7 +375,18 @@ async function tell(place) {
   const titleOf = ({ source }) => source.split('\n')[0].replace(/^#+ /, '');
   const all = slides();
   const { began } = kept();
-  const minutes = { own: minutesIn(step, end), planned: minutesIn(0, end), all: minutesIn(0) };
+  let minutes = { own: minutesIn(step, end), planned: minutesIn(0, end), all: minutesIn(0) };
+  if (plan.some(({ file }) => file === fileOf(deck))) {
+    // In a timetable they are those of all lessons and breaks up to here.
+    const numberOf = index => Number(/^## (\d+)/.exec(cells[index].source)?.[1] ?? 0);
+    const row = rowOf(numberOf(step));
+    const start = indices.find(index => starts(index) && numberOf(index) === plan[row].steps?.[0]) ?? 0;
+    minutes = {
+      own: minutes.own,
+      planned: sumOf(plan.slice(0, row)) + Math.min(minutesIn(start, end), plan[row].minutes),
+      all: sumOf(plan),
+    };
+  }
   const path = context.path;
   void tellClass({ lesson: path.match(/\d\d_(\w+)\.ipynb$/)?.[1], cell: cells[at].id, began_s: began ?? null, ...minutes });
   const following = (all[here() + 1] ?? []).map(index => cells[index]);
@@ -382,6 +441,20 @@ function onGuesses({ source, data }) {
   if (document.activeElement === frame) focusCell();
 }
 
+// Show or hide the answers, as its button does.
+function showAnswers() {
+  const frame = document.getElementById('deck-guesses');
+  if (!frame) return say('No guesses of a class on this slide.');
+  frame.contentWindow.postMessage('show', new URL(frame.src).origin);
+}
+
+async function showJoins() {
+  const address = await pageOfClass();
+  if (!address) return say('No class is open: make class, in another terminal.');
+  document.getElementById('deck-joins')?.remove(); // of a second call
+  document.body.append(element('iframe', { id: 'deck-joins', title: 'How to join the class', src: `${address}#wall` }));
+}
+
 // --- Keys ----------------------------------------------------------------------------------------
 
 const KEYS = {
@@ -398,9 +471,12 @@ const KEYS = {
   enter,
   'Control enter': run,
   'Shift enter': run,
-  i: () => again('i', 'I again: interrupt the cell', () => deck.sessionContext.session?.kernel?.interrupt()),
+  i: () => again('i', 'I again: interrupt the cell', interrupt),
   0: () => again('0', '0 again: restart the kernel', restart),
-  r: () => kept().used && again('r', 'R again: throw away what was typed and run', fresh),
+  a: actions => again('a', 'A again: run all cells above', () => void runAbove(actions)),
+  r: () => again('r', 'R again: throw away what was typed and run in this lesson', fresh),
+  s: showAnswers,
+  j: () => void showJoins(),
   b: () => document.body.classList.add('deck-black'),
   '.': () => document.body.classList.add('deck-black'),
   n: () => void window.open(server.baseUrl + NOTES, 'notes', 'popup'),
@@ -429,10 +505,15 @@ function onKey(event, tracker, actions) {
   const cell = deck.content.activeCell.node;
   if (target.closest?.('iframe') || !deck.node.contains(target) && target !== document.body) return;
   if (['control', 'shift', 'alt', 'meta', 'altgraph', 'capslock'].includes(low)) return;
-  const black = document.body.classList.contains('deck-black');
+  const joins = document.getElementById('deck-joins');
+  const covered = joins || document.body.classList.contains('deck-black');
   const edits = target.closest?.('.jp-InputArea-editor');
   const inside = !edits && target !== cell && cell.contains(target);
-  if (black) return take(event, () => document.body.classList.remove('deck-black'));
+  if (covered)
+    return take(event, () => {
+      document.body.classList.remove('deck-black');
+      joins?.remove();
+    });
   if (edits) {
     const wanted = ['Control enter', 'Shift enter', 'f5', 'Control s', 'Control r'];
     const completes = document.querySelector('.jp-Completer:not(.lm-mod-hidden)');
@@ -495,15 +576,20 @@ function next() {
   } else if (number < slides().length - 1) {
     goTo(number + 1);
   } else {
-    say('The end. Enter opens the next lesson.');
+    const file = further(1);
+    if (file) walk(file);
+    else say(plan.length ? 'The end of the timetable.' : nextFile() ? 'The end. Enter opens the next lesson.' : 'The end.');
   }
   used();
 }
 
 function previous() {
   const outer = scroller();
+  const file = further(-1);
   if (outer.scrollTop > 4) outer.scrollTop -= 0.8 * outer.clientHeight;
-  else goTo(here() - 1);
+  else if (here() > 0) goTo(here() - 1);
+  else if (file) walk(file, true);
+  else say('The first slide.');
 }
 
 // A copy in which something was typed before is from now on the one that is shown.
@@ -553,9 +639,16 @@ function enter() {
     content.activate();
     return;
   }
-  const sources = shownOn(slides()[here()]).map(index => content.widgets[index].model.sharedModel.getSource());
-  const [, file] = sources.at(-1).match(/^Next: \[.*\]\((\S+\.ipynb)\)$/m) ?? [];
-  if (file) void server.open(`presentation/${file}`);
+  const file = nextFile();
+  if (file) walk(file);
+  else say('There is no cell to write into on this slide.');
+}
+
+// The lesson to which the last cell of this slide leads.
+function nextFile() {
+  const { widgets } = deck.content;
+  const source = widgets[shownOn(slides()[here()]).at(-1)].model.sharedModel.getSource();
+  return source.match(/^Next: \[.*\]\((\S+\.ipynb)\)$/m)?.[1];
 }
 
 function escape(_actions, _on, from = { edits: true }) {
@@ -593,6 +686,23 @@ async function run(actions, on) {
   panel.deckFollows = true;
   void actions.runCells(content, [cell], sessionContext);
   if (on && panel === deck) byCell(1);
+}
+
+// As JupyterLab's "Run All Above Selected Cell".
+async function runAbove(actions) {
+  const panel = deck;
+  const { content, sessionContext } = panel;
+  const above = content.widgets.slice(0, content.activeCellIndex).filter(({ model }) => model.type === 'code');
+  if (!above.length) return say('There is no cell above.');
+  say(`Runs the ${above.length} cells above`);
+  await sessionContext.ready;
+  const passed = await actions.runCells(content, above, sessionContext);
+  if (panel === deck) say(passed ? 'The cells above have run.' : 'One of the cells above has ended with an error.');
+}
+
+function interrupt() {
+  say('Interrupted.');
+  void deck.sessionContext.session?.kernel?.interrupt();
 }
 
 async function restart() {
