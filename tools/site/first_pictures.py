@@ -21,8 +21,18 @@ from tools.lessons.lesson import FOLDER, Lesson, lessons
 
 IMAGES = FOLDER / 'images'
 FILE = IMAGES / 'depth_10_hits_depth_1_stops.svg'
-# The cell whose drive a lesson shows first. It is where the lesson leads to, and tells no guess.
-DRIVES = {'14': 'l11-replay', '15': 'cpp-12-drive'}
+# The cell whose drive a lesson shows first, and how much of it: a guess is not told.
+DRIVES = {
+    '01': ('drive-the-square', 1),
+    '05': ('drive-depth-10', 0.55),
+    '06': ('drive-deadlock', 0.4),
+    '08': ('run-15-obey', 1),
+    '10': ('l09-careful', 1),
+    '14': ('l11-replay', 1),
+    '15': ('cpp-12-drive', 1),
+    '18': ('bag0716d970', 1),
+    '20': ('project-082', 1),
+}
 CELLS = {10: 'drive-depth-10', 1: 'drive-depth-1'}
 ARRIVE, TAKE, END = range(3)  # moves of a replay
 
@@ -278,11 +288,17 @@ def _colour(name: str) -> str:
     return 'light-dark({},{})'.format(*PAIRS[name])
 
 
-def drive_picture(page: str) -> str:
-    """Return the floor of a saved drive, on which its robot moves once."""
+def drive_picture(page: str, share: float) -> str:
+    """Return the floor of a saved drive, on which its robot drives once, a share of its way."""
     svg = unquote(re.search(r'src="data:image/svg\+xml,([^"]*)"', page)[1])
     poses = runs_of(page)[0]['poses']
-    last = len(poses) - 1
+    last = int(share * (len(poses) - 1))
+    poses = poses[: last + 1]
+    if share < 1:
+        svg = re.sub(r"<path[^>]* class='(all|driven|seconds|bumps)'[^>]*/>", '', svg)
+        x, y, *_ = poses[-1]
+        at = f"class='robot' transform='translate({x:.3f} {y:.3f})'"
+        svg = re.sub(r"class='robot' transform='[^']*'", at, svg)
     every = max(1, last // 60)
     moves = turns = ''
     for i, (x, y, yaw, *_) in enumerate(poses):
@@ -308,5 +324,6 @@ if __name__ == '__main__':
     write(FILE, picture())
     for known in lessons():
         if known.number in DRIVES:
-            shown = drive_picture(output_of(known, DRIVES[known.number]))
+            cell, share = DRIVES[known.number]
+            shown = drive_picture(output_of(known, cell), share)
             write(IMAGES / f'drive_of_{known.name}.svg', shown)
