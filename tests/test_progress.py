@@ -85,6 +85,17 @@ def test_passed_tasks_are_kept(kept):
     assert kept.read_text() == 'lose_them 1\n'
 
 
+def test_the_total_counts_tasks(kept):
+    progress.add('another_lesson 1')
+    progress.record(1, 'ada')
+    assert progress.total() == '1 of 4 tasks'
+
+
+def test_without_a_file_there_is_no_total(monkeypatch):
+    monkeypatch.setenv(progress.FILE_VARIABLE, '')
+    assert progress.total() == ''
+
+
 def test_what_a_task_was_about_is_kept_if_it_differs(kept):
     tasks = Tasks()
     tasks.add(1, about=str.lower)(lambda word: [('it is right', lambda: word != 'WRONG', '')])

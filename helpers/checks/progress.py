@@ -137,6 +137,17 @@ def show() -> None:
     print(table(known, lines))
 
 
+def total() -> str:
+    """Return how many tasks are solved: `12 of 169 tasks`; empty if no progress is kept."""
+    path = file()
+    if path is None:
+        return ''
+    known = {line for lesson in with_tasks() for line in lesson.lines()}
+    with suppress(OSError):
+        return f'{len(known.intersection(_read(path).splitlines()))} of {len(known)} tasks'
+    return ''
+
+
 def start_again() -> None:
     """Begin with an empty table. The old file is kept beside the new one, as `.old`."""
     path = file()

@@ -115,6 +115,9 @@ class Tasks:
                 _checks[number] = caller.f_code
             function, cpu_s, limit_s = self._tasks[number]
             _judge(verdict, lambda: function(*answer), cpu_s, limit_s)
+        if of == 'answer' and verdict.solved:
+            progress.record(number)
+            verdict.total = progress.total()
         _show(verdict)
         if of == 'answer' and verdict.points:
             _solved[number] = verdict.solved

@@ -21,7 +21,7 @@ KEY = 'ros2_notebooks'
 SAME, LONG = 'the same', 40
 AGAIN = 'Try again, or go on with the solution below.'
 CARD = 'border-left:4px solid {};padding:.1em .8em;margin:.2em 0;line-height:1.45'
-INDENTED = 'margin-left:1.5em'
+INDENTED, FAINT = 'margin-left:1.5em', 'margin-left:1em;opacity:.75'
 GREEN, AMBER = '#2e7d32', '#b26a00'
 
 
@@ -37,13 +37,17 @@ class Point:
 
 @dataclass
 class Verdict:
-    """What a check says of a task. `seconds` is how long the check took."""
+    """What a check says of a task.
+
+    `seconds` is how long the check took, and `total` how many tasks are solved now, in words.
+    """
 
     task: int
     points: list[Point] = field(default_factory=list)
     of: str = 'answer'
     note: str = ''
     seconds: float = 0.0
+    total: str = ''
 
     @property
     def solved(self) -> bool:
@@ -105,7 +109,8 @@ class Verdict:
             rows.append(f'<div>{html.escape(self.note)}</div>')
         title, colour = html.escape(self.title()), GREEN if self.solved else AMBER
         if self.solved:
-            rows = [f'<div><b>✔ {title}</b></div>', *rows]
+            total = f' <span style="{FAINT}">{self.total}</span>' if self.total else ''
+            rows = [f'<div><b>✔ {title}</b>{total}</div>', *rows]
         else:
             rows.append(f'<div><b>{title}</b></div>')
         return f'<div style="{CARD.format(colour)}">{"".join(rows)}</div>'
