@@ -19,7 +19,8 @@ from helpers.workspace import Process, without_folders
 
 DRIVER = TURTLEBOT3.but(max_speed=0.5)  # twice as fast as a real one, which is slow to look at
 LAUNCH = 'source install/setup.bash\nros2 launch {name} bringup.launch.xml robot:=false'
-READY_S, PATIENCE_S = 30.0, 3.0
+# Once its nodes are known: so long, or longer if it has not heard a command yet, a robot may stand.
+READY_S, PATIENCE_S, SILENT_S = 30.0, 3.0, 6.0
 STILL_S, LONGEST_S = 1.2, 12.0
 ENDS_S = 15.0  # launch waits 5 s, and once more, for a program that does not end
 TROUBLE_M, TROUBLE_S, PUSH_S = 0.4, 1.4, 0.5
@@ -192,7 +193,8 @@ class Watcher:
             if len(names) < NODES and now_s - self._begun_s < READY_S:
                 return False
             self._ready_s = now_s
-        return now_s - self._ready_s > max(PATIENCE_S, 1.5 * (self._ready_s - self._begun_s))
+        patience_s = PATIENCE_S if self.robot.record.commands else SILENT_S
+        return now_s - self._ready_s > max(patience_s, 1.5 * (self._ready_s - self._begun_s))
 
 
 def end_launch(process: Process) -> None:
