@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
-from helpers.checks.bench import Bench
+from helpers.checks.bench import RELIABLE, Bench
 from helpers.checks.programs import TRACEBACK, error_in, wait_until
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import EMPTY, Robot
@@ -270,7 +270,7 @@ def leave_a_robot_that_stands(workspace, file):
     def leaves_it_standing(sent):
         """Let the program drive, send it a signal, and look at what it has commanded."""
         with Bench() as bench:
-            commands = bench.hear('cmd_vel', Twist)
+            commands = bench.hear('cmd_vel', Twist, RELIABLE)
             start = f'exec {sys.executable} {file} --ros-args --disable-external-lib-logs'
             with workspace.start(start, 'driver') as process:
                 drove = bench.wait(lambda: len(commands) >= 3 or not process.running, 15)

@@ -10,7 +10,7 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 
-from helpers.checks.bench import Bench
+from helpers.checks.bench import RELIABLE, Bench
 from helpers.checks.builds import why_it_failed
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
@@ -147,7 +147,7 @@ def wake(bench, process, scans, answers):
 def answers_to(workspace, program, kind, topic, *distances, pause_s=0.0):
     """Publish a scan for each distance. Return the node's name, and what it says to each scan."""
     with Bench() as bench, workspace.run(program, program) as process:
-        answers = bench.hear(topic, kind)
+        answers = bench.hear(topic, kind, RELIABLE)
         scans, tester = bench.publisher('scan', LaserScan), bench.tester
 
         def is_known():
@@ -236,7 +236,7 @@ def a_node_of_your_own(workspace):
     def stops_at_ctrl_c():
         built()
         with Bench() as bench, workspace.run('brake', 'brake') as process:
-            commands = bench.hear('cmd_vel', Twist)
+            commands = bench.hear('cmd_vel', Twist, RELIABLE)
             scans = bench.publisher('scan', LaserScan)
             bench.wait(lambda: not process.running or scans.get_subscription_count(), START_S)
             wake(bench, process, scans, commands)
