@@ -39,8 +39,7 @@ QUIET_S = 6.0
 CALLBACK_S = 3.0  # for a callback to end
 POLL_S = 0.005
 ALL = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)  # hears every publisher
-# For what programs say: a publisher that ends may wait for this subscription, so that its last
-# message is not lost, as the base of a robot hears it.
+# As the base of a robot subscribes: a program that ends can wait until its last message is here.
 RELIABLE = QoSProfile(depth=1000)
 STATUS = {
     GoalStatus.STATUS_SUCCEEDED: 'SUCCEEDED',
