@@ -28,7 +28,7 @@ from packaging.requirements import Requirement
 from classroom.update import BASE, committed
 from helpers.notebook import MARK
 from tools.lessons.clean import text_of
-from tools.lessons.lesson import ROOT, tags
+from tools.lessons.lesson import PICTURES, ROOT, tags
 
 NAME = 'ros2_notebooks'
 LOCK = 'tools/locks/requirements.lock'
@@ -94,6 +94,12 @@ def write_lessons(source: Path, to: Path, *, solutions: bool = True) -> None:
         lesson = lesson_for_students(nbformat.read(path, as_version=4), left_out)
         (to / path.name).write_text(text_of(lesson), encoding='utf-8')
         (to / path.name).chmod(0o644)
+    if to != source:
+        (to / PICTURES).mkdir(exist_ok=True)
+        (to / PICTURES).chmod(0o755)
+        for picture in (source / PICTURES).glob('*'):
+            (to / PICTURES / picture.name).write_bytes(picture.read_bytes())
+            (to / PICTURES / picture.name).chmod(0o644)
 
 
 def not_committed(root: Path) -> list[str]:

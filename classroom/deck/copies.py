@@ -24,7 +24,6 @@ from tools.lessons import lesson
 from tools.lessons.clean import text_of, write
 
 FOLDER = 'presentation'
-PICTURES = 'images'  # of the lessons, beside them
 KEY = 'deck'  # in the metadata of a copy
 
 
@@ -38,9 +37,9 @@ class Copies:
     def make(self, wanted: list[Path], new: bool = False) -> None:
         """Make or keep all copies. `new` makes those of the wanted lessons anew."""
         self.folder.mkdir(exist_ok=True)
-        pictures = self.root / 'notebooks' / PICTURES
+        pictures = self.root / 'notebooks' / lesson.PICTURES
         if pictures.is_dir():
-            shutil.copytree(pictures, self.folder / PICTURES, dirs_exist_ok=True)
+            shutil.copytree(pictures, self.folder / lesson.PICTURES, dirs_exist_ok=True)
         for path in lesson.paths(self.root / 'notebooks'):
             if new and path in wanted:
                 self._make(path)

@@ -13,7 +13,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from support.checkouts import git
 
 from classroom import handout, update
-from tools.lessons.lesson import ROOT
+from tools.lessons.lesson import PICTURES, ROOT
 
 FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb', 'classroom/update.py'}
 LESSONS = '<!-- made by `make notebooks`: lessons -->\n\n| 01 |\n\n<!-- end -->'
@@ -133,6 +133,14 @@ def test_solutions_may_come_later(checkout, tmp_path):
     archive = checkout / 'handout/ros2_notebooks.tar.gz'
     assert update.main([str(archive), '--to', str(course)]) == 0
     assert cells_of(course) == ['start = 99', 'solved = 2']
+
+
+def test_the_lessons_of_a_hub_have_their_pictures(tmp_path):
+    source, lessons = ROOT / 'notebooks', tmp_path / 'lessons'
+    for _ in range(2):  # a hub starts again
+        handout.write_lessons(source, lessons)
+    names = {path.name for path in (source / PICTURES).iterdir()}
+    assert {path.name for path in (lessons / PICTURES).iterdir()} == names
 
 
 def test_packages_are_those_of_the_wanted_pythons(tmp_path):

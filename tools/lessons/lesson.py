@@ -21,6 +21,7 @@ from nbformat import NotebookNode
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / 'notebooks'
+PICTURES = 'images'  # of the lessons, beside them
 START, GLOSSARY = '00', '99'  # the notebooks that are no lessons
 PARTS = ('nodes', 'packages', 'robot')
 NOTE = 'For the instructor'

@@ -28,6 +28,7 @@ from tools.lessons.lesson import (
     FOLDER,
     GLOSSARY,
     PARTS,
+    PICTURES,
     ROOT,
     START,
     Lesson,
@@ -159,7 +160,7 @@ def prepare(pages: Path) -> None:
         shutil.copy(FOLDER / lesson.file, downloads)
         page = page_of(lesson.notebook, lesson.file, figures)
         nbformat.write(page, notebooks / lesson.file)
-    shutil.copytree(FOLDER / 'images', notebooks / 'images')
+    shutil.copytree(FOLDER / PICTURES, notebooks / PICTURES)
     for name in DOCUMENTS:
         (pages / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / f'{name}.md', pages / f'{name}.md')

@@ -17,9 +17,9 @@ from urllib.parse import unquote
 
 from helpers.notebook import LOOK
 from helpers.robot import CORRIDOR, RADIUS_M
-from tools.lessons.lesson import FOLDER, Lesson, lessons
+from tools.lessons.lesson import FOLDER, PICTURES, Lesson, lessons
 
-IMAGES = FOLDER / 'images'
+IMAGES = FOLDER / PICTURES
 FILE = IMAGES / 'depth_10_hits_depth_1_stops.svg'
 # The cell whose drive a lesson shows first, and how much of it: a guess is not told.
 DRIVES = {
