@@ -2,7 +2,7 @@
 
 import pytest
 
-from helpers.checks.builds import build, compile_error, data_files_of, first_error
+from helpers.checks.builds import build, compile_error, first_error
 from helpers.checks.errors import Failed
 from helpers.workspace import Workspace
 from helpers.workspace.build_output import lines_that_matter
@@ -139,30 +139,6 @@ def package():
 def setup(workspace, arguments):
     text = f"from setuptools import setup\n\nsetup(name='robot', {arguments})\n"
     workspace.write('src/robot/setup.py', text)
-
-
-def test_data_files_are_those_of_setup_py(package):
-    setup(package, "packages=['robot'], data_files=[('share/robot', ['package.xml'])]")
-    assert data_files_of(package, 'robot') == [('share/robot', ['package.xml'])]
-    setup(package, "packages=['robot']")
-    assert data_files_of(package, 'robot') == []
-
-
-@pytest.mark.parametrize(
-    ('arguments', 'sentence'),
-    [
-        ("data_files=[('share/robot', 'package.xml')]", 'not a pair of a folder and a list'),
-        ("data_files=[('/share/robot', ['package.xml'])]", 'it must not begin with a /'),
-        ("data_files=['package.xml']", 'not a pair of a folder and a list'),
-        ('data_files=files', "NameError: name 'files' is not defined"),
-        ('data_files=3 3', 'Perhaps you forgot a comma? Line 3 of setup.py: setup('),
-    ],
-)
-def test_what_is_wrong_with_setup_py_is_said(package, arguments, sentence):
-    setup(package, arguments)
-    with pytest.raises(Failed) as failed:
-        data_files_of(package, 'robot')
-    assert sentence in str(failed.value)
 
 
 def test_a_build_raises_the_first_error_and_can_begin_anew(package):

@@ -1,12 +1,9 @@
-"""What checks need for builds and packages: a build, why it failed, what setup.py installs."""
+"""What checks need for builds and packages: a build, and why it failed."""
 
 from __future__ import annotations
 
-import ast
 import re
 import shutil
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,11 +13,6 @@ from helpers.workspace import BuildResult, Workspace, lines_that_matter
 LONGEST = 600  # characters of a reason
 # What CMake adds to its reason: advice for somebody who installs packages.
 ADVICE = re.compile(r' (?:Possible reasons include|Add the installation prefix|See also).*')
-# As colcon asks. What setup.py prints comes before.
-ASK_SETUP = """
-from distutils.core import run_setup
-print(repr(run_setup('setup.py', script_args=['--dry-run'], stop_after='config').data_files))
-"""
 
 
 def build(workspace: Workspace, *packages: str, anew: bool = False) -> BuildResult:
@@ -134,31 +126,3 @@ def _with_line(text: str, number: str, file: str, code: str) -> str:
     end = '' if text[-1:] in ('.', '!', '?') else '.'
     line = f'Line {number} of {Path(file).name}'
     return f'{text}{end} {line}: {code.strip()}' if code.strip() else f'{text}{end} {line}'
-
-
-def data_files_of(workspace: Workspace, package: str) -> list[tuple[str, list[str]]]:
-    """Return the pairs of a folder and files that setup.py of a package gives as `data_files`.
-
-    Raises Failed if setup.py fails, or if they are not pairs of a folder and a list of files.
-    """
-    asked = subprocess.run(
-        [sys.executable, '-W', 'ignore', '-c', ASK_SETUP],
-        cwd=workspace.file(f'src/{package}'),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    if asked.returncode:
-        raise Failed(compile_error(asked.stderr))
-    pairs = ast.literal_eval(asked.stdout.splitlines()[-1]) or []
-    for pair in pairs:
-        if not (
-            isinstance(pair, tuple | list)
-            and len(pair) == 2
-            and isinstance(pair[0], str)
-            and isinstance(pair[1], tuple | list)
-        ):
-            raise Failed(f'data_files has {pair!r}, not a pair of a folder and a list of files')
-        if pair[0].startswith('/'):
-            raise Failed(f'data_files has the folder {pair[0]}: it must not begin with a /')
-    return [(folder, list(files)) for folder, files in pairs]

@@ -115,18 +115,19 @@ class Tasks:
                 _checks[number] = caller.f_code
             function, cpu_s, limit_s = self._tasks[number]
             _judge(verdict, lambda: function(*answer), cpu_s, limit_s)
-        if of == 'answer' and verdict.solved:
-            progress.record(number)
-            verdict.total = progress.total()
-        _show(verdict)
-        if of == 'answer' and verdict.points:
-            _solved[number] = verdict.solved
+        if of == 'solution' or not verdict.points:
+            _show(verdict)
+            return
+        about = ''
+        if verdict.solved:
             about = self._about[number](*answer) if number in self._about else ''
-            if verdict.solved:
-                progress.record(number, about)
-            classroom.tell_task(number, verdict.solved)
-            if about and verdict.solved:
-                classroom.tell_about(number, about)
+            progress.record(number, about)
+            verdict.total = progress.total() if progress.this_lesson() else ''
+        _show(verdict)
+        _solved[number] = verdict.solved
+        classroom.tell_task(number, verdict.solved)
+        if about:
+            classroom.tell_about(number, about)
 
 
 def once(function: Callable[[], object]) -> Callable[[], object]:

@@ -7,7 +7,7 @@ The data stand in the metadata of the cell's output, under `ros2_notebooks`:
 
 `of` is 'answer', or 'solution' if the lesson's own solution was judged. `found`, `hint` and `note`
 are there if something was found, if a hint was shown, and if the answer could not be judged.
-Progress, class page, tests, slides and site read these, and never the text.
+Grades, rules and tests read these, and never the text.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Verdict:
             lines += wrap(f'[{"ok" if point.ok else "not yet"}] {point.what}', rest=' ' * 10)
             if found:
                 lines += wrap(f'    Found: {found}', rest=' ' * 10)
-            if point.hint:
+            if point.hint and found != SAME:  # the hint of the first one is about it
                 lines += wrap(f'    Hint: {point.hint}', rest=' ' * 10)
         if self.note:
             lines += wrap(self.note)
@@ -103,7 +103,7 @@ class Verdict:
                 f'<div><span style="color:{colour}">{mark}</span> {html.escape(point.what)}</div>'
             )
             for name, text in (('Found', found), ('Hint', point.hint)):
-                if text:
+                if text and not (name == 'Hint' and found == SAME):
                     rows.append(f'<div style="{INDENTED}"><b>{name}</b> {html.escape(text)}</div>')
         if self.note:
             rows.append(f'<div>{html.escape(self.note)}</div>')

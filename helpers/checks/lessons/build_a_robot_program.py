@@ -712,7 +712,7 @@ def reach_and_speed(workspace):
         (
             'between',
             speeds_are((0.625, 0.5, 0.25), (0.4, 1.0, 0.2)),
-            '(reach - STOP) / (SLOW - STOP)',
+            '(reach - STOP_M) / (SLOW_M - STOP_M)',
         ),
     ]
 
@@ -1676,13 +1676,13 @@ WHAT_TO_TEST = {
 @tasks.add(16, limit_s=90)
 def test_the_logic(workspace, tests):
     return judged_tests(
-        workspace, tests, 'logic', LOGIC, WRONG_LOGICS, 'Is each line what task 3 says?'
+        workspace, tests, 'logic', LOGIC, WRONG_LOGICS, 'Is each line what tasks 3 and 6 say?'
     )
 
 
 @tasks.add(17, limit_s=90)
 def test_the_node(workspace, tests):
-    return judged_tests(workspace, tests, 'patrol', NODE, WRONG_NODES, 'What does task 11 say?')
+    return judged_tests(workspace, tests, 'patrol', NODE, WRONG_NODES, 'What does task 12 say?')
 
 
 # --- A TurtleBot 3

@@ -210,7 +210,19 @@ def the_filter_node(FilterNode):
                 bench.say(topic, message)
                 if isinstance(message, Odometry) and len(estimates) == before:
                     raise Failed('it publishes nothing after a message of the wheels')
+                if not isinstance(message, Odometry) and len(estimates) > before:
+                    raise Failed(
+                        f'it also publishes after a message of {topic}: only odom is answered'
+                    )
         return estimates
+
+    def last_after(*messages):
+        """Return the last estimate, which must be as old as the last message."""
+        last = estimates_after(*messages)[-1]
+        found, right = (seconds_of(one.header.stamp) for one in (last, messages[-1]))
+        if abs(found - right) > 0.01:
+            raise Failed(f'its time is {found:.1f} s, not {right:.1f} s: it is that of the stamp')
+        return last
 
     def answers(count):
         times = [number / 10 for number in range(count)]
@@ -225,12 +237,12 @@ def the_filter_node(FilterNode):
     def turns_to(yaw):
         message = imu(yaw=yaw, vyaw=0.0)
         message.orientation_covariance = np.diag([1e-4] * 3).ravel()
-        last = estimates_after(*again(message))[-1]
+        last = last_after(*again(message))
         found = yaw_of(last.pose.pose.orientation)
         return abs(found - yaw) < 0.2 or f'a yaw of {found:.1f} rad, not {yaw:.1f} rad'
 
     def goes_to_a_fix():
-        last = estimates_after(*again(fix(0.0, 3.0, variances=(1e-4, 1e-4))))[-1]
+        last = last_after(*again(fix(0.0, 3.0, variances=(1e-4, 1e-4))))
         y = last.pose.pose.position.y
         return abs(y - 3) < 0.1 or f'y = {y:.1f} m after precise fixes at 3.0 m'
 
