@@ -5,6 +5,7 @@ import pytest
 import support.examples  # noqa: F401
 from support.browser import *  # noqa: F403
 from support.lab_server import NOTEBOOKS, server
+from support.waits import wait_for
 
 from classroom.tests.support.classes import running_class
 from classroom.tests.support.deck_page import DeckPage
@@ -43,8 +44,10 @@ def run_as_saved(copy, lesson):
 def deck(lab_page, instructor_server, request):
     """Yield an instructor's page. No change of a copy and no place reaches the next test."""
     folder = instructor_server.folder / 'presentation'
-    copies = {path: path.read_bytes() for path in folder.glob('*.ipynb')}
+    copies = {path: path.read_bytes() for path in folder.glob('[0-9]*.ipynb')}
     with lab_page(instructor_server, request.node.name, DeckPage) as opened:
         yield opened
+    # The server may still save, for the page that has closed: a file beside the copy, then the copy.
+    wait_for(lambda: not any(folder.glob('.~*')))
     for path, before in copies.items():
         path.write_bytes(before)
