@@ -47,7 +47,7 @@ def deck(lab_page, instructor_server, request):
     copies = {path: path.read_bytes() for path in folder.glob('[0-9]*.ipynb')}
     with lab_page(instructor_server, request.node.name, DeckPage) as opened:
         yield opened
-    # The server may still save, for the page that has closed: a file beside the copy, then the copy.
+    # The server may still save, for the page that has closed: beside the copy, then over it.
     wait_for(lambda: not any(folder.glob('.~*')))
     for path, before in copies.items():
         path.write_bytes(before)
