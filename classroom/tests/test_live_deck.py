@@ -285,6 +285,7 @@ def a_fresh_copy(deck):
     deck.key('r')
     deck.key('r')
     deck.page.wait_for_slide(0)
+    deck.page.wait_for_notebook(f'presentation/{LESSON}')  # its kernel starts again
     assert 'typed' not in ''.join(deck.page.cells()[code]['source'])
 
 

@@ -10,9 +10,9 @@ PLAN = plan_of('90')
 FILES = list(PLAN.steps)
 ROWS = PLAN.from_first_lesson
 BEGAN = f"() => {PANEL}.model.getMetadata('deck').began"
-
 SAYS = "() => document.querySelector('#deck-says').textContent"
-SHOWN = f'() => {PANEL}.context.path'
+# Both at once: another lesson may open between two questions.
+STATE = f"() => [{PANEL}.context.path, document.querySelector('#deck-says').textContent]"
 IS_SHOWN = f"""file => {PANEL}.context.path.endsWith(file)
     && {PANEL}.node.matches('.jp-Deck')"""
 
@@ -27,8 +27,8 @@ def test_pagedown_leads_through_a_timetable(lab_page, tmp_path):
     def walk_out(deck, edge, key, file):
         """Press a key at an edge of a lesson, also for texts that wait there, until it is left."""
         deck.page.keyboard.press(edge)
-        left = deck.page.evaluate(SHOWN)
-        while deck.page.evaluate(SHOWN) == left and not deck.page.evaluate(SAYS):
+        here = [deck.page.evaluate(STATE)[0], '']
+        while deck.page.evaluate(STATE) == here:
             deck.page.keyboard.press(key)
         deck.wait_for_notebook(f'presentation/{file}')
         deck.page.wait_for_function(IS_SHOWN, arg=file)

@@ -20,6 +20,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / 'notebooks').glob('*.ipynb'))
 START_LIMIT_S = 60
+END_LIMIT_S = 30
 
 
 class Server(NamedTuple):
@@ -63,7 +64,13 @@ def made(folder: Path, printed: str, *make: str) -> Iterator[tuple[subprocess.Po
     finally:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGTERM)
-        process.wait(START_LIMIT_S)
+        try:
+            process.wait(END_LIMIT_S)
+        except subprocess.TimeoutExpired:
+            # Jupyter's loop has stopped before it ended a thread of AnyIO that answers a request,
+            # such as the last save of a page, and the process waits for that thread for ever.
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
 
 
 @contextmanager
