@@ -138,9 +138,9 @@ def show() -> None:
 
 
 def total() -> str:
-    """Return how many tasks are solved: `12 of 169 tasks`; empty if no progress is kept."""
+    """Return how many tasks are solved: `12 of 169 tasks`; empty if no progress is kept here."""
     path = file()
-    if path is None:
+    if path is None or not this_lesson():
         return ''
     known = {line for lesson in with_tasks() for line in lesson.lines()}
     with suppress(OSError):

@@ -122,7 +122,7 @@ class Tasks:
         if verdict.solved:
             about = self._about[number](*answer) if number in self._about else ''
             progress.record(number, about)
-            verdict.total = progress.total() if progress.this_lesson() else ''
+            verdict.total = progress.total()
         _show(verdict)
         _solved[number] = verdict.solved
         classroom.tell_task(number, verdict.solved)

@@ -13,6 +13,7 @@ Grades, rules and tests read these, and never the text.
 from __future__ import annotations
 
 import html
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 
 from helpers.notebook import wrap
@@ -73,23 +74,23 @@ class Verdict:
     def text(self) -> str:
         """Return the verdict as lines of text."""
         lines = []
-        for point, found in zip(self.points, self._found(), strict=True):
+        for point, found, hint in self._rows():
             lines += wrap(f'[{"ok" if point.ok else "not yet"}] {point.what}', rest=' ' * 10)
             if found:
                 lines += wrap(f'    Found: {found}', rest=' ' * 10)
-            if point.hint and found != SAME:  # the hint of the first one is about it
-                lines += wrap(f'    Hint: {point.hint}', rest=' ' * 10)
+            if hint:
+                lines += wrap(f'    Hint: {hint}', rest=' ' * 10)
         if self.note:
             lines += wrap(self.note)
         return '\n'.join([*lines, self.title()])
 
-    def _found(self) -> list[str]:
-        """Return what was found for each point, a long text only once in a row."""
-        texts = [point.found for point in self.points]
-        return [
-            SAME if len(text) > LONG and text == before else text
-            for text, before in zip(texts, ['', *texts], strict=False)
-        ]
+    def _rows(self) -> Iterator[tuple[Point, str, str]]:
+        """Yield each point, what was found, and its hint: of equal long texts in a row, one."""
+        before = ''
+        for point in self.points:
+            is_same = len(point.found) > LONG and point.found == before
+            yield point, SAME if is_same else point.found, '' if is_same else point.hint
+            before = point.found
 
     def card(self) -> str:
         """Return the verdict as HTML: solved is seen at a glance, and what is missing is indented.
@@ -97,13 +98,13 @@ class Verdict:
         Its colours are those of the page, so that it fits a dark one, too.
         """
         rows = []
-        for point, found in zip(self.points, self._found(), strict=True):
+        for point, found, hint in self._rows():
             mark, colour = ('✔', GREEN) if point.ok else ('○', AMBER)
             rows.append(
                 f'<div><span style="color:{colour}">{mark}</span> {html.escape(point.what)}</div>'
             )
-            for name, text in (('Found', found), ('Hint', point.hint)):
-                if text and not (name == 'Hint' and found == SAME):
+            for name, text in (('Found', found), ('Hint', hint)):
+                if text:
                     rows.append(f'<div style="{INDENTED}"><b>{name}</b> {html.escape(text)}</div>')
         if self.note:
             rows.append(f'<div>{html.escape(self.note)}</div>')
