@@ -20,7 +20,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[2]
 NOTEBOOKS = sorted((ROOT / 'notebooks').glob('*.ipynb'))
 START_LIMIT_S = 60
-END_LIMIT_S = 30
+STOPS = 'received signal 15, stopping'  # Jupyter's log
 
 
 class Server(NamedTuple):
@@ -65,12 +65,14 @@ def made(folder: Path, printed: str, *make: str) -> Iterator[tuple[subprocess.Po
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGTERM)
         try:
-            process.wait(END_LIMIT_S)
+            process.wait(START_LIMIT_S)
         except subprocess.TimeoutExpired:
-            # Jupyter's loop has stopped before it ended a thread of AnyIO that answers a request,
-            # such as the last save of a page, and the process waits for that thread for ever.
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
+            # Jupyter's loop may stop before it has ended a thread of AnyIO that answers a request,
+            # such as the last save of a page. Then the process waits for that thread for ever.
+            if STOPS not in log.read_text():
+                raise
 
 
 @contextmanager
