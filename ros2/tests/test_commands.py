@@ -7,7 +7,9 @@ import os
 import random
 import re
 import signal
+import socket
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,13 @@ from processes import process, python, ros2
 from waits import LIMIT_S, START_LIMIT_S
 
 from ros2_command import index
+from ros2_command.discovery import (
+    FIRST_PORT,
+    OFFSET,
+    PARTICIPANTS,
+    PORTS_OF_A_DOMAIN,
+    _count_participants,
+)
 from ros2_command.values import _slots, filled, to_yaml
 
 HERE = Path(__file__).parent
@@ -138,6 +147,28 @@ def test_finds_200_nodes_at_once(own_domain, run):
             "Cannot echo topic '/both', as it contains more than one type: "
             '[std_msgs/msg/Int32, std_msgs/msg/String]\n'
         )
+
+
+def test_counts_each_participant_while_other_programs_open_and_close_ports(own_domain):
+    busy = """
+import socket, time
+while True:
+    beside = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(6)]
+    for one in beside:
+        one.bind(('127.0.0.1', 0))
+    time.sleep(0.002)
+    for one in beside:
+        one.close()
+"""
+    first = FIRST_PORT + PORTS_OF_A_DOMAIN * own_domain + OFFSET
+    with contextlib.ExitStack() as stack:
+        for index_of_participant in range(PARTICIPANTS):
+            held = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            stack.enter_context(held).bind(('127.0.0.1', first + 2 * index_of_participant))
+        stack.enter_context(python(busy))
+        deadline = time.monotonic() + 2
+        while time.monotonic() < deadline:
+            assert _count_participants(own_domain) == PARTICIPANTS
 
 
 def test_sees_nodes_of_many_processes_right_after_their_start(own_domain, run):
