@@ -26,27 +26,27 @@ clean: ## remove the environment, caches and what lessons built; what you wrote 
 
 ## Teach
 
-present: set_up ## show lessons as slides whose cells run: LESSON=02, PLAN=90 (a timetable), NEW=yes, CLASS=
+present: set_up ## show lessons as slides whose cells run: LESSON=02, PLAN=90 (half, full, two, three), NEW=yes, CLASS=, BROWSER=no
 	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" --class "$(CLASS)" $(if $(filter yes,$(NEW)),--new) \
 		$(server) -- $(LAB_ARGS)
 
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join; PORT=8765, BROWSER=no
 	@exec $(PYTHON) -m classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
 
-handout: set_up ## write a student's edition: SOLUTIONS=no, OFFLINE=yes (with packages, PYTHONS="3.11 3.12")
-	@$(PYTHON) -m classroom.handout $(if $(filter no,$(SOLUTIONS)),--no-solutions) \
+handout: set_up ## write a student's edition: SOLUTIONS=no (or "00 01"), OFFLINE=yes (with packages, PYTHONS="3.11 3.12")
+	@$(PYTHON) -m classroom.handout $(if $(SOLUTIONS),--solutions "$(SOLUTIONS)") \
 		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
 
-grade: set_up ## judge what students hand in: FOLDER=submissions, LESSON=02, JOBS=2; see teaching.md
+grade: set_up ## judge what students hand in: FOLDER=submissions, LESSON=02, JOBS=2, STARS=no; see teaching.md
 	@$(PYTHON) -m classroom.grade "$(or $(FOLDER),submissions)" --lesson "$(LESSON)" --seed "$(SEED)" --assignment "$(ASSIGNMENT)" \
-		$(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
+		$(if $(filter no,$(STARS)),--no-stars) $(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
 
 hub: ## run a JupyterHub for a class: CONTAINERS=yes, SOLUTIONS=no, HUB_ARGS=...; see classroom/HOSTING.md
 	@classroom/hub/set_up.sh
-	@CONTAINERS=$(CONTAINERS) SOLUTIONS=$(SOLUTIONS) exec $(PYTHON) -m jupyterhub --config classroom/hub/jupyterhub_config.py $(HUB_ARGS)
+	@CONTAINERS="$(CONTAINERS)" SOLUTIONS="$(SOLUTIONS)" exec $(PYTHON) -m jupyterhub --config classroom/hub/jupyterhub_config.py $(HUB_ARGS)
 
 image: ## build the container image of the lessons: SOLUTIONS=no, BASE=, CONTAINER=, IMAGE_ARGS=
-	@SOLUTIONS=$(SOLUTIONS) classroom/container/run.sh image
+	@SOLUTIONS="$(SOLUTIONS)" classroom/container/run.sh image
 
 ## Contribute
 

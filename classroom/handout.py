@@ -1,15 +1,16 @@
 """Make a student's edition of this course: one archive, for `make lab` and `make update`.
 
     python -m classroom.handout                       without notes for the instructor
-    python -m classroom.handout --no-solutions        and without solutions
+    python -m classroom.handout --solutions no        and without solutions
+    python -m classroom.handout --solutions "00 01"   with the solutions of these lessons only
     python -m classroom.handout --wheels 3.11 3.12    with all packages for these Pythons
     python -m classroom.handout --lessons FOLDER      the lessons only, into this folder
 
 It is a student's: KEPT, with students.md as its README and a Makefile of COMMANDS.
 environment.md is without what is between `<!-- not in the handout -->` and `<!-- end -->`. The
 notebooks have no outputs. `.handed_out` holds the same files once more, so that `make update` can
-see what the student has written since. An archive with solutions brings them to those who have one
-without.
+see what the student has written since. An archive with more solutions brings them to those who have
+one with fewer.
 """
 
 import argparse
@@ -28,9 +29,10 @@ from packaging.requirements import Requirement
 from classroom.update import BASE, committed
 from helpers.notebook import MARK
 from tools.lessons.clean import text_of
-from tools.lessons.lesson import PICTURES, ROOT, tags
+from tools.lessons.lesson import PICTURES, ROOT, chosen, tags
 
 NAME = 'ros2_notebooks'
+ALL = 'yes'  # SOLUTIONS=: of all lessons
 LOCK = 'tools/locks/requirements.lock'
 WHEELS = 'wheels'
 # What `make lab` and `make update` need. The lock of uv is that of the installer itself.
@@ -54,11 +56,11 @@ NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', 
 GLIBC = ('_2_28', '_2_27', '_2_26', '_2_24', '_2_17', '_2_12', '_2_5', '2014', '2010', '1')
 
 
-def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple = ()) -> Path:
+def handout(root: Path, output: Path, *, solutions: str = ALL, pythons: tuple = ()) -> Path:
     """Write the archive of the checkout `root`, and return it.
 
-    `pythons` are versions such as '3.12', whose wheels are added. Raises ValueError with one
-    sentence.
+    `solutions` is what SOLUTIONS= says; `pythons` are versions such as '3.12', whose wheels are
+    added. Raises ValueError with one sentence.
     """
     with tempfile.TemporaryDirectory() as folder:
         course = committed(root, 'HEAD', Path(folder, NAME))
@@ -82,15 +84,20 @@ def handout(root: Path, output: Path, *, solutions: bool = True, pythons: tuple 
     return output
 
 
-def write_lessons(source: Path, to: Path, *, solutions: bool = True) -> None:
-    """Write the lessons of a folder as students get them: all may read them, and no others stay."""
-    left_out = {'notes'} if solutions else {'notes', 'solution'}
+def write_lessons(source: Path, to: Path, *, solutions: str = ALL) -> None:
+    """Write the lessons of a folder as students get them: all may read them, and no others stay.
+
+    `solutions` is what SOLUTIONS= says: yes, no, or the lessons whose solutions are handed out.
+    Raises ValueError with one sentence if there is no such lesson.
+    """
+    solved = [] if solutions == 'no' else chosen('' if solutions == ALL else solutions, source)
     paths = sorted(source.glob('*.ipynb'))
     to.mkdir(parents=True, exist_ok=True)
     to.chmod(0o755)
     for other in {path.name for path in to.glob('*.ipynb')} - {path.name for path in paths}:
         (to / other).unlink()
     for path in paths:
+        left_out = {'notes'} if path in solved else {'notes', 'solution'}
         lesson = lesson_for_students(nbformat.read(path, as_version=4), left_out)
         (to / path.name).write_text(text_of(lesson), encoding='utf-8')
         (to / path.name).chmod(0o644)
@@ -200,21 +207,20 @@ def _for(block: str, version: str) -> str:
 def main(arguments: list[str] | None = None) -> int:
     """Run the tool; return its exit status."""
     parser = argparse.ArgumentParser(description="Make a student's edition of this course.")
-    parser.add_argument('--no-solutions', action='store_true')
+    parser.add_argument('--solutions', default=ALL, metavar='yes|no|"00 01"')
     parser.add_argument('--wheels', nargs='+', default=(), metavar='PYTHON', help='such as 3.12')
     parser.add_argument('--lessons', type=Path, metavar='FOLDER', help='no archive: lessons only')
     parser.add_argument('--root', type=Path, default=ROOT)
     options = parser.parse_args(arguments)
-    if options.lessons:
-        write_lessons(
-            options.root / 'notebooks', options.lessons, solutions=not options.no_solutions
-        )
-        return 0
     output = options.root / 'handout' / f'{NAME}.tar.gz'
+    pythons = tuple(options.wheels)
     try:
-        solutions, pythons = not options.no_solutions, tuple(options.wheels)
+        if options.lessons:
+            notebooks = options.root / 'notebooks'
+            write_lessons(notebooks, options.lessons, solutions=options.solutions)
+            return 0
         left_out = not_committed(options.root)
-        handout(options.root, output, solutions=solutions, pythons=pythons)
+        handout(options.root, output, solutions=options.solutions, pythons=pythons)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1

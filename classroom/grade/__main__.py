@@ -161,7 +161,9 @@ def judge_all(
             for task, outcome in result.tasks.items():
                 if outcome.why not in ('', 'not answered') and not outcome.of:
                     work.row.said.append(f'task {task}: {outcome.why}')
-            lines.append(f'lesson {number}: {result.points} of {len(result.tasks)}{again}')
+            points = sum(result.tasks[task].solved for task in lesson.counted)
+            work.row.points += points
+            lines.append(f'lesson {number}: {points} of {len(lesson.counted)}{again}')
         with writing:
             print(f'{student.name}: {"; ".join([*lines, *work.row.said])}', flush=True)
 
@@ -181,7 +183,7 @@ def write(
 ) -> list[str]:
     """Write all tables and the feedback; return the files, and what could not be written."""
     rows = [work.row for work in works]
-    most = sum(len(lesson.tasks) for lesson in wanted)
+    most = sum(len(lesson.counted) for lesson in wanted)
     systems = {row.student.system for row in rows}
     said = []
 
@@ -233,6 +235,7 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
     parser.add_argument('--trust', action='store_true', help='without a container, as you')
     parser.add_argument('--limit', type=float, default=LIMIT_MIN, help='minutes for a lesson')
     parser.add_argument('--seed', default='', help='of a lesson that has one, for all students')
+    parser.add_argument('--no-stars', action='store_true', help='tasks with ★ give no points')
     parser.add_argument('--assignment', default='', help='its name or id in Canvas')
     parser.add_argument('--notebooks', type=Path, default=FOLDER, help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
@@ -243,7 +246,7 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
         if not students:
             raise ValueError(f'Nobody has handed in anything in {options.folder}.')
         sheets = [tables.read_sheet(file.name, file.read()) for file in files]
-        known = handed_out(options.notebooks)
+        known = handed_out(options.notebooks, stars=not options.no_stars)
         reads = [read(student, known) for student in students]
         if options.lesson:
             names = {path.name for path in chosen(options.lesson, options.notebooks)}

@@ -15,7 +15,7 @@ from tools.lessons.lesson import FOLDER, Lesson, lessons, tags
 
 CHECKS = re.compile(r'^from helpers\.checks\.lessons\.(\w+) import ', re.MULTILINE)
 CHECK = re.compile(r'check\((\d+)')
-HEADING = re.compile(r'^### ✎ Task (\d+)', re.MULTILINE)
+HEADING = re.compile(r'^### ✎ Task (\d+)( ★)?', re.MULTILINE)
 SEED = re.compile(r'^SEED = (\d{1,9})$', re.MULTILINE)
 LARGEST_SOURCE = 200_000  # letters of a cell
 # What an answer of a lesson has no need for, and what forges a verdict would use.
@@ -36,11 +36,12 @@ class Task:
 
 
 class Handed:
-    """A lesson as it was handed out, with its tasks."""
+    """A lesson as it was handed out, with its tasks. `stars`: those with ★ count, too."""
 
-    def __init__(self, lesson: Lesson) -> None:
+    def __init__(self, lesson: Lesson, *, stars: bool = True) -> None:
         self.lesson = lesson
         self.cells = lesson.notebook.cells
+        self._stars = stars
 
     @cached_property
     def module(self) -> str:
@@ -67,6 +68,13 @@ class Handed:
         return tasks
 
     @cached_property
+    def counted(self) -> list[int]:
+        """The numbers of the tasks that give a point."""
+        headings = [heading for cell in self.cells for heading in HEADING.findall(cell.source)]
+        starred = {int(number) for number, star in headings if star}
+        return [number for number in self.tasks if self._stars or number not in starred]
+
+    @cached_property
     def ids(self) -> set[str]:
         """The ids of the cells of tasks."""
         return {
@@ -76,9 +84,10 @@ class Handed:
         }
 
 
-def handed_out(folder: Path = FOLDER) -> list[Handed]:
+def handed_out(folder: Path = FOLDER, *, stars: bool = True) -> list[Handed]:
     """Return the lessons that have tasks."""
-    return [one for one in map(Handed, lessons(folder)) if one.tasks]
+    handed = [Handed(lesson, stars=stars) for lesson in lessons(folder)]
+    return [one for one in handed if one.tasks]
 
 
 @dataclass

@@ -30,15 +30,15 @@ POINTS_POSSIBLE = '    Points Possible'  # as Canvas writes it
 
 @dataclass
 class Row:
-    """A student, and the results of the lessons, by their numbers. `said` are the sentences."""
+    """A student, and the results of the lessons, by their numbers. `said` are the sentences.
+
+    `points` is how many tasks that count are solved.
+    """
 
     student: Submission
     results: dict[str, Result] = field(default_factory=dict)
+    points: int = 0
     said: list[str] = field(default_factory=list)
-
-    @property
-    def points(self) -> int:
-        return sum(result.points for result in self.results.values())
 
 
 @dataclass
@@ -78,6 +78,7 @@ def grades(rows: list[Row], lessons: list[Handed]) -> str:
     """Return grades.csv: a row for each student, a column for each task."""
     columns = [(one.lesson.number, number) for one in lessons for number in one.tasks]
     header = ['name', 'id', 'late', *(f'{lesson} task {number}' for lesson, number in columns)]
+    most = sum(len(one.counted) for one in lessons)
     table = [[*header, 'points', 'of', 'minutes to judge', 'said']]
     for row in rows:
         values = []
@@ -89,7 +90,7 @@ def grades(rows: list[Row], lessons: list[Handed]) -> str:
         student = row.student
         said = '; '.join(row.said)
         points = row.points if row.results else ''
-        end = [points, len(columns), f'{minutes:.1f}', _harmless(said)]
+        end = [points, most, f'{minutes:.1f}', _harmless(said)]
         late = 'late' if student.late else ''
         table.append([_harmless(student.name), student.number, late, *values, *end])
     return _text(table)

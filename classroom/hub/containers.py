@@ -12,7 +12,7 @@ SERVICES = ('/run/podman/podman.sock', '/var/run/docker.sock')
 RUN = Path(__file__).parents[1] / 'container' / 'run.sh'
 
 
-def use_service(*, solutions: bool = True) -> tuple[str, dict[str, str]]:
+def use_service(solutions: str) -> tuple[str, dict[str, str]]:
     """Let docker's library speak to podman or docker. Raises SystemExit if a class cannot begin.
 
     Return the name of this machine in its containers, and the hosts that must be added for it.
@@ -33,8 +33,9 @@ def use_service(*, solutions: bool = True) -> tuple[str, dict[str, str]]:
     said = subprocess.run([RUN, 'label'], check=True, capture_output=True, text=True)
     if labels.get('lessons') != said.stdout.strip():
         sys.exit('The image is not of these lessons: run `sudo make image`, then try again.')
-    if not solutions and labels.get('solutions') != 'no':
-        sys.exit('The image has the solutions: run `sudo make image SOLUTIONS=no` first.')
+    if labels.get('solutions') != solutions:
+        command = f'sudo make image SOLUTIONS="{solutions}"'
+        sys.exit(f'The image has the solutions of other lessons: run `{command}` first.')
     # Podman adds this name by itself, and does not know docker's word for the address.
     if any('Podman' in part['Name'] for part in client.version().get('Components', ())):
         return 'host.containers.internal', {}

@@ -6,7 +6,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from classroom.handout import write_lessons
+from classroom.handout import ALL, write_lessons
 from helpers.checks.classroom import HUB_VARIABLE
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -57,8 +57,8 @@ def own_port(spawner) -> None:
 
 c.Spawner.pre_spawn_hook = own_port
 CLASS_URL = 'http://127.0.0.1:8764'
-LESSONS = ROOT / '.jupyter/lessons'  # without notes, and without solutions if SOLUTIONS=no
-SOLUTIONS = os.environ.get('SOLUTIONS') != 'no'
+LESSONS = ROOT / '.jupyter/lessons'  # without notes, and with the solutions that SOLUTIONS names
+SOLUTIONS = os.environ.get('SOLUTIONS') or ALL
 write_lessons(ROOT / 'notebooks', LESSONS, solutions=SOLUTIONS)
 c.Spawner.environment = {
     HUB_VARIABLE: f'{CLASS_URL}/services/class',
@@ -100,7 +100,7 @@ if os.environ.get('CONTAINERS') == 'yes':
 
     from classroom.hub.containers import IMAGE, use_service
 
-    host, more_hosts = use_service(solutions=SOLUTIONS)
+    host, more_hosts = use_service(SOLUTIONS)
     c.JupyterHub.spawner_class = 'dockerspawner.DockerSpawner'
     c.DockerSpawner.image = IMAGE
     c.DockerSpawner.pull_policy = 'never'

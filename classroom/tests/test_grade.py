@@ -471,6 +471,20 @@ def test_moodle_takes_its_worksheet_back(submit, capsys):
     assert absent['Grade'] == other['Grade'] == ''
 
 
+@pytest.mark.parametrize(('options', 'of'), [([], 9), (['--no-stars'], 8)])
+def test_tasks_with_a_star_count_or_not(submit, capsys, options, of):
+    answers = dict.fromkeys(('task-01-2-starter', 'task-01-6-starter'), RIGHT)
+    data = json.dumps(notebook('01', **answers)).encode()
+    folder = submit(**{'Student_500_assignsubmission_file/lesson.ipynb': data})
+    assert main([str(folder), *options], Stand()) == 0
+    points = of - 7
+    assert f'Student: lesson 01: {points} of {of}\n' in capsys.readouterr().out
+    [row] = rows_of(folder)
+    assert (row['points'], row['of'], row['01 task 6']) == (str(points), str(of), '1')
+    [row] = rows_of(folder, 'moodle.csv')
+    assert float(row['Grade']) == points
+
+
 def test_moodle_without_a_worksheet(submit):
     folder = submit(**moodle_class(2))
     assert main([str(folder)], Stand()) == 0

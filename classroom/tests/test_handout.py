@@ -125,7 +125,7 @@ def test_what_is_not_committed_is_named_and_left_out(checkout, tmp_path, capsys)
 
 
 def test_solutions_may_come_later(checkout, tmp_path):
-    course = unpack(checkout, tmp_path / 'home', '--no-solutions')
+    course = unpack(checkout, tmp_path / 'home', '--solutions', 'no')
     assert cells_of(course) == ['start = 1']
     lesson = course / 'notebooks/01_publish.ipynb'
     lesson.write_text(lesson.read_text().replace('start = 1', 'start = 99'))
@@ -133,6 +133,15 @@ def test_solutions_may_come_later(checkout, tmp_path):
     archive = checkout / 'handout/ros2_notebooks.tar.gz'
     assert update.main([str(archive), '--to', str(course)]) == 0
     assert cells_of(course) == ['start = 99', 'solved = 2']
+
+
+def test_solutions_of_the_weeks_before(checkout, tmp_path):
+    second = checkout / 'notebooks/02_lose.ipynb'
+    shutil.copy(checkout / 'notebooks/01_publish.ipynb', second)
+    for solutions, have in (('01', [True, False]), ('01 lose', [True, True]), ('no', [False] * 2)):
+        handout.write_lessons(checkout / 'notebooks', tmp_path / 'hub', solutions=solutions)
+        lessons = sorted((tmp_path / 'hub').glob('*.ipynb'))
+        assert ['solved = 2' in lesson.read_text() for lesson in lessons] == have
 
 
 def test_the_lessons_of_a_hub_have_their_pictures(tmp_path):
@@ -170,6 +179,8 @@ def test_bad_input_gives_one_sentence(checkout, tmp_path, capsys):
     (locks / 'requirements-uv.lock').write_text('\nuv==1\n')
     git(checkout, 'add', '.')
     git(checkout, 'commit', '-m', 'locks')
+    assert handout.main(['--root', str(checkout), '--solutions', 'of week 1']) == 1
+    assert "no single lesson 'of'" in capsys.readouterr().err
     assert handout.main(['--root', str(checkout), '--wheels', '3.9']) == 1
     assert capsys.readouterr().err.count('\n') == 1
     assert not (checkout / 'handout').exists()
