@@ -66,7 +66,10 @@ def a_file_for_all_floors(workspace, file):
     def starts_without():
         if declared() is not True:
             return 'they are not declared as the task says'
-        return says(run(workspace, file, *ROBOT_AND_DRIVER, programs=2), *ROBOT_AND_DRIVER)
+        text = run(workspace, file, *ROBOT_AND_DRIVER, programs=2)
+        if started(text) == ['robot']:
+            return 'only the robot is started: with driver:=true the driver must start'
+        return says(text, *ROBOT_AND_DRIVER)
 
     def passes_on():
         if declared() is not True:
@@ -85,7 +88,7 @@ def a_file_for_all_floors(workspace, file):
     by_hand = 'with driver:=false only the robot starts'
     return [
         ('it declares three arguments', declared, '<arg name=... default=.../>, three times.'),
-        ('without arguments it starts as before', starts_without, 'All three have a default.'),
+        ('without arguments it starts as before', starts_without, 'if="$(var driver)"'),
         ('floor and speed reach the programs', passes_on, '$(var floor) in place of the word.'),
         (by_hand, drives_by_hand, 'if="..." belongs to the node.'),
     ]
@@ -162,11 +165,42 @@ def start_it_again(workspace, file):
     ]
 
 
+SILENT = """import rclpy
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
+from std_srvs.srv import Trigger
+
+
+async def never(request, response):
+    print('asked', flush=True)
+    await Future()
+
+
+rclpy.init()
+node = rclpy.create_node('silent')
+group = ReentrantCallbackGroup()  # a second request is counted, too
+node.create_service(Trigger, 'camera/turn_left', never, callback_group=group)
+rclpy.spin(node)
+"""
+
+
 @tasks.add(8, limit_s=120)
 def a_camera_that_waits(workspace):
+    ros2_run = 'source install/setup.bash\nros2 run'
+
+    @once
+    def seen():
+        """Return how it waits and turns and, tried meanwhile, how it gives up."""
+        workspace.write('.tried/silent.py', SILENT)
+        space = '--ros-args -r __ns:=/silent'
+        with (
+            workspace.start(f'python3 .tried/silent.py {space}', 'a silent robot') as silent,
+            workspace.start(f'{ros2_run} fleet_pkg camera {space}', 'its camera') as camera,
+        ):
+            return waits_and_turns(), gives_up(camera, silent)
+
     def waits_and_turns():
         """Start it before the robot, and a second time after it."""
-        ros2_run = 'source install/setup.bash\nros2 run'
         space = '--ros-args -r __ns:=/tried'
         with workspace.start(f'{ros2_run} fleet_pkg camera {space}', 'the camera') as camera:
 
@@ -192,7 +226,14 @@ def a_camera_that_waits(workspace):
 
     hint = 'while not self.client.wait_for_service(timeout_sec=1.0): log. Then call_async, and '
     hint += 'rclpy.spin_until_future_complete(self, future, timeout_sec=5.0).'
-    return [('it turns the camera, whichever starts first', waits_and_turns, hint)]
+    return [
+        ('it turns the camera, whichever starts first', lambda: seen()[0], hint),
+        (
+            'it asks once, and gives up if no answer comes',
+            lambda: seen()[1],
+            'After timeout_sec=5.0, future.done() says whether the answer has come.',
+        ),
+    ]
 
 
 @tasks.add(9, limit_s=90)
@@ -376,9 +417,28 @@ def turns(camera, limit_s):
     wait_until(lambda: has_turned() or not camera.running, limit_s)
     if not camera.running and not has_turned():
         return f'beside a robot it ends: {error_in(camera.lines)}'
+    if not has_turned() and 'I wait for' in ''.join(camera.lines[-1:]):
+        return 'the robot is there, and it still waits: has the service another name?'
     if not has_turned():
         said = ' / '.join(camera.lines[-3:]) or 'nothing'
         return f'the robot is there, and it does not log "Turned: True". Its last lines: {said}'
     if not wait_until(lambda: not camera.running, limit_s):
         return 'it has turned the camera, and does not end'
     return camera.wait() == 0 or f'it ends with an error: {error_in(camera.lines)}'
+
+
+def gives_up(camera, silent):
+    """Wait until a camera has ended, whose robot is asked and never answers."""
+    wait_until(lambda: 'asked' in silent.lines or not camera.running, 30)
+    if 'asked' not in silent.lines:
+        return f'it never asks: {error_in(camera.lines)}'
+    # Five seconds, and what a slow machine needs for the end of a program.
+    if not wait_until(lambda: not camera.running, 15):
+        return 'no answer comes, and it waits for ever'
+    asked = silent.lines.count('asked')
+    if asked != 1:
+        return f'it asks {asked} times: {error_in(camera.lines)}'
+    if camera.wait() != 0:
+        return f'no answer comes, and it ends: {error_in(camera.lines)}'
+    said = any('Turned: False' in line for line in camera.lines)
+    return said or 'no answer comes, and it does not log "Turned: False"'

@@ -78,7 +78,7 @@ def three_sensors(workspace, file):
         (
             'IMU',
             lambda: is_there('imu_link', (0.05, 0, 0.03), 0.3491),
-            'x is in front, z is up.',
+            'x is in front, z is up; rpy is in radians.',
         ),
     ]
 
@@ -212,10 +212,11 @@ def from_a_frame_to_its_parent(to_parent):
             f'{one}, not {right[0, 1]:.2f}, {right[1, 1]:.2f}'
         )
 
+    turned = 'x cos a - y sin a, x sin a + y cos a: both of the x that the function gets.'
     return [
         ('not turned, not shifted', lambda: leads(0.0, 0.0, 0.0), 'The starter does this.'),
         ('shifted', lambda: leads(1.5, -0.5, 0.0), 'translation.x is added to each x.'),
-        ('turned to the left', lambda: leads(0.0, 0.0, 1.0), 'x cos a - y sin a'),
+        ('turned to the left', lambda: leads(0.0, 0.0, 1.0), turned),
         (
             'turned to the right, then shifted',
             lambda: leads(0.5, -0.2, -0.5),
@@ -532,7 +533,11 @@ def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
             'except ExtrapolationException: it goes into a new list.',
         ),
         ('it is placed where the robot was', at_its_place, 'self.place(scan)'),
-        ('the others go on waiting', others_wait, 'Each scan needs a try of its own.'),
+        (
+            'the others go on waiting',
+            others_wait,
+            'A try for each scan. A loop skips some if its list changes meanwhile.',
+        ),
         ('at most ten wait, the newest', not_for_ever, 'self.waiting = too_early[-AT_MOST:]'),
     ]
 
