@@ -26,7 +26,7 @@ FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progr
 LESSON = re.compile(r'(?:^|/)\d\d_(\w+)\.ipynb$')
 
 
-class Tasks(NamedTuple):
+class Lesson(NamedTuple):
     """What the table says of a notebook: '02', 'lose_messages', 'Lose messages', 2."""
 
     number: str
@@ -48,7 +48,7 @@ def this_lesson() -> str:
     return found[1] if found else ''
 
 
-def with_tasks() -> list[Tasks]:
+def with_tasks() -> list[Lesson]:
     """Return the notebooks that have tasks, in teaching order.
 
     They are those in the folder of the running notebook, or else those of this checkout. A title
@@ -61,7 +61,7 @@ def with_tasks() -> list[Tasks]:
         words = path.stem[3:].replace('_', ' ').capitalize()
         words = json.loads(f'"{title[1]}"') if title else words
         numbers = re.findall(r'^\s*"### ✎ Task (\d+)', source, re.MULTILINE)
-        found.append(Tasks(path.name[:2], path.stem[3:], words, len(set(numbers))))
+        found.append(Lesson(path.name[:2], path.stem[3:], words, len(set(numbers))))
     return [lesson for lesson in found if lesson.tasks]
 
 
@@ -157,7 +157,7 @@ def start_again() -> None:
     print('Your table is empty again.')
 
 
-def table(known: Iterable[Tasks], solved: Collection[str] = ()) -> str:
+def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
     """Return a row for each lesson, and a line with the sum; `solved` holds lines of the file."""
     rows, sums = [['lesson', 'solved', 'open']], [0, 0]
     for lesson in known:

@@ -73,10 +73,10 @@ def needs_run(lessons: list[Lesson]) -> bool:
     )
 
 
-def with_tasks(lessons: list[Lesson]) -> list[progress.Tasks]:
+def with_tasks(lessons: list[Lesson]) -> list[progress.Lesson]:
     """Return the notebooks that have tasks, as `helpers.checks.progress` knows them."""
     return [
-        progress.Tasks(lesson.number, lesson.name, lesson.title, len(lesson.tasks))
+        progress.Lesson(lesson.number, lesson.name, lesson.title, len(lesson.tasks))
         for lesson in lessons
         if lesson.tasks
     ]
