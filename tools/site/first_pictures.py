@@ -1,4 +1,4 @@
-"""The first pictures: of README and site, and of lessons whose own drive comes late on the page.
+"""The first pictures: of README and site, and of lessons whose own picture comes late on the page.
 
     python -m tools.site.first_pictures
 
@@ -26,13 +26,17 @@ DRIVES = {
     '01': ('drive-the-square', 1),
     '05': ('drive-depth-10', 0.55),
     '06': ('drive-deadlock', 0.4),
+    '07': ('lesson-07-19', 0.5),
     '08': ('run-15-obey', 1),
     '10': ('l09-careful', 1),
     '14': ('l11-replay', 1),
     '15': ('cpp-12-drive', 1),
     '18': ('bag0716d970', 1),
+    '19': ('take-dan', 1),
     '20': ('project-082', 1),
 }
+# The cell whose queue a lesson shows, until it is full: which message is lost is a guess.
+QUEUE = 'lose_messages', 'step-through-run'
 CELLS = {10: 'drive-depth-10', 1: 'drive-depth-1'}
 ARRIVE, TAKE, END = range(3)  # moves of a replay
 
@@ -253,35 +257,79 @@ def lane(drive: Drive, y: int) -> tuple[str, str]:
     return body, tape + seen_css + moving(f'r{drive.depth}', poses)
 
 
-def picture() -> str:
-    """Return the picture, from the saved outputs of lesson 05."""
-    lesson = next(lesson for lesson in lessons() if lesson.name == 'keep_what_is_fresh')
-    lanes = [lane(recorded(lesson, depth), y) for depth, y in zip(CELLS, (34, 178), strict=True)]
-    style = STYLE.replace('PLAYS', f'{PLAYS_S}s') + ''.join(css for _, css in lanes)
-    style += ''.join(
-        f'.{name}{{fill:COLOUR({name})}}' for name in ('ink', *PAIRS) if name != 'ground'
+def filling(lesson: Lesson) -> Drive:
+    """Return how the queue of a slow subscriber fills up, as slow as a picture plays."""
+    (run,) = runs_of(output_of(lesson, QUEUE[1]))
+    (callback,) = run['setup']['callbacks']
+    waiting, moves = 0, []
+    for at, kind, _, what in run['moves']:
+        waiting += {ARRIVE: 1, TAKE: -1, END: 0}[kind]
+        if waiting > callback['depth']:
+            break
+        moves.append((at, kind, what))
+    slower = FAST * PLAYS_S / moves[-1][0]
+    stretched = [(at * slower, kind, what) for at, kind, what in moves]
+    return Drive(callback['depth'], [], [], stretched, FAST * PLAYS_S, hit=False)
+
+
+def queue_picture(lesson: Lesson) -> str:
+    """Return the queue of a slow subscriber, until it is full."""
+    drive = filling(lesson)
+    messages, tape = queue(drive)
+    places = ''.join(f'<rect x="{FIRST_X + i * PLACE}" class="place"/>' for i in range(drive.depth))
+    words = (
+        f'<text class="ink" x="{BRAKE_X + 22}" y="20" text-anchor="end">callback</text>'
+        f'<text class="ink" x="{FIRST_X}" y="20">queue of {drive.depth} messages</text>'
+        f'<text class="says ink" style="animation-delay:{PLAYS_S}s" x="{FIRST_X}" y="84">'
+        'It is full. What will happen to the next message?</text>'
     )
-    style += (
-        'rect{y:1px;width:22px;height:22px;rx:4px}.place{fill:none;stroke:COLOUR(wall)}'
+    body = (
+        f'<g transform="translate(0 32)"><rect x="{BRAKE_X}" class="busy"/>{messages}{places}</g>'
+    )
+    return _svg('0 0 720 104', 'The real queue of lesson 02', _style([tape]), f'{words}{body}')
+
+
+def _style(moves: list[str]) -> str:
+    """Return the style of a picture with queues, and the keyframes that move them."""
+    return (
+        STYLE.replace('PLAYS', f'{PLAYS_S}s')
+        + ''.join(moves)
+        + ''.join(f'.{name}{{fill:COLOUR({name})}}' for name in ('ink', *PAIRS) if name != 'ground')
+        + 'rect{y:1px;width:22px;height:22px;rx:4px}.place{fill:none;stroke:COLOUR(wall)}'
+        '.busy{fill:COLOUR(heard)}'
         '.last{fill:COLOUR(heard);animation:gone .01s reverse both}'
         '.line{stroke:COLOUR(ink);stroke-dasharray:3 5}.behind{stroke:COLOUR(good);'
         'stroke-width:3;stroke-opacity:.4}text.age{text-anchor:middle}circle.ghost{fill:none;stroke:COLOUR(waiting);'
         'stroke-width:2.5;stroke-dasharray:5 4}.robot path{fill:COLOUR(ground)}'
         '.ground{fill:COLOUR(ground)}'
     )
-    head, size = 'y="24" text-anchor="end" class="ink', 'width="720" height="314"'
+
+
+def _svg(box: str, about: str, style: str, body: str) -> str:
+    width, height = box.split()[2:]
     text = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 720 314" {size}>\n'
-        '<!-- Two real drives of lesson 05, 1.6 times as fast. Made by '
-        f'tools/site/first_pictures.py. -->\n<style>{style}</style>\n'
-        '<path class="ground" d="M0 0H720V314H0z"/>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{box}" width="{width}" '
+        f'height="{height}">\n'
+        f'<!-- {about}. Made by tools/site/first_pictures.py. -->\n<style>{style}</style>\n'
+        f'<path class="ground" d="M0 0H{width}V{height}H0z"/>{body}\n</svg>\n'
+    )
+    return re.sub(r'COLOUR\((\w+)\)', lambda found: _colour(found[1]), text)
+
+
+def picture() -> str:
+    """Return the picture, from the saved outputs of lesson 05."""
+    lesson = next(lesson for lesson in lessons() if lesson.name == 'keep_what_is_fresh')
+    lanes = [lane(recorded(lesson, depth), y) for depth, y in zip(CELLS, (34, 178), strict=True)]
+    head = 'y="24" text-anchor="end" class="ink'
+    body = (
         f'<clipPath id="driven"><path d="M{START_X} 0H720V90H{START_X}z"/></clipPath>'
         f'<text {head}" x="{16 + BRAKE_X + 24}">brake</text>'
         f'<text class="ink" x="{16 + FIRST_X}" y="24">queue<tspan class="wide"> of scans</tspan>'
         f'</text><text {head} wide" x="704">0.6 m before the wall: brake</text>'
-        '\n' + '\n'.join(body for body, _ in lanes) + '\n</svg>\n'
+        '\n' + '\n'.join(body for body, _ in lanes)
     )
-    return re.sub(r'COLOUR\((\w+)\)', lambda found: _colour(found[1]), text)
+    about = f'Two real drives of lesson 05, {FAST} times as fast'
+    return _svg('0 0 720 314', about, _style([css for _, css in lanes]), body)
 
 
 def _colour(name: str) -> str:
@@ -323,6 +371,8 @@ def write(file: Path, text: str) -> None:
 if __name__ == '__main__':
     write(FILE, picture())
     for known in lessons():
+        if known.name == QUEUE[0]:
+            write(IMAGES / f'queue_of_{known.name}.svg', queue_picture(known))
         if known.number in DRIVES:
             cell, share = DRIVES[known.number]
             shown = drive_picture(output_of(known, cell), share)

@@ -1,4 +1,7 @@
-"""What the tasks of the lesson "Build a robot program" are judged by."""
+"""What the tasks of the lesson "Build a robot program" are judged by.
+
+The lesson imports from here what drives a robot with its program, too: robot_program.py.
+"""
 
 import contextlib
 import math
@@ -24,17 +27,24 @@ from helpers.checks.builds import build, builds
 from helpers.checks.planted import planted, run_tests
 from helpers.checks.programs import DIED, started
 from helpers.checks.robot_program import (
+    CELLAR,
     CIRCLE,
+    CUT,
     DEGREES,
+    ENDS,
     LAST,
     LAUNCH,
+    ON_THE_WAY,
     PACKAGE,
     SIM,
     SNAKE,
+    Cable,
     Ear,
     Tour,
     action,
     drive,
+    driven_live,
+    ended_by,
     estimated,
     launched,
     module,
@@ -43,6 +53,7 @@ from helpers.checks.robot_program import (
     route_of,
     spun,
     steered,
+    write_route_of_cellar,
 )
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import (
@@ -56,6 +67,28 @@ from helpers.robot import (
     Robot,
 )
 from helpers.ros import ros_session
+
+__all__ = [
+    'CELLAR',
+    'CIRCLE',
+    'CUT',
+    'ENDS',
+    'LAST',
+    'ON_THE_WAY',
+    'SIM',
+    'Cable',
+    'check',
+    'drive',
+    'driven_live',
+    'ended_by',
+    'estimated',
+    'launched',
+    'module',
+    'round_tour',
+    'spun',
+    'steered',
+    'write_route_of_cellar',
+]
 
 tasks = Tasks()
 check = tasks.check
