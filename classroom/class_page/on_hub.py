@@ -24,6 +24,8 @@ from classroom.class_page.store import ClassStore
 from classroom.class_page.web import Instructor, Room, Student, serve
 
 PREFIX = os.environ['JUPYTERHUB_SERVICE_PREFIX']
+# The hub makes this of the service's `url`, which that of `make hub` has not. PREFIX is enough.
+os.environ.pop('JUPYTERHUB_OAUTH_CALLBACK_URL', None)
 
 
 class HubStudent(HubOAuthenticated, Student):

@@ -48,6 +48,11 @@ async def teach(hub: Hub) -> None:
         for path in ('', 'live', 'class.js'):
             answer = await hub.answer(f'/services/class/{path}', token)
             assert answer.code in (302, 403), path
+    codes = [
+        await asyncio.to_thread(hub.in_browser, name, '/services/class/')
+        for name in ('teacher', STUDENTS[0])
+    ]
+    assert codes == [200, 403]
 
     # Nobody hears anybody else, not even a second kernel of the same student.
     others = ((s, path) for s in students for path in LESSONS if path.name not in s.kernels)

@@ -14,7 +14,11 @@ import socket
 import sqlite3
 import subprocess
 import sys
+from http.cookiejar import CookieJar
 from pathlib import Path
+from urllib.error import HTTPError
+from urllib.parse import urlencode
+from urllib.request import HTTPCookieProcessor, build_opener
 
 import psutil
 import pytest
@@ -142,6 +146,21 @@ class Hub:
             request_timeout=START_S,
         )
         return await AsyncHTTPClient().fetch(request, raise_error=False)
+
+    def in_browser(self, name: str, path: str) -> int:
+        """Log somebody in and open a page, with cookies as a browser has. Return its status."""
+        cookies = CookieJar()
+        browser = build_opener(HTTPCookieProcessor(cookies))
+        browser.open(f'{self.url}/hub/login').close()
+        [xsrf] = [cookie.value for cookie in cookies if cookie.name == '_xsrf']
+        form = urlencode({'username': name, 'password': 'any', '_xsrf': xsrf}).encode()
+        # Without `next` the hub would start a server.
+        browser.open(f'{self.url}/hub/login?next=/hub/home', form).close()
+        try:
+            with browser.open(self.url + path) as page:
+                return page.status
+        except HTTPError as error:
+            return error.code
 
     async def ask(
         self, path: str, method: str = 'GET', body: object = None, token: str | None = None
