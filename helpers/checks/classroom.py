@@ -78,6 +78,10 @@ ONE_ANSWER = (
     'A guess is one answer after the question: write 0.65 with a point, and several answers as a '
     "list, such as ['A', 'B']. Change it and run the cell again."
 )
+NO_GUESS = (
+    'None is no guess: write a number, True or False, or a text in quotes in its place, and run '
+    'the cell again.'
+)
 SENT = (
     'Sent to it: your guesses and what you measured, which tasks you tried and solved, at '
     'which step you are, and a raised hand. Not sent: your code and its outputs.'
@@ -111,6 +115,9 @@ def guess(question: str, *answers: object) -> object:
         print(*wrap(ONE_ANSWER), sep='\n')
         return ...
     [value] = answers
+    if value is None:
+        print(*wrap(NO_GUESS), sep='\n')
+        return ...
     if value is not ...:
         print('Your guess is saved:', value)
         _tell('guess', question=question, value=value)
@@ -336,7 +343,8 @@ def _join(address: str, code: str, name: str) -> str:
     called = f', called {name}. {SENT}' if name else f'. {SENT} Nor your name.'
     return (
         f'You are in the class of {address} on seat {seat}{called} '
-        'leave_class() ends it, raise_hand() says that you are lost.'
+        'raise_hand() says that you are lost, leave_class() ends it; in the next lesson import '
+        'them again, as here.'
     )
 
 

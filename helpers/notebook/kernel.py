@@ -17,6 +17,8 @@ NOT_RUN = (
 )
 CHECK = re.compile(r'check\(\d+,')
 NO_ANSWER = '{} is not there yet: run the cell of the task above, then this one again.'
+OF_A_CLASS = '{0} is for a class: write `from helpers.checks import {0}` above it.'
+CLASS = 'guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand'
 NO_GUESS = '{} is a guess: make it in its cell above, run that cell, then this one again.'
 
 
@@ -33,12 +35,15 @@ def load_ipython_extension(shell) -> None:
 
     def explain(shell, kind, error, traceback, tb_offset=None) -> None:
         shell.showtraceback((kind, error, traceback), tb_offset=tb_offset)
-        if 'helpers.ros.session' not in sys.modules and 'helpers.workspace' not in sys.modules:
+        name = getattr(error, 'name', None) or ''
+        if name in CLASS:
+            print(OF_A_CLASS.format(name))
+        elif 'helpers.ros.session' not in sys.modules and 'helpers.workspace' not in sys.modules:
             print(NOT_RUN)
-        elif (getattr(error, 'name', None) or '').startswith('my_'):
-            print(NO_GUESS.format(error.name))
+        elif name.startswith('my_'):
+            print(NO_GUESS.format(name))
         elif traceback.tb_next and CHECK.match(_first_line(traceback.tb_next)):
-            print(NO_ANSWER.format(error.name))
+            print(NO_ANSWER.format(name))
 
     shell.set_custom_exc((NameError, UsageError), explain)
 

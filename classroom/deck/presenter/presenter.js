@@ -9,13 +9,14 @@
 const COPIES = 'presentation/';
 const LESSON_S = 4 * 3600; // a deck that was left open longer begins anew
 const PLAN_S = 12 * 3600;
+const SILENT = 'The server does not answer: look at its terminal. A new `make present` goes on here.';
 const TWICE_MS = 2000; // I I, 0 0, R R and Escape Escape come within this time
 const SAVE_MS = 300;
 // Of the letters of a slide: what does not fit in the smallest ones is scrolled.
 const SCALES = { texts: [1.6, 1.45, 1.3, 1.15, 1, 0.95, 0.9], code: [1.25, 1.1, 1, 0.95, 0.9] };
 const TYPED = 'textarea, select, [contenteditable], input:not([type=range], [type=number], [type=button])';
 // What works with the focus in a replay, a level or a list, too: its other keys are its own.
-const EVERYWHERE = ['pagedown', 'pageup', 'b', '.', 'n', 'escape', 'f5', 'Control s', 'Control r'];
+const EVERYWHERE = ['pagedown', 'pageup', 'b', '.', 'n', 's', 'j', 'escape', 'f5', 'Control s', 'Control r'];
 
 let packages; // of JupyterLab, by name
 let server; // { baseUrl, ask, open }
@@ -97,7 +98,8 @@ function begin(app, tracker, actions, { makeRequest }, dialogs) {
     const asks = deck && dialogs.tracker.find(({ isAttached }) => isAttached);
     if (!asks) return;
     const parts = asks.node.querySelectorAll('.jp-Dialog-header, .jp-Dialog-body');
-    say([...parts].map(part => part.textContent).join('. '));
+    const said = [...parts].map(part => part.textContent).filter(Boolean).join('. ');
+    say(said.includes('Failed to fetch') ? SILENT : said);
     asks.reject();
   }).observe(document.body, { childList: true });
 }
