@@ -24,7 +24,9 @@ def test_without_a_class_a_guess_returns_its_value(folder, capsys, value):
     assert classroom.guess('How many?', value) is value
     classroom.tell_task(1, False)
     assert list(folder.iterdir()) == []
-    assert 'class' not in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert 'class' not in said
+    assert ('saved' in said) == (value not in (None, ...))
 
 
 @pytest.mark.parametrize(

@@ -117,8 +117,7 @@ def guess(question: str, *answers: object) -> object:
     [value] = answers
     if value is None:
         print(*wrap(NO_GUESS), sep='\n')
-        return ...
-    if value is not ...:
+    elif value is not ...:
         print('Your guess is saved:', value)
         _tell('guess', question=question, value=value)
         _outbox.say_trouble()
