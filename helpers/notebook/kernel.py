@@ -18,7 +18,7 @@ NOT_RUN = (
 CHECK = re.compile(r'check\(\d+,')
 NO_ANSWER = '{} is not there yet: run the cell of the task above, then this one again.'
 OF_A_CLASS = '{0} is for a class: write `from helpers.checks import {0}` above it.'
-CLASS = 'guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand'
+CLASS = 'join_class', 'leave_class', 'lower_hand', 'raise_hand'
 NO_GUESS = '{} is a guess: make it in its cell above, run that cell, then this one again.'
 
 
