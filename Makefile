@@ -39,7 +39,7 @@ handout: set_up ## write a student's edition: SOLUTIONS=no (or "00 01"), OFFLINE
 
 grade: set_up ## judge what students hand in: FOLDER=submissions, LESSON=02, JOBS=2, STARS=no; see teaching.md
 	@$(PYTHON) -m classroom.grade "$(or $(FOLDER),submissions)" --lesson "$(LESSON)" --seed "$(SEED)" --assignment "$(ASSIGNMENT)" \
-		$(if $(filter no,$(STARS)),--no-stars) $(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
+		$(if $(filter no,$(STARS)),--no-stars) $(if $(TASKS),--tasks "$(TASKS)") $(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
 
 hub: ## run a JupyterHub for a class: CONTAINERS=yes, SOLUTIONS=no, HUB_ARGS=...; see classroom/HOSTING.md
 	@classroom/hub/set_up.sh

@@ -225,7 +225,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 1
     what = f'for Python {" and ".join(pythons)}, no network needed' if pythons else 'no packages'
-    print(f'{output}: {output.stat().st_size / 1e6:.1f} MB, {what}.')
+    of = {ALL: 'all lessons', 'no': 'no lesson'}.get(options.solutions, options.solutions)
+    print(f'{output}: {output.stat().st_size / 1e6:.1f} MB, {what}. Solutions of {of}.')
     if left_out:
         print('Not committed, so not in it:', ', '.join(left_out))
     print(f'Students: tar xf {output.name} && cd {NAME} && make lab')

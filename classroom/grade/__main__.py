@@ -96,13 +96,13 @@ def choose(work: Work, notebooks: list[Read], wanted: list[Handed]) -> None:
         answers = answers_of(one.cells, lesson)
         count = sum(map(answers.changed, lesson.tasks.values()))
         number = lesson.lesson.number
-        if number in best:
-            work.row.said.append(
-                f'lesson {number} is there twice: the one with more answers counts'
-            )
+        twice = number in best
         if number not in best or count >= best[number][0]:
             best[number] = count, answers
             work.paths[number] = one.path
+        if twice:
+            which = Path(work.paths[number]).name
+            said.append(f'lesson {number} is there twice: {which} counts')
     for number, (_, answers) in best.items():
         work.answers[number] = answers
         said += answers.said
@@ -235,18 +235,27 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
     parser.add_argument('--trust', action='store_true', help='without a container, as you')
     parser.add_argument('--limit', type=float, default=LIMIT_MIN, help='minutes for a lesson')
     parser.add_argument('--seed', default='', help='of a lesson that has one, for all students')
+    parser.add_argument('--tasks', default='', help='only these give points: "9 10"')
     parser.add_argument('--no-stars', action='store_true', help='tasks with ★ give no points')
     parser.add_argument('--assignment', default='', help='its name or id in Canvas')
     parser.add_argument('--notebooks', type=Path, default=FOLDER, help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     try:
-        if options.jobs < 1 or (options.seed and not options.seed.isdecimal()):
-            raise ValueError('JOBS= is a number from 1 on, and SEED= a number.')
+        tasks = options.tasks.split()
+        if options.jobs < 1 or not all(map(str.isdecimal, [options.seed or '0', *tasks])):
+            raise ValueError('JOBS= is a number from 1 on, SEED= a number, and TASKS= numbers.')
         students, files = submissions_of(options.folder)
         if not students:
             raise ValueError(f'Nobody has handed in anything in {options.folder}.')
         sheets = [tables.read_sheet(file.name, file.read()) for file in files]
-        known = handed_out(options.notebooks, stars=not options.no_stars)
+        for is_sheet in (tables.is_moodle, tables.is_canvas):
+            if len(same := [sheet.name for sheet in sheets if is_sheet(sheet)]) > 1:
+                raise ValueError(
+                    f'{" and ".join(same)} are of two assignments: each one has a folder of its '
+                    'own, such as FOLDER=submissions_02.'
+                )
+        only = {*map(int, tasks)}
+        known = handed_out(options.notebooks, stars=not options.no_stars, only=only)
         reads = [read(student, known) for student in students]
         if options.lesson:
             names = {path.name for path in chosen(options.lesson, options.notebooks)}
@@ -257,6 +266,8 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
             wanted = [one for one in known if one.lesson.file in most]
         if not wanted:
             raise ValueError(f'There is no notebook of a lesson in {options.folder}.')
+        if not any(one.counted for one in wanted):
+            raise ValueError(f'Lesson {wanted[0].lesson.number} has no task {options.tasks}.')
         where = where or (Trusted() if options.trust else Container())
         if why := where.ready():
             raise ValueError(

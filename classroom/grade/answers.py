@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,10 @@ from tools.lessons.lesson import FOLDER, Lesson, lessons, tags
 CHECKS = re.compile(r'^from helpers\.checks\.lessons\.(\w+) import ', re.MULTILINE)
 CHECK = re.compile(r'check\((\d+)')
 HEADING = re.compile(r'^### ✎ Task (\d+)( ★)?', re.MULTILINE)
-SEED = re.compile(r'^SEED = (\d{1,9})$', re.MULTILINE)
+SEED = re.compile(r'^SEED *= *(\d{1,9})\b.*$', re.MULTILINE)
+# The lesson whose tasks ask for what a cell of the student's own has printed.
+LOOKS_FIRST = 'find_the_fault'
+LOOK = '%%terminal'
 LARGEST_SOURCE = 200_000  # letters of a cell
 # What an answer of a lesson has no need for, and what forges a verdict would use.
 MACHINERY = re.compile(
@@ -36,12 +39,15 @@ class Task:
 
 
 class Handed:
-    """A lesson as it was handed out, with its tasks. `stars`: those with ★ count, too."""
+    """A lesson as it was handed out, with its tasks.
 
-    def __init__(self, lesson: Lesson, *, stars: bool = True) -> None:
+    `stars`: those with ★ count, too. `only`: no other ones count.
+    """
+
+    def __init__(self, lesson: Lesson, *, stars: bool = True, only: Collection[int] = ()) -> None:
         self.lesson = lesson
         self.cells = lesson.notebook.cells
-        self._stars = stars
+        self._stars, self._only = stars, only
 
     @cached_property
     def module(self) -> str:
@@ -71,8 +77,9 @@ class Handed:
     def counted(self) -> list[int]:
         """The numbers of the tasks that give a point."""
         headings = [heading for cell in self.cells for heading in HEADING.findall(cell.source)]
-        starred = {int(number) for number, star in headings if star}
-        return [number for number in self.tasks if self._stars or number not in starred]
+        starred = set() if self._stars else {int(number) for number, star in headings if star}
+        wanted = {*(self._only or self.tasks)} - starred
+        return [number for number in self.tasks if number in wanted]
 
     @cached_property
     def ids(self) -> set[str]:
@@ -84,9 +91,11 @@ class Handed:
         }
 
 
-def handed_out(folder: Path = FOLDER, *, stars: bool = True) -> list[Handed]:
+def handed_out(
+    folder: Path = FOLDER, *, stars: bool = True, only: Collection[int] = ()
+) -> list[Handed]:
     """Return the lessons that have tasks."""
-    handed = [Handed(lesson, stars=stars) for lesson in lessons(folder)]
+    handed = [Handed(lesson, stars=stars, only=only) for lesson in lessons(folder)]
     return [one for one in handed if one.tasks]
 
 
@@ -147,9 +156,13 @@ def lesson_of(cells: Iterable[Cell], known: Iterable[Handed]) -> Handed | None:
 
 @dataclass
 class Answers:
-    """The sources of a student's exercise cells by the ids of the lesson, and what was found."""
+    """The sources of a student's exercise cells by the ids of the lesson, and what was found.
+
+    `looks` are the cells with `%%terminal` that were added before a cell of the lesson.
+    """
 
     sources: dict[str, str] = field(default_factory=dict)
+    looks: dict[str, list[str]] = field(default_factory=dict)
     said: list[str] = field(default_factory=list)
     seed: str = ''
 
@@ -208,11 +221,27 @@ def answers_of(cells: list[Cell], handed: Handed) -> Answers:
     ):
         if numbers:
             answers.said.append(f'task {", ".join(dict.fromkeys(numbers))} {what}')
-    # A number decides which robots the lesson has: the one thing that is taken from other cells.
+    # A number decides which robots the lesson has.
     if any(SEED.search(cell.source) for cell in handed.cells):
         found = [SEED.search(cell.source) for cell in cells if cell.kind == 'code']
         answers.seed = next((match[1] for match in found if match), '')
+        answers.said.append(f'SEED {answers.seed or "is not there"}')
+    if handed.lesson.name == LOOKS_FIRST:
+        answers.looks = _looks(
+            cells, {cell.id for cell in handed.cells if cell.cell_type == 'code'}
+        )
     return answers
+
+
+def _looks(cells: list[Cell], known: set[str]) -> dict[str, list[str]]:
+    looks, waiting = {}, []
+    for cell in cells:
+        if cell.id in known:
+            if waiting:
+                looks[cell.id], waiting = waiting, []
+        elif cell.kind == 'code' and cell.source.startswith(LOOK):
+            waiting.append(cell.source[:LARGEST_SOURCE])
+    return looks
 
 
 def _below_heading(cells: list[Cell], task: int) -> list[Cell]:

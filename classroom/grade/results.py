@@ -54,6 +54,7 @@ def digest_of(handed: Handed, answers: Answers, files: dict[str, bytes]) -> str:
     for part in (
         [[cell.id, cell.cell_type, cell.source] for cell in handed.cells],
         sorted(answers.sources.items()),
+        sorted(answers.looks.items()),
         answers.seed,
         [[name, hashlib.sha256(data).hexdigest()] for name, data in sorted(files.items())],
     ):
@@ -80,6 +81,8 @@ def job_of(
         if cell.cell_type != 'code':
             continue
         kind, number = of_cell.get(cell.id, ('', 0))
+        for count, look in enumerate(answers.looks.get(cell.id, ())):
+            cells.append({'id': f'{cell.id}-look-{count}', 'source': look, 'kind': '', 'task': 0})
         one = {'id': cell.id, 'source': cell.source, 'kind': kind, 'task': number}
         if kind == 'exercise':
             one |= {'source': answers.sources.get(cell.id, cell.source), 'starter': cell.source}

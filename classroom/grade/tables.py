@@ -135,6 +135,8 @@ def moodle(rows: list[Row], most: int, sheet: Sheet | None) -> tuple[str, list[s
             line[at['Grade']] = f'{row.points * (maximum or most) / most:.2f}'
             if 'Feedback comments' in at:
                 line[at['Feedback comments']] = f'{row.points} of {most} tasks are solved.'
+        elif row and row.said and 'Feedback comments' in at:
+            line[at['Feedback comments']] = f'Not judged: {"; ".join(row.said)}.'
         filled.append(line)
     names = [by_number[number].student.name for number in sorted(absent)]
     return _text(filled, sheet.delimiter), names

@@ -432,7 +432,7 @@ def test_a_line_for_each_strange_submission(submit, capsys):
         'Bob: 02.ipynb is lesson 02, not asked for; lesson 00 is not there',
         'Cy: no notebook, but notes.txt',
         'Di: lesson 00: 0 of 1; nothing is written in lesson 00',
-        'Eve: lesson 00: 0 of 1; lesson 00 is there twice: the one with more answers counts',
+        'Eve: lesson 00: 0 of 1; lesson 00 is there twice: a.ipynb counts',
         'Fay: own.ipynb is no lesson of this course',
         f'{folder}_graded: grades.csv, feedback.zip, equal_answers.txt',
     ]
@@ -483,6 +483,37 @@ def test_tasks_with_a_star_count_or_not(submit, capsys, options, of):
     assert (row['points'], row['of'], row['01 task 6']) == (str(points), str(of), '1')
     [row] = rows_of(folder, 'moodle.csv')
     assert float(row['Grade']) == points
+
+
+def test_an_exam_of_two_tasks(submit, capsys):
+    """What a student has run to look at the robot is run again; two tasks are all points."""
+    data = notebook('19', **{'find-next': RIGHT, 'mend-next': RIGHT, 'next': 'SEED = 7  # mine'})
+    at = next(i for i, cell in enumerate(data['cells']) if cell['id'] == 'find-next')
+    look = {
+        'cell_type': 'code',
+        'id': 'own',
+        'metadata': {},
+        'source': '%%terminal\nros2 node list',
+    }
+    data['cells'].insert(at, look | {'outputs': [], 'execution_count': None})
+    path = 'Student_500_assignsubmission_file/19_first.ipynb'
+    folder = submit(**{path: json.dumps(data).encode()})
+    assert main([str(folder), '--tasks', '9 10'], Stand()) == 0
+    assert 'Student: lesson 19: 2 of 2; SEED 7\n' in capsys.readouterr().out
+    [handed] = [one for one in handed_out() if one.lesson.number == '19']
+    cells = job_of(handed, answers_of(cells_of(json.dumps(data).encode()), handed), {})['cells']
+    ids = [cell['id'] for cell in cells]
+    assert ids[ids.index('find-next') - 1] == 'find-next-look-0'
+    assert 'SEED = 7' in next(cell['source'] for cell in cells if cell['id'] == 'next')
+    assert main([str(folder), '--tasks', '99'], Stand()) == 1
+    assert 'no task 99' in capsys.readouterr().err
+
+
+def test_two_assignments_in_one_folder_are_refused(submit, capsys):
+    sheet = b'Identifier,Grade,Last modified (grade)\n'
+    folder = submit(**moodle_class(1), **{'one.csv': sheet, 'two.csv': sheet})
+    assert main([str(folder)], Stand()) == 1
+    assert 'FOLDER=submissions_02' in capsys.readouterr().err
 
 
 def test_moodle_without_a_worksheet(submit):

@@ -39,10 +39,15 @@ def next_robot(workspace, seed):
     First those come that have not been mended yet, without those of the core. Then all of them.
     """
     known = progress.about(LAST)
+    return take(workspace, FAULTS[order_of(seed, known)[0]], OTHERS[len(known) % len(OTHERS)])
+
+
+def order_of(seed, known=()):
+    """Return the faults in the order that a number gives them, without those that are known."""
     left = [fault for fault in FAULTS if fault not in {*known, *CORE.values()}]
     order = sorted(left or FAULTS)
     random.Random(seed).shuffle(order)
-    return take(workspace, FAULTS[order[0]], OTHERS[len(known) % len(OTHERS)])
+    return order
 
 
 def drive(case):
