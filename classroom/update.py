@@ -230,8 +230,22 @@ def update_from_folder(newer: Path, mine: Path) -> list[str]:
     """
     said = merge_folders(mine / BASE, mine, newer)
     said += keep_old_cells_as_text(mine, newer)
+    if (mine / BASE).is_dir():
+        before, after = with_solutions(mine / BASE), with_solutions(newer)
+        for numbers, what in (
+            (after - before, 'now have their solutions'),
+            (before - after, 'no longer have their solutions, as this archive has none of them'),
+        ):
+            if numbers:
+                said.append(f'Lessons {", ".join(sorted(numbers))} {what}.')
     merge_folders(mine / BASE, mine / BASE, newer)
     return said
+
+
+def with_solutions(folder: Path) -> set[str]:
+    """Return the numbers of the lessons of a folder that have a solution."""
+    lessons = folder.rglob('[0-9][0-9]_*.ipynb')
+    return {path.name[:2] for path in lessons if b'"%%solution ' in path.read_bytes()}
 
 
 def update_from_archive(archive: Path, mine: Path) -> list[str]:

@@ -15,6 +15,7 @@ from support.checkouts import git
 from classroom import handout, update
 from tools.lessons.lesson import PICTURES, ROOT
 
+SOLVED = '%%solution 1\nsolved = 2'
 FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb', 'classroom/update.py'}
 LESSONS = '<!-- made by `make notebooks`: lessons -->\n\n| 01 |\n\n<!-- end -->'
 
@@ -28,7 +29,7 @@ def checkout(tmp_path):
     cells = [
         new_code_cell('start = 1', id='start', outputs=said, metadata={'tags': ['exercise']}),
         new_raw_cell('For the instructor', id='note', metadata={'tags': ['notes']}),
-        new_code_cell('solved = 2', id='solution', metadata={'tags': ['solution']}),
+        new_code_cell(SOLVED, id='solution', metadata={'tags': ['solution']}),
         new_markdown_cell('## 7. For instructors', id='instructors'),
     ]
     nbformat.write(new_notebook(cells=cells), root / 'notebooks/01_publish.ipynb')
@@ -62,7 +63,7 @@ def test_a_handout_is_a_students(checkout, tmp_path, capsys):
     assert re.search(r'ros2_notebooks\.tar\.gz: 0\.0 MB, no packages\.', printed)
     files = {str(p.relative_to(course)) for p in course.rglob('*') if p.is_file()}
     assert files == FILES | {f'{update.BASE}/{name}' for name in FILES}
-    assert cells_of(course) == ['start = 1', 'solved = 2']
+    assert cells_of(course) == ['start = 1', SOLVED]
     assert '"output_type"' not in (course / 'notebooks/01_publish.ipynb').read_text()
     assert (course / 'README.md').read_text() == 'for students: | 01 |'
 
@@ -124,7 +125,7 @@ def test_what_is_not_committed_is_named_and_left_out(checkout, tmp_path, capsys)
     assert re.search(r'^Not committed, so not in it: Makefile, .*my draft', said, re.M)
 
 
-def test_solutions_may_come_later(checkout, tmp_path):
+def test_solutions_may_come_later(checkout, tmp_path, capsys):
     course = unpack(checkout, tmp_path / 'home', '--solutions', 'no')
     assert cells_of(course) == ['start = 1']
     lesson = course / 'notebooks/01_publish.ipynb'
@@ -132,7 +133,8 @@ def test_solutions_may_come_later(checkout, tmp_path):
     unpack(checkout, tmp_path / 'later')
     archive = checkout / 'handout/ros2_notebooks.tar.gz'
     assert update.main([str(archive), '--to', str(course)]) == 0
-    assert cells_of(course) == ['start = 99', 'solved = 2']
+    assert cells_of(course) == ['start = 99', SOLVED]
+    assert 'Lessons 01 now have their solutions.' in capsys.readouterr().out
 
 
 def test_solutions_of_the_weeks_before(checkout, tmp_path):
