@@ -267,7 +267,8 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
         if not wanted:
             raise ValueError(f'There is no notebook of a lesson in {options.folder}.')
         if not any(one.counted for one in wanted):
-            raise ValueError(f'Lesson {wanted[0].lesson.number} has no task {options.tasks}.')
+            number = wanted[0].lesson.number
+            raise ValueError(f'No task of lesson {number} would count: look at TASKS= and STARS=.')
         where = where or (Trusted() if options.trust else Container())
         if why := where.ready():
             raise ValueError(

@@ -506,7 +506,7 @@ def test_an_exam_of_two_tasks(submit, capsys):
     assert ids[ids.index('find-next') - 1] == 'find-next-look-0'
     assert 'SEED = 7' in next(cell['source'] for cell in cells if cell['id'] == 'next')
     assert main([str(folder), '--tasks', '99'], Stand()) == 1
-    assert 'no task 99' in capsys.readouterr().err
+    assert 'No task of lesson 19 would count' in capsys.readouterr().err
 
 
 def test_two_assignments_in_one_folder_are_refused(submit, capsys):
