@@ -159,7 +159,7 @@ def judge_all(
             if result.trouble:
                 work.row.said.append(result.trouble)
             for task, outcome in result.tasks.items():
-                if outcome.why not in ('', 'not answered') and not outcome.of:
+                if outcome.why not in ('', 'not answered', result.trouble) and not outcome.of:
                     work.row.said.append(f'task {task}: {outcome.why}')
             points = sum(result.tasks[task].solved for task in lesson.counted)
             work.row.points += points

@@ -131,7 +131,7 @@ def run(job: dict, where: Where, limit_s: float) -> Said:
         if where.stopped:
             said.trouble, said.is_ours = 'it was interrupted', True
         elif late.is_set():
-            said.trouble = f'{LATE} {limit_s / 60:.0f} minutes'
+            said.trouble = f'{LATE} {limit_s / 60:.0f} min'
         elif not said.ended and not said.trouble:
             errors.seek(0)
             lines = errors.read()[-10_000:].decode(errors='replace').strip().splitlines()

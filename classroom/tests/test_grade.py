@@ -598,7 +598,7 @@ def test_what_is_kept_is_that_of_the_same_answers_and_lesson(lessons, tmp_path):
     kept.put('ada', result)
     assert kept.get('ada', digest, 20) == result
     assert kept.get('ada', digest_of(lessons['00'], answers, {'a': b''}), 20) is None
-    result.trouble, result.minutes = 'it was ended after 5 minutes', 5.0
+    result.trouble, result.minutes = 'it was ended after 5 min', 5.0
     kept.put('ada', result)
     assert kept.get('ada', digest, 5) == result
     assert kept.get('ada', digest, 20) is None  # it has more time now
