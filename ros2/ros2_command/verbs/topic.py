@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy import qos
+from rclpy.duration import Duration
 from rclpy.node import Node
 
 from ros2_command.commands import (
@@ -31,6 +32,9 @@ TOPICS = Names('topic', 'msg', lambda node: node.get_topic_names_and_types())
 ARGUMENTS = (TOPICS.hidden,)
 TYPE = 'message_type', 'Type of the ROS message', TOPICS.complete_types
 KEEP_ALIVE_S = 0.1  # after the last message, so that it is sent
+# A reliable subscription confirms each message, once it has discovered this publisher, too: on a
+# busy machine later than it was discovered itself. So long it is waited for at most.
+CONFIRMED_S = 2.0
 POLICIES = {
     'history': qos.HistoryPolicy,
     'reliability': qos.ReliabilityPolicy,
@@ -373,6 +377,7 @@ def _pub(args: argparse.Namespace) -> None:
         if times != 1:
             opened.node.create_timer(1.0 / args.rate, publish)
             opened.spin_until(lambda: times != 0 and count >= times)
+        publisher.wait_for_all_acked(Duration(seconds=CONFIRMED_S))
         time.sleep(KEEP_ALIVE_S)
 
 
