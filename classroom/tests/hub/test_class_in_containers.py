@@ -57,7 +57,7 @@ del _memory
 print('done')
 """
 # What `make hub CONTAINERS=yes` looks at before it starts.
-CHECK = 'from classroom.hub.containers import use_service; print(use_service()[0])'
+CHECK = 'from classroom.hub.containers import use_service; print(use_service({!r})[0])'
 MEMORY = 8e9  # bytes: nine students with a lesson, and one who fills 2 GB
 
 
@@ -137,14 +137,18 @@ def service(podman, image, folder):
 
 def test_nobody_notices_the_trouble_of_others(make, service, folder):
     variables = {'PYTHONPATH': str(make.checkout), 'DOCKER_HOST': service}
-    found = subprocess.run(
-        [sys.executable, '-c', CHECK],
-        cwd=make.checkout,
-        env=os.environ | variables,
-        text=True,
-        capture_output=True,
+    found, refused = (
+        subprocess.run(
+            [sys.executable, '-c', CHECK.format(solutions)],
+            cwd=make.checkout,
+            env=os.environ | variables,
+            text=True,
+            capture_output=True,
+        )
+        for solutions in ('yes', '00 01')
     )
     assert (found.returncode, found.stdout) == (0, 'host.containers.internal\n'), found.stderr
+    assert 'run `sudo make image SOLUTIONS="00 01"` first' in refused.stderr
     state = folder / 'hub'
     state.mkdir()
     with Hub(state, '', make.checkout, CONTAINERS='yes', **variables) as hub:
