@@ -24,7 +24,7 @@ from classroom.class_page.store import ClassStore
 from classroom.class_page.web import Instructor, Room, Student, serve
 
 PREFIX = os.environ['JUPYTERHUB_SERVICE_PREFIX']
-# The hub makes this of the service's `url`, which that of `make hub` has not. PREFIX is enough.
+# The hub derives this from the service's `url`. That of `make hub` has none, and PREFIX is enough.
 os.environ.pop('JUPYTERHUB_OAUTH_CALLBACK_URL', None)
 
 

@@ -59,7 +59,10 @@ c.Spawner.pre_spawn_hook = own_port
 CLASS_URL = 'http://127.0.0.1:8764'
 LESSONS = ROOT / '.jupyter/lessons'  # without notes, and with the solutions that SOLUTIONS names
 SOLUTIONS = os.environ.get('SOLUTIONS') or ALL
-write_lessons(ROOT / 'notebooks', LESSONS, solutions=SOLUTIONS)
+try:
+    write_lessons(ROOT / 'notebooks', LESSONS, solutions=SOLUTIONS)
+except ValueError as error:  # SOLUTIONS names no lesson
+    sys.exit(str(error))
 c.Spawner.environment = {
     HUB_VARIABLE: f'{CLASS_URL}/services/class',
     'LESSONS': str(LESSONS),

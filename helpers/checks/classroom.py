@@ -78,7 +78,7 @@ ONE_ANSWER = (
     'A guess is one answer after the question: write 0.65 with a point, and several answers as a '
     "list, such as ['A', 'B']. Change it and run the cell again."
 )
-NO_GUESS = (
+NONE_IS_NO_GUESS = (
     'None is no guess: write a number, True or False, or a text in quotes in its place, and run '
     'the cell again.'
 )
@@ -116,7 +116,7 @@ def guess(question: str, *answers: object) -> object:
         return ...
     [value] = answers
     if value is None:
-        print(*wrap(NO_GUESS), sep='\n')
+        print(*wrap(NONE_IS_NO_GUESS), sep='\n')
     elif value is not ...:
         print('Your guess is saved:', value)
         _tell('guess', question=question, value=value)

@@ -417,9 +417,9 @@ def turns(camera, limit_s):
     wait_until(lambda: has_turned() or not camera.running, limit_s)
     if not camera.running and not has_turned():
         return f'beside a robot it ends: {error_in(camera.lines)}'
-    if not has_turned() and 'I wait for' in ''.join(camera.lines[-1:]):
-        return 'the robot is there, and it still waits: has the service another name?'
     if not has_turned():
+        if camera.lines and 'I wait for' in camera.lines[-1]:
+            return 'the robot is there, and it still waits: has the service another name?'
         said = ' / '.join(camera.lines[-3:]) or 'nothing'
         return f'the robot is there, and it does not log "Turned: True". Its last lines: {said}'
     if not wait_until(lambda: not camera.running, limit_s):

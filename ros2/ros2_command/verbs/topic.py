@@ -32,8 +32,8 @@ TOPICS = Names('topic', 'msg', lambda node: node.get_topic_names_and_types())
 ARGUMENTS = (TOPICS.hidden,)
 TYPE = 'message_type', 'Type of the ROS message', TOPICS.complete_types
 KEEP_ALIVE_S = 0.1  # after the last message, so that it is sent
-# A reliable subscription confirms each message, once it has discovered this publisher, too: on a
-# busy machine later than it was discovered itself. So long it is waited for at most.
+# How long a command waits at most until reliable subscriptions have confirmed its last message. One
+# confirms it when it has discovered the publisher, on a busy machine later than it was discovered.
 CONFIRMED_S = 2.0
 POLICIES = {
     'history': qos.HistoryPolicy,
