@@ -1,0 +1,91 @@
+"""The first pictures: of README and site, and of lessons whose own picture comes late on the page.
+
+    python -m tools.lessons.first_pictures
+
+It reads what the lessons have saved, and writes `notebooks/images/`: what is seen has happened.
+A picture plays once, in 4.5 s. Without motion it is its own end.
+"""
+
+from functools import partial
+
+from tools.lessons.first_pictures.drives import drive_picture
+from tools.lessons.first_pictures.queues import gate_picture, queue_picture, threads_picture
+from tools.lessons.first_pictures.sensors import camera_picture, lidar_picture, wheels_picture
+from tools.lessons.first_pictures.terminals import terminal_picture
+from tools.lessons.first_pictures.two_brakes import two_brakes_picture
+from tools.lessons.lesson import FOLDER, PICTURES, lessons
+
+IMAGES = FOLDER / PICTURES
+
+# What each lesson shows first. What a learner guesses is not told.
+FIRST = {
+    'publish_and_subscribe': partial(drive_picture, cell_id='drive-the-square'),
+    'lose_messages': partial(queue_picture, cell_id='step-through-run'),
+    'run_callbacks_in_parallel': partial(
+        threads_picture, cell_id='step-c-and-d-run', name='D', seconds=1.0
+    ),
+    'choose_the_number_of_threads': partial(gate_picture, cell_id='lesson-04-11'),
+    'keep_what_is_fresh': partial(drive_picture, cell_id='drive-depth-10', share=0.55),
+    'call_a_service_from_a_callback': partial(drive_picture, cell_id='drive-deadlock', share=0.4),
+    'run_a_long_job': partial(drive_picture, cell_id='lesson-07-19', share=0.5),
+    'set_parameters': partial(drive_picture, cell_id='run-15-obey'),
+    'make_a_package': partial(
+        terminal_picture,
+        lines=[
+            '$ colcon build',
+            ('lesson-08-17', 'Starting'),
+            ('lesson-08-17', 'Finished'),
+            ('lesson-08-17', 'Summary'),
+            '$ ros2 node list',
+            ('nodes-08', '/'),
+        ],
+    ),
+    'bring_in_a_package': partial(drive_picture, cell_id='l09-careful'),
+    'use_a_message_in_your_own_interface': partial(
+        camera_picture, cell_id='lesson-10-45', degrees=[0, 45, 90, 135]
+    ),
+    'launch_a_system': partial(
+        terminal_picture,
+        lines=[
+            '1 $ ros2 launch two_robots.launch.xml',
+            '2 $ ros2 topic list | grep -E "scan|cmd_vel"',
+            ('robots-shown-16', '/'),
+            '1 $ ^C',
+            ('ctrl-c-16', 'Programs'),
+        ],
+    ),
+    'test_a_node': partial(
+        terminal_picture,
+        lines=[
+            'def test_stops_before_a_wall(bench):',
+            '    bench.send(0.25)',
+            '    end = time.monotonic() + 0.15',
+            '    while time.monotonic() < end:',
+            '        bench.executor.spin_once(timeout_sec=0.05)',
+            '    assert bench.speeds == [0.0]',
+            ('lesson-17-flaky-runs', 'Runs passed'),
+        ],
+    ),
+    'share_code_in_a_cpp_library': partial(drive_picture, cell_id='l11-replay'),
+    'write_a_node_in_cpp': partial(drive_picture, cell_id='cpp-12-drive'),
+    'fuse_odometry_imu_and_gps': wheels_picture,
+    'put_the_sensors_on_the_robot': lidar_picture,
+    'record_a_bag': partial(drive_picture, cell_id='bag0716d970'),
+    'find_the_fault': partial(drive_picture, cell_id='take-dan'),
+    'build_a_robot_program': partial(drive_picture, cell_id='project-082'),
+}
+
+
+def pictures() -> dict[str, str]:
+    """Return the SVG of each picture, by the name of its file in `notebooks/images/`."""
+    of = {lesson.name: lesson for lesson in lessons()}
+    made = {name: picture(of[name]) for name, picture in FIRST.items()}
+    return made | {'depth_10_hits_depth_1_stops': two_brakes_picture(of['keep_what_is_fresh'])}
+
+
+if __name__ == '__main__':
+    for name, svg in pictures().items():
+        file = IMAGES / f'{name}.svg'
+        if not file.exists() or file.read_text(encoding='utf-8') != svg:
+            file.write_text(svg, encoding='utf-8')
+            print(f'{file.relative_to(FOLDER.parent)}: written from the notebooks')

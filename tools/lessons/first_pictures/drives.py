@@ -1,0 +1,51 @@
+"""Drives: the floor of a saved drive, on which its robot drives once, and draws its way."""
+
+import math
+import re
+from itertools import pairwise
+
+from tools.lessons.first_pictures.look import PLAYS_S, colour, output_of, percent, runs_of, svg_of
+from tools.lessons.lesson import Lesson
+
+TRAIL = 2.6  # pixels
+
+
+def drive_picture(lesson: Lesson, cell_id: str, share: float = 1) -> str:
+    """Return a saved drive, a share of its way. Its end is not told before it happens."""
+    page = output_of(lesson, cell_id)
+    svg, run = svg_of(page), runs_of(page)[0]
+    last = int(share * (len(run['poses']) - 1))
+    poses = run['poses'][: last + 1]
+    if share < 1:
+        svg = re.sub(r"<path[^>]* class='(all|driven|seconds|bumps)'[^>]*/>", '', svg)
+        x, y, *_ = poses[-1]
+        at = f"class='robot' transform='translate({x:.3f} {y:.3f})'"
+        svg = re.sub(r"class='robot' transform='[^']*'", at, svg)
+    far = [0.0]
+    for (x0, y0, *_), (x1, y1, *_) in pairwise(poses):
+        far.append(far[-1] + math.hypot(x1 - x0, y1 - y0))
+    every = max(1, last // 60)
+    moves = turns = trail = ''
+    for i, (x, y, yaw, *_) in enumerate(poses):
+        if i % every == 0 or i == last:
+            when = percent(PLAYS_S * i / last)
+            moves += f'{when}{{transform:translate({x:.3g}px,{y:.3g}px)}}'
+            turns += f'{when}{{transform:rotate({math.degrees(yaw):.0f}deg)}}'
+            trail += f'{when}{{stroke-dashoffset:{1 - far[i] / far[-1]:.3f}}}'
+    bump_s = PLAYS_S * min(1, run['bumps'][0] / 1000 / run['step'] / last) if run['bumps'] else 0
+    scale = float(re.search(r'scale\(([\d.]+) ', svg)[1])
+    svg = re.sub(r"<path[^>]* class='driven'[^>]*/>", '', svg)
+    svg = svg.replace(" class='all'", " class='all' pathLength='1'")
+    style = (
+        f'<style>svg{{color-scheme:light dark;color:{colour("ink")}}}.fan,.old{{display:none}}'
+        f'.robot,.robot>g,.all{{animation:move {PLAYS_S}s linear both}}'
+        '.robot>g{animation-name:turn}'
+        # A dash has the length of the way only where the line is scaled with its floor.
+        f'.all{{animation-name:trail;vector-effect:none;stroke-width:{TRAIL / scale:.4f};'
+        'stroke-opacity:1;stroke-dasharray:1}'
+        f'.seconds{{animation:comes .3s {PLAYS_S}s both}}'
+        f'.bumps{{animation:comes .1s {bump_s:.2f}s both}}@keyframes comes{{from{{opacity:0}}}}'
+        f'@keyframes move{{{moves}}}@keyframes turn{{{turns}}}@keyframes trail{{{trail}}}'
+        '@media(prefers-reduced-motion:reduce){svg *{animation:none!important}}</style>'
+    )
+    return re.sub(r'(<svg[^>]*>)', rf'\1{style}', svg, count=1) + '\n'

@@ -1,0 +1,134 @@
+"""What sensors say: wheels that lose their way, a lidar mounted askew, a camera that turns."""
+
+import base64
+import io
+import math
+import re
+
+import numpy as np
+from PIL import Image
+
+from helpers.fusion import fuse, simulate
+from helpers.robot import ROOMS
+from helpers.robot.body import Body
+from helpers.robot.sensors import Sensors
+from helpers.robot.view.picture import floor_picture
+from tools.lessons.first_pictures.look import PLAYS_S, WIDTH, colour, output_of, percent, svg
+from tools.lessons.lesson import Lesson
+
+ASKEW = math.radians(-30)  # as MOUNTING of the lesson says
+RAYS = 45  # so many groups of points come one after the other
+VIEW_W = 170  # pixels
+LABEL = 34
+WAY_PAD = 44  # pixels around two ways
+WAYS = (
+    'path.driven,path.believed{fill:none;stroke-width:3;stroke-linejoin:round;'
+    'stroke:COLOUR(good)}path.believed{stroke:COLOUR(waiting)}'
+    'path.driven,path.believed{stroke-dasharray:1 1;'
+    f'animation:draw {PLAYS_S}s linear both}}@keyframes draw{{from{{stroke-dashoffset:1}}}}'
+    f'circle{{animation:{PLAYS_S}s linear both}}'
+    'circle.driven{fill:COLOUR(good)}circle.believed{fill:COLOUR(waiting)}'
+)
+
+
+def wheels_picture(lesson: Lesson) -> str:
+    """Return the way of a robot, and the way that its wheels believe: the lesson's drive."""
+    measurements, truth = simulate(1, 60)
+    believed = fuse(measurements, ('odom',))
+    ways = [table[['x', 'y']].to_numpy()[::25] for table in (truth, believed)]
+    low, high = (bound(np.concatenate(ways), axis=0) for bound in (np.min, np.max))
+    scale = (WIDTH - 2 * WAY_PAD) / (high[0] - low[0])
+    height = scale * (high[1] - low[1]) + 2 * WAY_PAD
+    body = css = ''
+    for name, way in zip(('driven', 'believed'), ways, strict=True):
+        xs, ys = WAY_PAD + scale * (way[:, 0] - low[0]), WAY_PAD + scale * (high[1] - way[:, 1])
+        line = 'M' + 'L'.join(f'{x:.0f} {y:.0f}' for x, y in zip(xs, ys, strict=True))
+        css += f'@keyframes {name}{{'
+        for i in range(0, len(xs), 2):
+            css += f'{percent(PLAYS_S * i / (len(xs) - 1))}'
+            css += f'{{transform:translate({xs[i]:.0f}px,{ys[i]:.0f}px)}}'
+        css += '}'
+        body += (
+            f'<path class="{name} way-{name}" d="{line}" pathLength="1"/>'
+            f'<circle class="{name}" r="9" transform="translate({xs[-1]:.0f} {ys[-1]:.0f})" '
+            f'style="animation-name:{name}"/>'
+        )
+    off_m = math.dist(ways[0][-1], ways[1][-1])
+    body += (
+        f'<text class="good" x="{WAY_PAD}" y="24">where the robot is</text>'
+        f'<text class="waiting" x="{WIDTH - WAY_PAD}" y="24" text-anchor="end">'
+        'where its wheels say that it is</text>'
+        f'<text class="says ink" x="{WAY_PAD}" y="{height - 10:.0f}" '
+        f'style="animation-delay:{PLAYS_S}s">After 60 s the two are {off_m:.1f} m apart.</text>'
+    )
+    return svg(
+        round(height),
+        f'The drive of {lesson.name}, as its wheels report it',
+        WAYS + css,
+        body,
+    )
+
+
+def lidar_picture(_lesson: Lesson) -> str:
+    """Return a floor, and the points of a lidar as if it looked ahead, as the robot believes.
+
+    The ranges are those of the course's robot, whose lidar is mounted as in the lesson.
+    """
+    body = Body(ROOMS)
+    robot = Sensors(0, False, None, {'base_scan': ASKEW})
+    ranges, first, step = robot.scan(body)
+    angles = body.pose.yaw + first + step * np.arange(len(ranges))
+    known = np.isfinite(ranges)
+    xs = body.pose.x + ranges[known] * np.cos(angles[known])
+    ys = body.pose.y + ranges[known] * np.sin(angles[known])
+    points = ''
+    for i, part in enumerate(np.array_split(np.arange(len(xs)), RAYS)):
+        dots = ''.join(f'M{xs[k]:.2f} {ys[k]:.2f}h0' for k in part)
+        points += (
+            f'<path class="seen" vector-effect="non-scaling-stroke" d="{dots}" '
+            f'style="animation-delay:{i * PLAYS_S / RAYS:.1f}s"/>'
+        )
+    picture = floor_picture(ROOMS, (), body.pose).replace(
+        '<g class="robot"', f'{points}<g class="robot"'
+    )
+    style = (
+        f'<style>svg{{color-scheme:light dark;color:{colour("ink")}}}'
+        f'.seen{{stroke:{colour("lost")};stroke-width:5;stroke-linecap:round;'
+        'animation:in .1s both}@keyframes in{from{opacity:0}}'
+        '@media(prefers-reduced-motion:reduce){.seen{animation:none}}</style>'
+    )
+    return re.sub(r'(<svg[^>]*>)', rf'\1{style}', picture, count=1) + '\n'
+
+
+def camera_picture(lesson: Lesson, cell_id: str, degrees: list[int]) -> str:
+    """Return the views of a camera that turns, from the figure that a cell has shown."""
+    page = output_of(lesson, cell_id)
+    data = re.search(r'src="data:image/png;base64,([^"]*)"', page)[1]
+    figure = Image.open(io.BytesIO(base64.b64decode(data))).convert('RGB')
+    views = ''
+    gap = (WIDTH - len(degrees) * VIEW_W) / (len(degrees) + 1)
+    for i, (view, turned) in enumerate(zip(_views(figure), degrees, strict=True)):
+        height = VIEW_W * view.height / view.width
+        png = io.BytesIO()
+        view.quantize(32).save(png, 'PNG', optimize=True)
+        x = gap + i * (VIEW_W + gap)
+        views += (
+            f'<g class="comes" style="animation-delay:{i * PLAYS_S / len(degrees):.1f}s">'
+            f'<text class="ink" x="{x + VIEW_W / 2:.0f}" y="24" text-anchor="middle">{turned}°'
+            f'</text><image x="{x:.0f}" y="{LABEL}" width="{VIEW_W}" height="{height:.0f}" '
+            f'href="data:image/png;base64,{base64.b64encode(png.getvalue()).decode()}"/></g>'
+        )
+    about = f'What the camera of {lesson.name} sees'
+    return svg(LABEL + height + 16, about, '', views)
+
+
+def _views(figure: Image.Image) -> list[Image.Image]:
+    """Return the views of a figure: what is not white, without the titles above."""
+    ink = (np.asarray(figure) < 250).any(axis=2)
+    rows = np.flatnonzero(ink.mean(axis=1) > 0.5)
+    columns = ink[rows].mean(axis=0) > 0.9
+    edges = np.flatnonzero(np.diff(np.r_[False, columns, False].astype(int)))
+    return [
+        figure.crop((left, rows[0], right, rows[-1] + 1))
+        for left, right in edges.reshape(-1, 2).tolist()
+    ]
