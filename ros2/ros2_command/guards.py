@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import faulthandler
 import fcntl
 import os
 import signal
+import sys
 import time
 from collections.abc import Iterator
 
@@ -27,6 +29,20 @@ def uninterrupted() -> Iterator[None]:
         signal.signal(signal.SIGINT, handler)
         if interrupts:
             signal.raise_signal(signal.SIGINT)
+
+
+@contextlib.contextmanager
+def at_most(seconds: float) -> Iterator[None]:
+    """End the process of a command if the block takes longer, also if it holds the interpreter."""
+    if os.path.basename(sys.argv[0]) != 'ros2':  # a program that uses this package
+        yield
+        return
+    with open(os.devnull, 'w') as nowhere:
+        faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
 
 
 @contextlib.contextmanager

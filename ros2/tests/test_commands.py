@@ -302,3 +302,15 @@ def test_tab_completes_names(graph, tmp_path):
 
     assert completed('ros2 top') == ['topic ']
     assert completed('ros2 topic echo /cha') == ['/chatter ']
+
+
+def test_a_command_whose_end_never_comes_is_ended():
+    # A PyDLL holds the interpreter while it waits, as Fast DDS does.
+    code = """import ctypes, sys
+from ros2_command.guards import at_most
+sys.argv[0] = 'ros2'
+with at_most(0.2):
+    ctypes.PyDLL(None).sleep(60)
+"""
+    with python(code) as command:
+        assert command.wait(LIMIT_S) == 1
