@@ -224,6 +224,21 @@ def round_tour(workspace, floor=ROOMS, file='rooms'):
     return tour, places
 
 
+def send_goal(session, server, places):
+    """Send a goal to another process. Return its handle, or None if no answer comes.
+
+    A server that has not discovered the client yet cannot answer: rmw_fastrtps gives it 0.1 s for
+    that, and rclpy does not begin such a goal. On a busy computer this happens, so it is sent
+    again.
+    """
+    for _ in range(5):
+        sent = server.send_goal_async(action().Goal(places=places))
+        with contextlib.suppress(TimeoutError):
+            session.wait_until(sent.done, 5.0)
+            return sent.result()
+    return None
+
+
 LAUNCH = 'source install/setup.bash\nexec ros2 launch patrol_pkg '
 BEATS = 12  # scans before a goal: in this time the battery says how full it is
 
@@ -266,11 +281,10 @@ def launched(
                 beats += beat(0.5)
             if beats < BEATS:
                 return robot, f'a scan had no command. {printed(workspace, program.lines)}'
-            sent = server.send_goal_async(action().Goal(places=places))
-            session.wait_until(sent.done)
-            if not sent.result().accepted:
-                return robot, 'the goal is refused'
-            ended = sent.result().get_result_async()
+            goal = send_goal(session, server, places)
+            if goal is None or not goal.accepted:
+                return robot, 'the goal is refused' if goal else 'the goal gets no answer'
+            ended = goal.get_result_async()
             while robot.t_s < seconds and not ended.done() and not robot.bumps:
                 if not beat():
                     return robot, f'a scan had no command. {printed(workspace, program.lines)}'
@@ -352,8 +366,7 @@ def ended_by(workspace, end):
 
         def drives():
             if server.server_is_ready() and robot.pose.x == CORRIDOR.start.x:
-                sent = server.send_goal_async(action().Goal(places=1))
-                session.wait_until(sent.done)  # refused, as long as nothing is known of the battery
+                send_goal(session, server, 1)  # refused, as long as the battery has not spoken
             return robot.record.poses[-1].v > 0.15
 
         limit_s = robot.t_s + LIMIT_S
@@ -397,9 +410,11 @@ def driven_live(workspace, file):
                 print(printed(workspace, program.lines))
                 return robot
             places = len(route_of(path.with_suffix('.yaml')))
-            sent = server.send_goal_async(action().Goal(places=places))
-            session.wait_until(sent.done)
-            ended = sent.result().get_result_async()
+            goal = send_goal(session, server, places)
+            if goal is None or not goal.accepted:
+                print('The goal is refused.' if goal else 'The goal gets no answer.')
+                return robot
+            ended = goal.get_result_async()
             robot.run(120, until=lambda: ended.done() or robot.bumps)
             robot.run(1.0)
     print(STATUS[ended.result().status] if ended.done() else 'not ended', 'bumps:', robot.bumps)
