@@ -31,6 +31,7 @@ from helpers.robot import (
 from helpers.robot.body import Body
 from helpers.robot.record import Command, Event, Scan, Step
 from helpers.robot.sensors import Sensors
+from helpers.robot.view.by_hand import Tour
 from helpers.robot.view.live import LiveView
 from helpers.ros import ros_session
 
@@ -243,6 +244,18 @@ def test_the_replay_takes_the_place_of_the_pictures(watched):
     assert all('robot-live' in data['text/html'] for _, data in pictures)
 
 
+def test_a_tour_by_hand_says_what_is_done():
+    tour = Tour({'A': (1.0, 0.0), 'B': (5.0, 0.0), 'C': (9.0, 0.0)})
+    assert tour.sentence(3.0) == ''
+    assert [x for x in range(7) if tour.comes_by(x, 0.1)] == [1, 5]
+    assert tour.sentence() == 'A and B done, C to go.'
+    assert tour.sentence(20.0, bumps=1) == 'You came to A and B, with one bump.'
+    assert tour.comes_by(9.2, 0.0)
+    assert tour.is_over
+    said = 'A, B and C in 24.3 s, without a bump. Run the cell again to be faster.'
+    assert tour.sentence(24.26) == said
+
+
 def test_bad_input_is_one_sentence():
     with pytest.raises(RuntimeError, match='No session is open'), ros_session():
         robot = Robot(EMPTY, sim_time=True)
@@ -252,6 +265,8 @@ def test_bad_input_is_one_sentence():
             watch(node)
         with pytest.raises(TypeError, match='Only a robot can be driven'):
             drive_by_hand(node)
+        with pytest.raises(TypeError, match=r'a method on_key\(forward, turn\)'):
+            drive_by_hand(robot, driver=node)
         with pytest.raises(ValueError, match='hears /imu/data: give one that hears /scan'):
             watch(robot, wrong)
         with pytest.raises(TypeError, match='give its subscription'):

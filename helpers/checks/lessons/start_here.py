@@ -1,5 +1,8 @@
-"""What the task of the lesson "Start here" is judged by."""
+"""What the tasks of the lesson "Start here" are judged by."""
 
+from geometry_msgs.msg import Twist
+
+from helpers.checks.bench import Bench
 from helpers.checks.tasks import Tasks
 from helpers.robot import Floor, Robot
 from helpers.ros import ros_session
@@ -11,7 +14,7 @@ HOUSE = Floor.from_text(
     """
 ####################
 #                  #
-#                  #
+#      A           #
 #####  #############
 #                  #
 # >                #
@@ -41,3 +44,25 @@ def through_the_door(speed):
 
     hint = 'Speed is distance divided by time: 1.75 m in 3.5 s.'
     return [('the robot goes through the door, and hits nothing', goes_through, hint)]
+
+
+@tasks.add(2)
+def a_first_node(HandDriver):
+    def publishes(forward, turn):
+        with Bench() as bench:
+            commands = bench.hear('cmd_vel', Twist)
+            driver = bench.spin(HandDriver())
+            driver.on_key(forward, turn)
+            bench.wait(lambda: commands)
+        if not commands:
+            return f'on_key({forward}, {turn}) published nothing on cmd_vel'
+        x, z = commands[-1].linear.x, commands[-1].angular.z
+        return (x, z) == (forward, turn) or (
+            f'on_key({forward}, {turn}) published linear.x = {x}, angular.z = {z}'
+        )
+
+    return [
+        ('it drives forward', lambda: publishes(0.5, 0.0), 'command.linear.x = forward'),
+        ('it drives back', lambda: publishes(-0.5, 0.0), 'command.linear.x = forward'),
+        ('it turns', lambda: publishes(0.0, 1.2), 'The same for angular.z: it is turn.'),
+    ]

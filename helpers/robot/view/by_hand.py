@@ -6,8 +6,11 @@ A press comes as a message of a widget. The kernel reads it in a thread of its o
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
+from typing import Protocol
 
 from helpers.notebook import hear_while_a_cell_runs, somebody_watches
 from helpers.replay import script, style
@@ -25,19 +28,66 @@ SPEEDS = {
     'left': (0.0, TURN),
     'right': (0.0, -TURN),
 }
+NEAR_M = 0.45  # so near, the robot is at a place, as on the site
 HELP = 'Hold a button, or click here and hold an arrow key. End ends the drive, as Interrupt does.'
 
 
-def drive_by_hand(robot: Robot, seconds: float = 60.0) -> None:
+class Driver(Protocol):
+    """A learner's node that sends what a hand wants."""
+
+    def on_key(self, forward: float, turn: float) -> None:
+        """Send a speed (m/s) and a turning rate (rad/s)."""
+
+
+class Tour:
+    """The places of a floor, and those to which a robot has come."""
+
+    def __init__(self, places: Mapping[str, tuple[float, float]]) -> None:
+        self.places, self.reached = places, []
+
+    @property
+    def is_over(self) -> bool:
+        return bool(self.places) and len(self.reached) == len(self.places)
+
+    def comes_by(self, x: float, y: float) -> bool:
+        """Note the places that are near. Return whether one is new."""
+        news = [
+            name
+            for name, place in self.places.items()
+            if name not in self.reached and math.dist(place, (x, y)) < NEAR_M
+        ]
+        self.reached += news
+        return bool(news)
+
+    def sentence(self, seconds: float | None = None, bumps: int = 0) -> str:
+        """Return what is done, and at the end how long it took."""
+        done, left = sorted(self.reached), sorted(set(self.places) - {*self.reached})
+        if seconds is None:
+            return f'{listed(done)} done, {listed(left) or "nothing"} to go.'
+        bumped = ['without a bump', 'with one bump'][bumps] if bumps < 2 else f'with {bumps} bumps'
+        if not left:
+            return f'{listed(done)} in {seconds:.1f} s, {bumped}. Run the cell again to be faster.'
+        return f'You came to {listed(done)}, {bumped}.' if done else ''
+
+
+def listed(names: list[str]) -> str:
+    return ' and '.join(filter(None, [', '.join(names[:-1]), *names[-1:]]))
+
+
+def drive_by_hand(robot: Robot, seconds: float = 60.0, driver: Driver | None = None) -> None:
     """Let a person drive the robot for some seconds, or until End. Call `watch(robot)` before.
 
-    While a button or key is held, ten commands a second go to `cmd_vel`. Where nobody watches, as
-    under nbval, it returns at once.
+    While a button or key is held, `driver.on_key(forward, turn)` is called ten times a second (m/s,
+    rad/s), and once with zeros when it is let go. Without a driver the commands go to `cmd_vel`.
+    If the floor has places, the drive is over when the robot has come to all of them, and the time
+    is said. Where nobody watches, as under nbval, it returns at once.
 
-    Raises TypeError for anything but a robot.
+    Raises TypeError for anything but a robot, and for a driver without `on_key`.
     """
     if not isinstance(robot, Robot):
         raise TypeError(f'Only a robot can be driven by hand, not {robot!r}.')
+    if driver is not None and not callable(getattr(driver, 'on_key', None)):
+        raise TypeError(f'A driver has a method on_key(forward, turn), and {driver!r} has none.')
     if not somebody_watches():
         return
     from IPython.display import HTML, display
@@ -67,15 +117,20 @@ def drive_by_hand(robot: Robot, seconds: float = 60.0) -> None:
         ),
         display_id=True,
     )
+    send = driver.on_key if driver else robot.command
     sent, sent_s = wanted, -EVERY_S
-    end_s = robot.t_s + seconds
+    begun_s = robot.t_s
+    tour = Tour(robot.floor.places)
+    said = display(HTML(''), display_id=True) if tour.places else None
 
     def go_on() -> bool:
         nonlocal sent, sent_s
         if wanted != sent or any(wanted) and robot.t_s - sent_s >= EVERY_S:
-            robot.command(*wanted)
+            send(*wanted)
             sent, sent_s = wanted, robot.t_s
-        return over or robot.t_s >= end_s
+        if said and tour.comes_by(robot.pose.x, robot.pose.y):
+            said.update(HTML(f'<p aria-live="polite">{escape(tour.sentence())}</p>'))
+        return over or tour.is_over or robot.t_s >= begun_s + seconds
 
     try:
         current_session().wait_until(go_on, 10 * seconds + 60)
@@ -83,3 +138,6 @@ def drive_by_hand(robot: Robot, seconds: float = 60.0) -> None:
         for output in (shown, keys):
             output.update({'text/html': ''}, raw=True)
         box.close()
+        if said:
+            text = escape(tour.sentence(robot.t_s - begun_s, len(robot.bumps)))
+            said.update(HTML(f'<p>{text}</p>'))

@@ -9,11 +9,17 @@ import numpy as np
 from PIL import Image
 
 from helpers.fusion import fuse, simulate
-from helpers.robot import ROOMS
-from helpers.robot.body import Body
-from helpers.robot.sensors import Sensors
-from helpers.robot.view.picture import floor_picture
-from tools.lessons.first_pictures.look import PLAYS_S, WIDTH, colour, output_of, percent, svg
+from helpers.robot import ROOMS, Robot, replay_drive
+from helpers.ros import ros_session
+from tools.lessons.first_pictures.look import (
+    PLAYS_S,
+    WIDTH,
+    colour,
+    output_of,
+    percent,
+    svg,
+    svg_of,
+)
 from tools.lessons.lesson import Lesson
 
 ASKEW = math.radians(-30)  # as MOUNTING of the lesson says
@@ -72,32 +78,37 @@ def wheels_picture(lesson: Lesson) -> str:
 def lidar_picture(_lesson: Lesson) -> str:
     """Return a floor, and the points of a lidar as if it looked ahead, as the robot believes.
 
-    The ranges are those of the course's robot, whose lidar is mounted as in the lesson.
+    The scan is that of the course's robot, whose lidar is mounted as in the lesson.
     """
-    body = Body(ROOMS)
-    robot = Sensors(0, False, None, {'base_scan': ASKEW})
-    ranges, first, step = robot.scan(body)
-    angles = body.pose.yaw + first + step * np.arange(len(ranges))
-    known = np.isfinite(ranges)
-    xs = body.pose.x + ranges[known] * np.cos(angles[known])
-    ys = body.pose.y + ranges[known] * np.sin(angles[known])
+    with ros_session():
+        robot = Robot(ROOMS, noise=False, sim_time=True, mounting={'base_scan': ASKEW})
+        robot.run(1.0)
+    scan, pose = robot.record.scans[-1], robot.pose
+    angles = pose.yaw + scan.first + scan.step * np.arange(len(scan.ranges))
+    known = np.isfinite(scan.ranges)
+    xs = pose.x + scan.ranges[known] * np.cos(angles[known])
+    ys = pose.y + scan.ranges[known] * np.sin(angles[known])
     points = ''
     for i, part in enumerate(np.array_split(np.arange(len(xs)), RAYS)):
         dots = ''.join(f'M{xs[k]:.2f} {ys[k]:.2f}h0' for k in part)
         points += (
-            f'<path class="seen" vector-effect="non-scaling-stroke" d="{dots}" '
-            f'style="animation-delay:{i * PLAYS_S / RAYS:.1f}s"/>'
+            f"<path class='seen' vector-effect='non-scaling-stroke' d='{dots}' "
+            f"style='animation-delay:{i * PLAYS_S / RAYS:.1f}s'/>"
         )
-    picture = floor_picture(ROOMS, (), body.pose).replace(
-        '<g class="robot"', f'{points}<g class="robot"'
-    )
+    picture = svg_of(html_of(replay_drive(robot.record)))
+    picture = picture.replace("<g class='robot'", f"{points}<g class='robot'")
     style = (
-        f'<style>svg{{color-scheme:light dark;color:{colour("ink")}}}'
+        f'<style>svg{{color-scheme:light dark;color:{colour("ink")}}}.fan,.start{{display:none}}'
         f'.seen{{stroke:{colour("lost")};stroke-width:5;stroke-linecap:round;'
         'animation:in .1s both}@keyframes in{from{opacity:0}}'
         '@media(prefers-reduced-motion:reduce){.seen{animation:none}}</style>'
     )
     return re.sub(r'(<svg[^>]*>)', rf'\1{style}', picture, count=1) + '\n'
+
+
+def html_of(shown) -> str:
+    """Return the page that a cell shows."""
+    return shown._repr_mimebundle_()['text/html']
 
 
 def camera_picture(lesson: Lesson, cell_id: str, degrees: list[int]) -> str:
