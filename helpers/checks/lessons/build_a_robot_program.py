@@ -811,7 +811,7 @@ def the_watchdog(workspace):
         ('once, when nothing comes for 0.3 s', stops_at(twice, [2.4, 20.6]), forget),
         ('after 0.8 s, if the parameter says so', stops_at(late, [1.85], longer), 'timeout_s'),
         ('it says so', says_so, 'node.get_logger().error(...)'),
-        ('also if no /clock comes', with_a_stopped_clock, steady),
+        ('even if no /clock comes', with_a_stopped_clock, steady),
     ]
 
 
@@ -935,7 +935,7 @@ def the_whole_node(workspace):
             'self.watchdog.seen()',
         ),
         (
-            'it stands if scans are old, or of the future',
+            'it stands if scans are old, or from the future',
             toured(wrong_stamps),
             'self.get_clock().now() - Time.from_msg(scan.header.stamp)',
         ),

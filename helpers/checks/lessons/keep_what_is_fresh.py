@@ -230,7 +230,7 @@ def how_old_is_a_scan(AgeBrake):
         ('scans of 0, 10 and 3600 s', lambda: notes(0, 10, 3600), hint),
         ('scans of 90, 20 and 0 s', lambda: notes(90, 20, 0), hint),
         (
-            'the time is that of the node, also in a simulation',
+            'the time is that of the node, even in a simulation',
             uses_the_clock_of_the_node,
             'self.get_clock().now() is the time of the node, time.time() that of the computer.',
         ),

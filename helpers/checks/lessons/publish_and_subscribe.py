@@ -252,8 +252,8 @@ def a_program_of_its_own(workspace, file):
         with workspace.start(f'exec {command}', 'import') as process:
             ended = wait_until(lambda: not process.running, 8)
         if not ended:
-            return 'who imports it is not done after 8 s: it starts to talk'
-        return process.wait() == 0 or f'who imports it gets an error: {error_in(process.lines)}'
+            return 'the import does not end within 8 s: it starts to talk'
+        return process.wait() == 0 or f'the import ends with an error: {error_in(process.lines)}'
 
     hint = 'main(): rclpy.init(), then in a try: rclpy.spin(Talker(sys.argv[1])).'
     caught = 'except (KeyboardInterrupt, ExternalShutdownException): pass'
@@ -261,7 +261,7 @@ def a_program_of_its_own(workspace, file):
     return [
         ('red talks, until Ctrl+C ends it', lambda: is_program('red'), hint),
         ('blue talks, until Ctrl+C ends it', lambda: is_program('blue'), caught),
-        ('who imports it gets the class, and nothing starts', can_be_imported, guarded),
+        ('a program that imports it gets the class, and nothing starts', can_be_imported, guarded),
     ]
 
 

@@ -163,7 +163,7 @@ def camera_and_battery(TwoTopics, make_my_executor):
             hint,
         ),
         (
-            'also when more pictures wait',
+            'even when more pictures wait',
             lambda: battery_is_heard('camera', 'camera', 'battery', 'camera', 'battery'),
             hint,
         ),
