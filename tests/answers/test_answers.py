@@ -37,7 +37,7 @@ from support.kernel import NOTEBOOKS, Kernel
 from helpers.checks.progress import with_tasks
 
 HERE = Path(__file__).parent
-RUNS_COMMANDS = re.compile(r'check\(\d+, workspace, [A-Z]')  # a text of commands
+BUILDS = re.compile(r'check\(\d+, workspace\b')  # or clones, or starts programs
 KEEP_NAMES = 'get_ipython().names_before = dict(get_ipython().user_ns)'
 PUT_NAMES_BACK = """
 def put_back(names, before):
@@ -85,7 +85,8 @@ class Lesson:
             if self.reached:
                 # Some solutions change the files that their starters have written.
                 run_all(self.kernel, self.cells['exercise'], self.cells['solution'])
-                self._run_commands()
+                # What a check builds is used by the cells below it.
+                run_all(self.kernel, filter(BUILDS.match, self.cells['check']))
             self._read_task()
 
     @contextmanager
@@ -122,12 +123,6 @@ class Lesson:
         path = self.kernel.run("print(globals()['workspace'].path)") if self._folder is None else ''
         if path.startswith('/'):
             self._folder = Path(path.strip())
-
-    def _run_commands(self) -> None:
-        """Clone or build what the next tasks need, if the check does it with given commands."""
-        for source in self.cells['check']:
-            if RUNS_COMMANDS.match(source):
-                self.kernel.run(source)
 
 
 def run_all(kernel: Kernel, *sources: list[str]) -> str:
