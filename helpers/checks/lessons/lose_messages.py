@@ -261,10 +261,15 @@ os.kill(int(sys.argv[1]), signal.SIGSTOP)
 node.create_subscription(String, 'topic', print, 100)
 time.sleep(0.2)
 os.kill(os.getpid(), signal.SIGSTOP)
-time.sleep(60)
+try:
+    time.sleep(60)
+except KeyboardInterrupt:
+    node.destroy_node()
+    rclpy.try_shutdown()
 """
 LONGER_THAN_PUBLISHING_S = 2.0
 WAITS_AT_MOST_S = 12.0
+ENDS_S = 5.0  # after Ctrl+C
 
 
 @tasks.add(7)
@@ -279,18 +284,30 @@ def a_program_of_its_own(workspace, file):
             text=True,
         )
 
+    def end(*programs):
+        """End programs as Ctrl+C does: a kill leaves the shared memory of their participants."""
+        for program in programs:
+            program.send_signal(signal.SIGCONT)
+            program.send_signal(signal.SIGINT)
+        for program in programs:
+            try:
+                program.wait(ENDS_S)
+            except subprocess.TimeoutExpired:
+                program.kill()
+                program.wait()
+
     def comes(bench, talker):
         """Wait until the talker publishes texts, or has ended. Raises Failed for another topic."""
         bench.wait(lambda: topics_of_texts(bench.tester) or talker.poll() is not None, 10)
         topics = topics_of_texts(bench.tester)
         if topics and '/topic' not in topics:
-            talker.kill()
+            end(talker)
             raise Failed(f'it publishes on {", ".join(topics)}, not on /topic')
 
     def ended(bench, talker):
         """Wait for the end of the talker. Raises Failed if it fails, or says nothing at its end."""
         if not bench.wait(lambda: talker.poll() is not None, WAITS_AT_MOST_S):
-            talker.kill()
+            end(talker)
             raise Failed('the program does not end')
         printed = talker.stdout.read().strip().splitlines()
         if talker.returncode:
@@ -337,9 +354,7 @@ def a_program_of_its_own(workspace, file):
             early = bench.wait(lambda: talker.poll() is not None, LONGER_THAN_PUBLISHING_S)
             if early:
                 ended(bench, talker)
-            for program in (talker, listener):
-                program.kill()
-                program.wait()
+            end(listener, talker)
         return not early or 'it ended although a slow subscriber had not got the messages'
 
     numbers = 'Which numbers does range(50) give?'
