@@ -20,7 +20,7 @@ function board(setup, names, { full = false, losses = 0 } = {}) {
   });
 
   const named = item => (many ? model.named(setup, item) : `${item.seq}`);
-  const message = (item, text = named(item)) => element('b', { 'data-is': `${item.callback} ${item.seq}` }, text);
+  const message = (item, text = named(item)) => ({ is: `${item.callback} ${item.seq}`, text });
 
   // Of each list its items: a class, and what is in it.
   const ITEMS = {
@@ -47,15 +47,25 @@ function board(setup, names, { full = false, losses = 0 } = {}) {
       .concat(lost.slice(-MOST).map(item => ['', message(item)])),
   };
 
+  const made = part => (part.is ? element('b', { 'data-is': part.is }, part.text) : part);
+
+  // Most lists stay as they are.
+  function put(list, items, node) {
+    const text = JSON.stringify(items);
+    if (list.has === text) return;
+    list.has = text;
+    list.replaceChildren(...items.map(node));
+  }
+
   function fill(state, stuck) {
     const kind = ({ id }) => (stuck.includes(id) ? 'replay-stuck' : 'replay-busy');
     lists.forEach((list, i) => {
-      const items = ITEMS[names[i]]?.(state, kind, stuck) ?? [['', `${state.values[names[i]] ?? 0}`]];
-      list.replaceChildren(...items.map(([kind, ...content]) => element('li', { class: kind }, ...content)));
+      const items = ITEMS[names[i]]?.(state, kind) ?? [['', `${state.values[names[i]] ?? 0}`]];
+      put(list, items, ([kind, ...content]) => element('li', { class: kind }, ...content.map(made)));
     });
     const empty = callbacks.flatMap(({ depth, name }, i) => (many && depth > 4 ? []
       : Array(Math.max(Math.min(depth, PLACES) - state.queues[i].length, 0)).fill(many ? name : '')));
-    free.replaceChildren(...empty.map(name => element('i', {}, name)));
+    put(free, empty, name => element('i', {}, name));
   }
 
   const places = () => new Map(rows.flatMap(one => [...one.querySelectorAll('[data-is]')])

@@ -169,7 +169,7 @@ function show(root, record) {
     slider.setAttribute('aria-valuetext', `step ${position} of ${last}`);
     back.disabled = position === 0;
     forth.disabled = position === last;
-    keepHeight();
+    requestAnimationFrame(keepHeight); // when the page is laid out anyway
     if (position === last) stop();
     else nameButton();
   }
