@@ -149,6 +149,8 @@ def threads_picture(lesson: Lesson, cell_id: str, name: str, seconds: float) -> 
     slower = PLAYS_S / seconds / 1e6
     moves = [Move(at * slower, kind, thread) for at, kind, _, thread in run['moves']]
     moves = [move for move in moves if move.at_s < PLAYS_S]
+    while moves[-1].kind == ARRIVE:  # it is taken within a millisecond, which is cut off
+        moves.pop()
     return _threads(lesson, run, run['setup']['callbacks'][0]['depth'], moves, PLAYS_S, '')
 
 
