@@ -22,8 +22,8 @@ KEY = 'ros2_notebooks'
 SAME, LONG = 'the same', 40
 AGAIN = 'Try again, or go on with the solution below.'
 CARD = 'border-left:4px solid {};padding:.1em .8em;margin:.2em 0;line-height:1.45'
-TITLE = 'font-size:inherit;font-weight:inherit;line-height:inherit;margin:0;padding:0'
-INDENTED, FAINT = 'margin-left:1.5em', 'margin-left:1em;opacity:.75'
+TITLE = 'display:inline;font:inherit;margin:0;padding:0'
+INDENTED, FAINT = 'margin-left:1.5em', 'font-weight:normal;margin-left:1em;opacity:.75'
 GREEN, AMBER = '#2e7d32', '#b26a00'
 
 
@@ -114,7 +114,9 @@ class Verdict:
             total = f' <span style="{FAINT}">{self.total}</span>' if self.total else ''
             heading = f'<div><b>✔ {title}</b>{total}</div>'
             if self.of == 'answer':  # JupyterLab's table of contents then shows what is solved
-                heading = f'<h4 style="{TITLE}"><b>✔ {title}</b>{total}</h4>'
+                name, rest = title.split(':', 1)
+                name = f'<h4 style="{TITLE}">✔ {name}</h4>'
+                heading = f'<div style="font-weight:bold">{name}:{rest}{total}</div>'
             rows = [heading, *rows]
         else:
             rows.append(f'<div><b>{title}</b></div>')

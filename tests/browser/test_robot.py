@@ -84,6 +84,7 @@ def test_watched_driven_and_replayed(lab):
     lab.wait_until_ran(1)
     assert complaints(lab.cells()[1]) == []
     assert page.locator('.robot-live, .by-hand').count() == 0
+    assert page.evaluate("document.activeElement.closest('.jp-Notebook') !== null")
 
     # The replay stays where the robot stopped, as large as it was. Stepped through with keys.
     shown = page.locator('.replay-on')

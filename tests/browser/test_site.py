@@ -84,12 +84,21 @@ def test_a_finger_drives_to_a_place_and_two_keys_make_a_curve(file_page, artefac
 
 def test_the_first_picture_plays_again(file_page):
     with file_page(1280, 900) as tab:
-        tab.goto((SITE / 'index.html').as_uri())
-        picture = tab.locator('img[src*=depth_10]')
-        before = picture.get_attribute('src')
-        tab.get_by_role('button', name='▶ Play again').click()
-        assert picture.get_attribute('src') != before
-        tab.wait_for_function("document.querySelector('img[src*=depth_10]').naturalWidth > 0")
+        for page in ('index.html', LESSONS[2]):
+            tab.goto((SITE / page).as_uri())
+            picture = tab.locator('img[src*="_images"]').first
+            before = picture.get_attribute('src')
+            tab.get_by_role('button', name='▶ Play again').click()
+            assert picture.get_attribute('src') != before
+            tab.wait_for_function(
+                'document.querySelector(\'img[src*="_images"]\').naturalWidth > 0'
+            )
+
+
+def test_the_list_of_lessons_shows_the_one_that_is_open(file_page):
+    with file_page(1280, 700) as tab:
+        tab.goto((SITE / LESSONS[20]).as_uri())
+        assert 0 < tab.locator('.sidebar-tree .current-page').last.bounding_box()['y'] < 650
 
 
 def test_check_and_solution_are_one_line_until_one_is_opened(file_page):

@@ -52,14 +52,23 @@ DOCUMENTS = (
 IMPORTS = ast.Import, ast.ImportFrom
 FOLDED_IMPORTS = 3  # and more of them in a cell are folded
 FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
+FIRST_PICTURE = 'first-picture'  # the cell of a lesson that has it
+SOLUTION = re.compile(r'^%%solution .*\n')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
-# The first picture plays once when it is loaded. To play it again is to load it again.
+# A first picture plays once when it is loaded: so it is loaded anew when it comes into view later.
 PLAY_AGAIN = """<p class="again"><button type="button">▶ Play again</button></p>
 <script>
-document.querySelector('.again button').onclick = () => {
-  const picture = document.querySelector('img[src*="depth_10_hits_depth_1_stops"]');
-  picture.src = `${picture.src.split('?')[0]}?${Date.now()}`;
-};
+(() => {
+  const picture = [...document.images].find(one => /_images.[^?]*[.]svg/.test(one.src));
+  const source = picture.src;
+  const play = () => { picture.src = `${source}?${Date.now()}`; };
+  document.querySelector('.again button').onclick = play;
+  new IntersectionObserver(([{ isIntersecting, time }], observer) => {
+    if (!isIntersecting) return;
+    observer.disconnect();
+    if (time > 1500) play();
+  }, { threshold: 0.6 }).observe(picture);
+})();
 </script>"""
 CONTENTS = """
 ```{{toctree}}
@@ -77,6 +86,8 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
     for cell in notebook.cells:
         if cell.cell_type == 'raw':  # a note for the instructor
             continue
+        if cell.id == FIRST_PICTURE:
+            cell.source += f'\n\n{PLAY_AGAIN}'
         if cell.cell_type == 'code':
             _fold(cell)
             cell.outputs = [output for output in cell.outputs if not is_widget(output)]
@@ -107,6 +118,8 @@ def _fold(cell: NotebookNode) -> None:
     kind = next((tag for tag in ('check', 'solution') if tag in tags(cell)), '')
     if kind:
         cell.metadata['tags'] = ['hide-cell', kind]
+        # It runs in JupyterLab. Here it would hide what the code below it is.
+        cell.source = SOLUTION.sub('', cell.source)
     elif _is_plumbing(cell):
         kind = 'imports'
         cell.metadata['tags'] = ['hide-input', kind]
@@ -168,7 +181,7 @@ def prepare(pages: Path) -> None:
         (pages / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, pages / file)
     shutil.copy(HERE / 'conf.py', pages)
-    for name in ('icon.svg', 'preview.png'):
+    for name in ('icon.svg', 'preview.png', 'sidebar.js'):
         shutil.copy(HERE / name, static)
     shutil.copytree(HERE / 'fonts', static / 'fonts')
     (static / 'site.css').write_text(LOOK_CSS + (HERE / 'site.css').read_text('utf-8'), 'utf-8')

@@ -20,6 +20,7 @@ html_title = project
 html_static_path = ['static']
 html_css_files = ['site.css']
 html_extra_path = ['downloads']
+html_js_files = ['sidebar.js']
 html_favicon = 'static/icon.svg'
 html_copy_source = False
 html_show_sphinx = False

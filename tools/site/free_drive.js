@@ -62,7 +62,7 @@ function body({ walls, start: [x, y, yaw], limits: [radius, acceleration, turnin
   return { now, step, range };
 }
 
-const HELLO = 'Come to A, B and C. Hold arrow keys, two for a curve, or the buttons, or a place of the floor.';
+const HELLO = 'Come to A, B and C. Click the floor, then hold arrow keys, two for a curve; or hold the buttons, or a place of the floor.';
 const list = names => names.join(', ').replace(/, (?=[^,]*$)/, ' and ');
 const bumped = count => (count ? `with ${count} ${count > 1 ? 'bumps' : 'bump'}` : 'without a bump');
 
@@ -70,7 +70,7 @@ const bumped = count => (count ? `with ${count} ${count > 1 ? 'bumps' : 'bump'}`
 function said(places, reached, bumps, seconds, best) {
   const left = Object.keys(places).sort().filter(name => !reached.includes(name));
   if (!reached.length) return bumps ? `A bump. Come to ${list(left)}.` : HELLO;
-  if (left.length) return `${list(reached)} ${reached.length > 1 ? 'are' : 'is'} done, ${list(left)} to go.`;
+  if (left.length) return `${list(reached)} ${reached.length > 1 ? 'are' : 'is'} done, ${list(left)} to go${bumps ? `, ${bumped(bumps)}` : ''}.`;
   const next = bumps ? 'Now without a bump?' : best < seconds ? `Your best is ${best.toFixed(1)} s.` : 'Your best so far. Faster?';
   return `${list([...reached].sort())} in ${seconds.toFixed(1)} s, ${bumped(bumps)}. ${next}`;
 }

@@ -49,3 +49,12 @@ area.addEventListener('pointerdown', onPointer);
 area.addEventListener('blur', () => byKey && release(), true);
 for (const name of ['pointerup', 'pointercancel']) window.addEventListener(name, release);
 area.querySelector('.by-hand-keys').focus({ preventScroll: true });
+// JupyterLab has brought the next cell into view, and with it pushed the picture out.
+area.scrollIntoView({ block: 'end' });
+// When the buttons go, the selected cell gets the keys: Shift+Enter runs it.
+new MutationObserver((_, observer) => {
+  if (area.querySelector('.by-hand, .by-hand-keys')) return;
+  observer.disconnect();
+  if (document.activeElement !== document.body) return;
+  area.closest('.jp-Notebook')?.querySelector('.jp-Cell.jp-mod-active')?.focus({ preventScroll: true });
+}).observe(area, { childList: true, subtree: true });

@@ -121,7 +121,7 @@ def drive_by_hand(robot: Robot, seconds: float = 60.0, driver: Driver | None = N
     sent, sent_s = wanted, -EVERY_S
     begun_s = robot.t_s
     tour = Tour(robot.floor.places)
-    said = display(HTML(''), display_id=True) if tour.places else None
+    said = display(HTML('<p>&nbsp;</p>'), display_id=True) if tour.places else None
 
     def go_on() -> bool:
         nonlocal sent, sent_s
@@ -139,5 +139,5 @@ def drive_by_hand(robot: Robot, seconds: float = 60.0, driver: Driver | None = N
             output.update({'text/html': ''}, raw=True)
         box.close()
         if said:
-            text = escape(tour.sentence(robot.t_s - begun_s, len(robot.bumps)))
+            text = escape(tour.sentence(robot.t_s - begun_s, robot.bumps))
             said.update(HTML(f'<p>{text}</p>'))

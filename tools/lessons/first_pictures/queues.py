@@ -12,7 +12,7 @@ PLACE, FIRST_X, CALLBACK_X = (
     132,
 )  # pixels: a place of the queue, the first one, the callback
 SHIFTS_S = 0.05  # until the queue has moved up by one place
-LANE, LANES_X = 28, 100  # pixels: the height of a thread's lane, and where lanes begin
+LANE, LANES_X = 28, 116  # pixels: the height of a thread's lane, and where lanes begin
 
 STYLE = """
 rect{y:1px;width:22px;height:22px;rx:4px}
@@ -34,7 +34,7 @@ THREADS = """
 .lane{stroke:COLOUR(wall);stroke-opacity:.5}
 text.number{fill:COLOUR(ground);font-size:13px}
 .thread{font-size:15px}
-@media(max-width:560px){.thread,text.number{font-size:19px}}
+@media(max-width:560px){.thread{font-size:23px}text.number{font-size:20px}}
 """
 
 
@@ -125,7 +125,7 @@ def queue_picture(lesson: Lesson, cell_id: str) -> str:
         f'<text class="ink" x="{FIRST_X}" y="20">queue of {depth} messages</text>'
         f'<g transform="translate(0 32)"><rect x="{CALLBACK_X}" class="busy"/>{looks(moves)}'
         f'{messages}{places(depth)}</g>'
-        f'<text class="says ink" style="animation-delay:{PLAYS_S}s" x="{FIRST_X}" y="84">'
+        f'<text class="says ink" style="animation-delay:{PLAYS_S}s" x="16" y="84">'
         'It is full. What will happen to the next message?</text>'
     )
     return svg(104, f'The real queue of {lesson.name}', STYLE + css, body)
