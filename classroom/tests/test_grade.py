@@ -387,12 +387,12 @@ def test_a_second_run_goes_on_where_the_first_one_ended(submit, capsys):
     folder = submit(**files)
     assert main([str(folder)], where) == 0
     assert where.count == 4
-    assert 'Student 001: lesson 00: 1 of 1\n' in capsys.readouterr().out
+    assert 'Student 001: lesson 00: 1 of 2\n' in capsys.readouterr().out
     changed = next(iter(files))
     submit(**{changed: with_answer(RIGHT), 'New_9_assignsubmission_file/a.ipynb': files[changed]})
     assert main([str(folder), '--jobs', '2'], where) == 0
     assert where.count == 6
-    assert 'Student 001: lesson 00: 1 of 1, judged before' in capsys.readouterr().out
+    assert 'Student 001: lesson 00: 1 of 2, judged before' in capsys.readouterr().out
     assert [row['points'] for row in rows_of(folder)] == ['0', '1', '1', '0', '1']
 
 
@@ -427,12 +427,12 @@ def test_a_line_for_each_strange_submission(submit, capsys):
     assert main([str(folder)], Stand()) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[:8] == [
-        '=cmd(): lesson 00: 0 of 1',
-        'Ada: lesson 00: 1 of 1',
+        '=cmd(): lesson 00: 0 of 2',
+        'Ada: lesson 00: 1 of 2',
         'Bob: 02.ipynb is lesson 02, not asked for; lesson 00 is not there',
         'Cy: no notebook, but notes.txt',
-        'Di: lesson 00: 0 of 1; nothing is written in lesson 00',
-        'Eve: lesson 00: 0 of 1; lesson 00 is there twice: a.ipynb counts',
+        'Di: lesson 00: 0 of 2; nothing is written in lesson 00',
+        'Eve: lesson 00: 0 of 2; lesson 00 is there twice: a.ipynb counts',
         'Fay: own.ipynb is no lesson of this course',
         f'{folder}_graded: grades.csv, feedback.zip, equal_answers.txt',
     ]
@@ -465,7 +465,7 @@ def test_moodle_takes_its_worksheet_back(submit, capsys):
     assert main([str(folder)], Stand()) == 0
     one, absent, other = rows_of(folder, 'moodle.csv')
     assert 'Student 000 is not in Grades-X.csv, by number and name' in capsys.readouterr().out
-    assert one['Grade'] == '100.00'
+    assert one['Grade'] == '50.00'
     assert one['Email address'] == 'a@b.c'
     assert one['Last modified (grade)'] == '-'
     assert absent['Grade'] == other['Grade'] == ''
@@ -538,7 +538,7 @@ def test_canvas_takes_its_gradebook_back(submit, capsys):
     possible, ada, alan = rows_of(folder, 'canvas.csv')
     assert list(ada) == [*tables.CANVAS, 'Start here (71)']
     assert possible['Start here (71)'] == '50'
-    assert (ada['Start here (71)'], alan['Start here (71)']) == ('50.00', '3')
+    assert (ada['Start here (71)'], alan['Start here (71)']) == ('25.00', '3')
     assert rows_of(folder)[0]['late'] == 'late'
     assert main([str(folder), '--assignment', 'none of them'], Stand()) == 0
     assert 'Start here (71), Essay (72). Name yours with ASSIGNMENT=' in capsys.readouterr().out
@@ -548,7 +548,7 @@ def test_canvas_without_a_gradebook(submit):
     folder = submit(**{'lovelaceada_55_9_x.ipynb': with_answer(RIGHT)})
     assert main([str(folder)], Stand()) == 0
     possible, ada = rows_of(folder, 'canvas.csv')
-    assert (ada['ID'], ada['Start here'], possible['Start here']) == ('55', '1', '1')
+    assert (ada['ID'], ada['Start here'], possible['Start here']) == ('55', '1', '2')
 
 
 def test_feedback_has_verdicts_and_no_solution(submit):
@@ -559,7 +559,7 @@ def test_feedback_has_verdicts_and_no_solution(submit):
         text = archive.read(archive.namelist()[1]).decode()
     found = nbformat.reads(text, as_version=4)
     nbformat.validate(found)
-    assert found.cells[0].source.startswith('# 1 of 1 tasks are solved')
+    assert found.cells[0].source.startswith('# 1 of 2 tasks are solved')
     [answer] = [cell for cell in found.cells if cell.id == STARTER]
     [check] = [cell for cell in found.cells if cell.id == 'check-00-1']
     assert answer.source == RIGHT
@@ -637,7 +637,7 @@ def test_real_checks_judge_and_survive(submit, capsys):
     folder = submit(**files, **{'Cy/c.ipynb': with_answer(HOSTILE)})
     assert main([str(folder), '--trust']) == 0
     assert capsys.readouterr().out.splitlines()[:3] == [
-        'Ada: lesson 00: 1 of 1',
-        'Bob: lesson 00: 0 of 1',
-        'Cy: lesson 00: 0 of 1; task 1: its code ended the kernel',
+        'Ada: lesson 00: 1 of 2',
+        'Bob: lesson 00: 0 of 2',
+        'Cy: lesson 00: 0 of 2; task 1: its code ended the kernel',
     ]
