@@ -4,7 +4,15 @@ import math
 import re
 from itertools import pairwise
 
-from tools.lessons.first_pictures.look import PLAYS_S, colour, output_of, percent, runs_of, svg_of
+from tools.lessons.first_pictures.look import (
+    PLAYS_S,
+    colour,
+    output_of,
+    percent,
+    runs_of,
+    styled,
+    svg_of,
+)
 from tools.lessons.lesson import Lesson
 
 TRAIL = 2.6  # pixels
@@ -37,7 +45,7 @@ def drive_picture(lesson: Lesson, cell_id: str, share: float = 1) -> str:
     svg = re.sub(r"<path[^>]* class='driven'[^>]*/>", '', svg)
     svg = svg.replace(" class='all'", " class='all' pathLength='1'")
     style = (
-        f'<style>svg{{color-scheme:light dark;color:{colour("ink")}}}.fan,.old{{display:none}}'
+        f'svg{{color-scheme:light dark;color:{colour("ink")}}}.fan,.old{{display:none}}'
         f'.robot,.robot>g,.all{{animation:move {PLAYS_S}s linear both}}'
         '.robot>g{animation-name:turn}'
         # A dash has the length of the way only where the line is scaled with its floor.
@@ -46,6 +54,6 @@ def drive_picture(lesson: Lesson, cell_id: str, share: float = 1) -> str:
         f'.seconds{{animation:comes .3s {PLAYS_S}s both}}'
         f'.bumps{{animation:comes .1s {bump_s:.2f}s both}}@keyframes comes{{from{{opacity:0}}}}'
         f'@keyframes move{{{moves}}}@keyframes turn{{{turns}}}@keyframes trail{{{trail}}}'
-        '@media(prefers-reduced-motion:reduce){svg *{animation:none!important}}</style>'
+        '@media(prefers-reduced-motion:reduce){svg *{animation:none!important}}'
     )
-    return re.sub(r'(<svg[^>]*>)', rf'\1{style}', svg, count=1) + '\n'
+    return styled(svg, style)

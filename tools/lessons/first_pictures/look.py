@@ -59,6 +59,11 @@ def svg_of(page: str) -> str:
     return unquote(re.search(r'src="data:image/svg\+xml,([^"]*)"', page)[1])
 
 
+def styled(picture: str, style: str) -> str:
+    """Return a saved picture with a style of its own."""
+    return re.sub(r'(<svg[^>]*>)', rf'\1<style>{style}</style>', picture, count=1) + '\n'
+
+
 def colour(name: str) -> str:
     return 'light-dark({},{})'.format(*PAIRS[name])
 

@@ -6,11 +6,8 @@ from tools.lessons.first_pictures.look import PLAYS_S, WIDTH, moving, output_of,
 from tools.lessons.lesson import Lesson
 
 ARRIVE, TAKE, END = range(3)  # moves of a replay
-PLACE, FIRST_X, CALLBACK_X = (
-    26,
-    186,
-    132,
-)  # pixels: a place of the queue, the first one, the callback
+# Pixels: the width of a place of the queue, and where the first one and the callback are.
+PLACE, FIRST_X, CALLBACK_X = 26, 186, 132
 SHIFTS_S = 0.05  # until the queue has moved up by one place
 LANE, LANES_X = 28, 116  # pixels: the height of a thread's lane, and where lanes begin
 
@@ -140,7 +137,7 @@ def gate_picture(lesson: Lesson, cell_id: str) -> str:
     depth, moves = until_full(run)
     moves = [move._replace(at_s=PLAYS_S * i / len(moves)) for i, move in enumerate(moves)]
     says = 'The queue is full, and more messages come.'
-    return _threads(lesson, run, depth, moves, PLAYS_S, says)
+    return _threads(lesson, run, depth, moves, says)
 
 
 def threads_picture(lesson: Lesson, cell_id: str, name: str, seconds: float) -> str:
@@ -151,15 +148,13 @@ def threads_picture(lesson: Lesson, cell_id: str, name: str, seconds: float) -> 
     moves = [move for move in moves if move.at_s < PLAYS_S]
     while moves[-1].kind == ARRIVE:  # it is taken within a millisecond, which is cut off
         moves.pop()
-    return _threads(lesson, run, run['setup']['callbacks'][0]['depth'], moves, PLAYS_S, '')
+    return _threads(lesson, run, run['setup']['callbacks'][0]['depth'], moves)
 
 
-def _threads(
-    lesson: Lesson, run: dict, depth: int, moves: list[Move], end_s: float, says: str
-) -> str:
+def _threads(lesson: Lesson, run: dict, depth: int, moves: list[Move], says: str = '') -> str:
     messages, css = tape(depth, moves)
     right = WIDTH - 16
-    scale = (right - LANES_X) / end_s
+    scale = (right - LANES_X) / PLAYS_S
     lanes = bars = ''
     for i, name in enumerate(run['setup']['threads']):
         y = i * LANE
@@ -169,7 +164,9 @@ def _threads(
         )
     begun: dict[int, tuple[float, int]] = {}
     taken = 0
-    for at_s, kind, thread in [*moves, *(Move(end_s, END, thread) for thread in range(99))]:
+    # What still runs at the end of the picture is cut off there.
+    ends = [Move(PLAYS_S, END, thread) for thread in range(len(run['setup']['threads']))]
+    for at_s, kind, thread in [*moves, *ends]:
         if kind == TAKE:
             begun[thread] = at_s, taken
             taken += 1
@@ -191,7 +188,7 @@ def _threads(
     )
     if says:
         body += (
-            f'<text class="says ink" style="animation-delay:{end_s}s" x="16" y="{height - 16}">'
+            f'<text class="says ink" style="animation-delay:{PLAYS_S}s" x="16" y="{height - 16}">'
             f'{says}</text>'
         )
     return svg(height, f'A real run of {lesson.name}', STYLE + THREADS + css, body)

@@ -17,6 +17,7 @@ from tools.lessons.first_pictures.look import (
     colour,
     output_of,
     percent,
+    styled,
     svg,
     svg_of,
 )
@@ -55,7 +56,7 @@ def wheels_picture(lesson: Lesson) -> str:
             css += f'{{transform:translate({xs[i]:.0f}px,{ys[i]:.0f}px)}}'
         css += '}'
         body += (
-            f'<path class="{name} way-{name}" d="{line}" pathLength="1"/>'
+            f'<path class="{name}" d="{line}" pathLength="1"/>'
             f'<circle class="{name}" r="9" transform="translate({xs[-1]:.0f} {ys[-1]:.0f})" '
             f'style="animation-name:{name}"/>'
         )
@@ -98,12 +99,12 @@ def lidar_picture(_lesson: Lesson) -> str:
     picture = svg_of(html_of(replay_drive(robot.record)))
     picture = picture.replace("<g class='robot'", f"{points}<g class='robot'")
     style = (
-        f'<style>svg{{color-scheme:light dark;color:{colour("ink")}}}.fan,.start{{display:none}}'
+        f'svg{{color-scheme:light dark;color:{colour("ink")}}}.fan,.start{{display:none}}'
         f'.seen{{stroke:{colour("lost")};stroke-width:5;stroke-linecap:round;'
         'animation:in .1s both}@keyframes in{from{opacity:0}}'
-        '@media(prefers-reduced-motion:reduce){.seen{animation:none}}</style>'
+        '@media(prefers-reduced-motion:reduce){.seen{animation:none}}'
     )
-    return re.sub(r'(<svg[^>]*>)', rf'\1{style}', picture, count=1) + '\n'
+    return styled(picture, style)
 
 
 def html_of(shown) -> str:
