@@ -68,20 +68,24 @@ function board(setup, names, { full = false, losses = 0 } = {}) {
     put(free, empty, name => element('i', {}, name));
   }
 
+  // Where each message is drawn, within the board: the page is laid out once a step.
   const places = () => new Map(rows.flatMap(one => [...one.querySelectorAll('[data-is]')])
-    .map(node => [node.dataset.is, { node, at: node.getBoundingClientRect() }]));
+    .map(node => [node.dataset.is, { node, x: node.offsetLeft, y: node.offsetTop }]));
+  let before;
 
   function draw(state, stuck = []) {
-    if (matchMedia('(prefers-reduced-motion: reduce)').matches) return fill(state, stuck);
-    const before = places();
     fill(state, stuck);
-    places().forEach(({ node, at }, is) => {
-      const from = before.get(is)?.at;
-      if (from && from.x === at.x && from.y === at.y) return;
-      const start = from ? { transform: `translate(${from.x - at.x}px, ${from.y - at.y}px)` }
-        : { transform: 'translate(2em)', opacity: 0 };
-      node.animate([start, { transform: 'none' }], { duration: MOVES_MS, easing: 'ease-out' });
-    });
+    if (matchMedia('(prefers-reduced-motion: reduce)').matches || !rows[0].offsetParent) return;
+    const now = places();
+    if (before) now.forEach(({ node, x, y }, is) => move(node, x, y, before.get(is)));
+    before = now;
+  }
+
+  function move(node, x, y, from) {
+    if (from && from.x === x && from.y === y) return;
+    const start = from ? { transform: `translate(${from.x - x}px, ${from.y - y}px)` }
+      : { transform: 'translate(2em)', opacity: 0 };
+    node.animate([start, { transform: 'none' }], { duration: MOVES_MS, easing: 'ease-out' });
   }
 
   return { rows, draw };

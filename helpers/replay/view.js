@@ -3,6 +3,7 @@
 
 const PLAYS_S = 10; // about so long a run plays
 const SPEEDS = [1, 2, 4, 0.5]; // and how much faster or slower
+const SHORT_US = 1e4; // of a run of less, milliseconds are shown
 const HOLD_MS = 1200; // a sentence while it plays, at least
 
 // How many times as fast as it was a run of so many microseconds plays: a number that is easily read.
@@ -19,8 +20,8 @@ function drawing(image) {
   return seen(svg, image.alt);
 }
 
-// The lists and the picture of one run.
-function panel(run, record, image, [from, until], grouped) {
+// The lists and the picture of one run. A short one has its times in milliseconds.
+function panel(run, record, image, [from, until], grouped, short) {
   const { setup, name } = record;
   const many = setup.callbacks.length > 1;
   const names = ['threads', ...(grouped ? ['groups'] : []), 'queue', ...(many ? [] : ['lost'])];
@@ -44,7 +45,7 @@ function panel(run, record, image, [from, until], grouped) {
 
   // Put the clock and the cursor to a time.
   function point(us) {
-    time.textContent = `${(us / 1e6).toFixed(3)} s`;
+    time.textContent = short ? `${(us / 1e3).toFixed(3)} ms` : `${(us / 1e6).toFixed(3)} s`;
     const part = Math.min(Math.max((us / 1e6 - from) / (until - from), 0), 1);
     cursor.setAttribute('transform', `translate(${(part * svg.dataset.wide).toFixed(1)})`);
   }
@@ -92,9 +93,12 @@ function show(root, record) {
   const named = (who, text) => (record.runs[who].name ? `${record.runs[who].name}: ` : '') + text;
   const outcome = record.runs.flatMap((one, who) => (one.outcome ?? runs[who].end ? [named(who, one.outcome ?? runs[who].end.says)] : [])).join(' ');
   // It opens where it tells most: at the bump of the drive, else at the last loss, else at the end.
+  // A page whose reader is to guess first opens it at its start.
   const drives = record.runs.flatMap((one, who) => (one.setup ? [] : [who]));
+  const hides = root.dataset.opens === 'start';
   const bump = drives.length === 1 && record.opens !== 'end' ? stops[drives[0]][0] : undefined;
-  const telling = bump ?? (drives.length ? last : losses.at(-1) ?? last);
+  const telling = hides ? 0 : bump ?? (drives.length ? last : losses.at(-1) ?? last);
+  const length = steps.at(-1)?.us ?? 0;
   let position = 0;
   let fresh = true; // as it was opened
   let playing = null;
@@ -104,7 +108,7 @@ function show(root, record) {
   const images = [...root.querySelectorAll('figure > img')];
   // One thread that runs one callback needs no group to be understood.
   const grouped = record.runs.some(({ setup }) => setup?.callbacks.length > 1 || setup?.threads.length > 1);
-  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped)
+  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped, length < SHORT_US)
     : floor(runs[i], one, drawing(images[i]))));
   const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
   const slider = element('input', {
@@ -114,7 +118,7 @@ function show(root, record) {
   const button = (name, onclick, label, kind) =>
     element('button', { type: 'button', onclick, 'aria-label': label, class: kind }, name);
   const play = button('', toggle, undefined, 'replay-play');
-  const usual = pace(steps.at(-1)?.us ?? 0);
+  const usual = pace(length);
   const rate = () => +(usual * SPEEDS[speed]).toPrecision(2);
   const faster = button('', () => {
     speed = (speed + 1) % SPEEDS.length;
@@ -125,8 +129,9 @@ function show(root, record) {
   const shown = element('div', { class: 'replay-runs' }, ...panels.map(({ node }) => node));
 
   function nameSpeed() {
-    faster.textContent = `${rate()}×`;
-    faster.ariaLabel = `speed ${rate()}×`;
+    const slower = +(1 / rate()).toPrecision(2);
+    faster.textContent = slower < 10 ? `${rate()}×` : `1/${slower.toLocaleString('en')}×`;
+    faster.ariaLabel = `speed ${faster.textContent}`;
   }
 
   // A text that changes is read out, but not while it changes all the time.
@@ -187,7 +192,8 @@ function show(root, record) {
     }
     if (shown.offsetHeight <= tall) return;
     tall = shown.offsetHeight;
-    shown.style.minHeight = `${tall}px`;
+    // On a slide the letters change their size later.
+    shown.style.minHeight = `${(tall / parseFloat(getComputedStyle(shown).fontSize)).toFixed(2)}em`;
   }
 
   function rest(to) {
@@ -296,8 +302,11 @@ function show(root, record) {
   root.querySelector('.replay-on > p').before(controls, says, shown); // which is then below
   nameSpeed();
   rest(telling);
-  fresh = true;
-  if (bump !== undefined && outcome) says.textContent = outcome;
+  fresh = !hides;
+  if (hides) {
+    says.textContent = 'Have you guessed? Then play it.';
+    shown.nextElementSibling.remove(); // it tells the end
+  } else if (bump !== undefined && outcome) says.textContent = outcome;
   nameButton();
 }
 
