@@ -114,6 +114,27 @@ def test_check_and_solution_are_one_line_until_one_is_opened(file_page):
         assert check.bounding_box()['y'] < solution.bounding_box()['y']
 
 
+def test_a_guess_comes_before_its_answer(file_page):
+    with file_page(1280, 740) as tab:
+        tab.goto((SITE / LESSONS[6]).as_uri())
+        answer = tab.locator('.cell.tag_answer > details').first
+        replay = answer.get_by_role('group', name='replay').first
+        assert not replay.is_visible()
+        answer.locator('summary').click()
+        slider, says = replay.get_by_label('step'), replay.locator('.replay-says')
+        assert (slider.input_value(), says.inner_text()) == ('0', 'Have you guessed? Then play it.')
+        slider.press('End')
+        assert 'The robot hit the wall' in says.inner_text()
+
+
+def test_on_paper_answers_are_open(file_page):
+    with file_page(794, 1123) as tab:
+        tab.goto((SITE / LESSONS[2]).as_uri())
+        tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+        tab.emulate_media(media='print')
+        assert tab.get_by_text('The answer is 6, 7, 8.').is_visible()
+
+
 def test_search_finds_a_term_in_each_language(file_page):
     # It also wants a piece of each page that it finds, which a browser does not read from a file.
     with file_page(1280, 740, expected=('Failed to fetch',)) as tab:

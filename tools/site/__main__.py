@@ -4,7 +4,8 @@
 
 Sphinx and myst-nb make the pages from the saved outputs: nothing runs. What they read is prepared
 in .site/pages: the documents, and the notebooks without notes for the instructor, with
-checks, solutions and imports folded, their figures as files, and a link to the lesson as it is.
+checks, solutions, imports and the answers of guesses folded, their figures as files, and a link to
+the lesson as it is.
 """
 
 import ast
@@ -14,6 +15,7 @@ import re
 import shutil
 import sys
 from base64 import b64decode
+from collections.abc import Callable
 from copy import deepcopy
 from pathlib import Path
 
@@ -24,6 +26,7 @@ from sphinx.cmd.build import build_main
 
 from helpers.notebook import LOOK_CSS
 from helpers.replay import level
+from tools.lessons.code import guess_of
 from tools.lessons.lesson import (
     FOLDER,
     GLOSSARY,
@@ -52,7 +55,11 @@ DOCUMENTS = (
 IMPORTS = ast.Import, ast.ImportFrom
 FOLDED_IMPORTS = 3  # and more of them in a cell are folded
 FIGURE = re.compile(r'<img (?P<alt>[^>]*?)src="data:image/png;base64,(?P<png>[^"]+)"')
+SCRIPT = re.compile(r'<script>(?P<text>\(\(\).*?)</script>', re.DOTALL)
+STYLE = re.compile(r'<style>(?P<text>.*?)</style>', re.DOTALL)
 FIRST_PICTURE = 'first-picture'  # the cell of a lesson that has it
+AT_START = '<div class="replay" ', '<div class="replay" data-opens="start" '  # see view.js
+ANSWER = 'Guess first, then open the answer'
 SOLUTION = re.compile(r'^%%solution .*\n')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
 # A first picture plays once when it is loaded: so it is loaded anew when it comes into view later.
@@ -83,6 +90,7 @@ CONTENTS = """
 def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
     """Return a notebook as myst-nb shall read it, and write its figures into a folder."""
     notebook, cells = deepcopy(notebook), []
+    _hide_answers(notebook.cells)
     for cell in notebook.cells:
         if cell.cell_type == 'raw':  # a note for the instructor
             continue
@@ -131,6 +139,25 @@ def _fold(cell: NotebookNode) -> None:
         cell.metadata['mystnb'] = {'code_prompt_show': words, 'code_prompt_hide': words}
 
 
+def _hide_answers(cells: list[NotebookNode]) -> None:
+    """Fold the output that answers a guess, and open the replays before it at their start."""
+    question = ''
+    for cell in cells:
+        if parts := guess_of(cell):
+            question = parts[1]
+        elif cell.cell_type == 'code' and question:
+            for data in (output.get('data', {}) for output in cell.outputs):
+                if 'text/html' in data:
+                    data['text/html'] = data['text/html'].replace(*AT_START)
+            if repr(question) in cell.source:
+                question = ''
+                # One that moves from run to run is not saved: see compare_prediction.
+                if not any('The answer is' in output.get('text', '') for output in cell.outputs):
+                    continue
+                cell.metadata['tags'] = [*tags(cell), 'hide-output', 'answer']
+                cell.metadata['mystnb'] = {'code_prompt_show': ANSWER, 'code_prompt_hide': ANSWER}
+
+
 def _is_plumbing(cell: NotebookNode) -> bool:
     """Return whether a cell only imports, and perhaps names a folder, and has nothing to show."""
     try:
@@ -143,7 +170,18 @@ def _is_plumbing(cell: NotebookNode) -> bool:
 
 
 def _with_files(text: str, figures: Path) -> str:
-    """Write the figures of an output into a folder, and return its HTML with links to them."""
+    """Write the figures and scripts of an output into a folder, and link to them in its HTML.
+
+    In a notebook, each replay has all that it needs. Here they share it.
+    """
+
+    def share(kind: str, link: str) -> Callable[[re.Match], str]:
+        def write(found: re.Match) -> str:
+            name = f'{hashlib.sha256(found["text"].encode()).hexdigest()[:16]}.{kind}'
+            (figures / name).write_text(found['text'], encoding='utf-8')
+            return link.format(f'../_static/figures/{name}')
+
+        return write
 
     def write(figure: re.Match) -> str:
         png = b64decode(figure['png'])
@@ -153,6 +191,8 @@ def _with_files(text: str, figures: Path) -> str:
         size = f'width="{image.width}" height="{image.height}" loading="lazy"'
         return f'<img {figure["alt"]}{size} src="../_static/figures/{name}"'
 
+    text = SCRIPT.sub(share('js', '<script src="{}"></script>'), text)
+    text = STYLE.sub(share('css', '<link rel="stylesheet" href="{}">'), text)
     return FIGURE.sub(write, text)
 
 
@@ -181,7 +221,7 @@ def prepare(pages: Path) -> None:
         (pages / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, pages / file)
     shutil.copy(HERE / 'conf.py', pages)
-    for name in ('icon.svg', 'preview.png', 'sidebar.js'):
+    for name in ('icon.svg', 'preview.png', 'sidebar.js', 'paper.js'):
         shutil.copy(HERE / name, static)
     shutil.copytree(HERE / 'fonts', static / 'fonts')
     (static / 'site.css').write_text(LOOK_CSS + (HERE / 'site.css').read_text('utf-8'), 'utf-8')
