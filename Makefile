@@ -62,6 +62,9 @@ notebooks: set_up ## run the notebooks, save their outputs, and the tables and p
 lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04; REMOVE=yes takes it out
 	@$(PYTHON) -m tools.lessons.new "$(NAME)" $(if $(AFTER),--after "$(AFTER)") $(if $(filter yes,$(REMOVE)),--remove)
 
+task: set_up ## begin a task in a lesson: LESSON=02, AFTER=3
+	@$(PYTHON) -m tools.lessons.task "$(LESSON)" $(if $(AFTER),--after "$(AFTER)")
+
 lint: set_up ## check style and format with ruff
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
 
@@ -110,7 +113,7 @@ set_up:
 	@mkdir -p .jupyter && tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
-test test-ros2 test-tools test-packages test-answers test-browser test-classroom notebooks lesson soak bench lint: groups := test
+test test-ros2 test-tools test-packages test-answers test-browser test-classroom notebooks lesson task soak bench lint: groups := test
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 

@@ -25,6 +25,7 @@ import re
 import shutil
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -48,6 +49,7 @@ def put_back(names, before):
 put_back(get_ipython().user_ns, get_ipython().names_before)
 """
 LEAST = {'wrong': 5, 'right': 3}  # answers of a task
+Cells = dict[str, list[str]]  # of a task, by their tag
 
 FILES = sorted(HERE.glob('*.yaml'))
 
@@ -63,6 +65,25 @@ def tag_of(cell: nbformat.NotebookNode) -> str:
     return tags.pop() if tags else ''
 
 
+def read_tasks(name: str) -> list[tuple[list[str], Cells]]:
+    """Return for each task of a lesson the cells above it, and its own."""
+    [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{name}.ipynb')
+    tasks, above, own = [], [], defaultdict(list)
+    for cell in nbformat.read(path, 4).cells:
+        if cell.cell_type != 'code':
+            continue
+        tag, source = tag_of(cell), cell.source
+        if not tag:
+            above.append(source)
+        elif tag != 'solution':
+            own[tag].append(source)
+        else:
+            own[tag].append(source.split('\n', 1)[1])
+            tasks.append((above, own))
+            above, own = [], defaultdict(list)
+    return tasks
+
+
 class Lesson:
     """A lesson in a kernel: its tasks are judged in their order, in one pass through its cells.
 
@@ -71,13 +92,11 @@ class Lesson:
     """
 
     def __init__(self, name: str) -> None:
-        [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{name}.ipynb')
         self.name, self.kernel = name, Kernel()
-        self._cells = [cell for cell in nbformat.read(path, 4).cells if cell.cell_type == 'code']
-        self._position = 0
+        self._tasks = read_tasks(name)
         self._folder: Path | None = None  # of its workspace
         self.reached = 0  # the task whose cells are `cells`
-        self.cells: dict[str, list[str]] = {}  # by their tag
+        self.cells: Cells = {}
 
     def go_to(self, task: int) -> None:
         """Run the cells above a task."""
@@ -87,7 +106,7 @@ class Lesson:
                 run_all(self.kernel, self.cells['exercise'], self.cells['solution'])
                 # What a check builds is used by the cells below it.
                 run_all(self.kernel, filter(BUILDS.match, self.cells['check']))
-            self._read_task()
+            self._reach_next()
 
     @contextmanager
     def undone(self) -> Iterator[None]:
@@ -104,22 +123,11 @@ class Lesson:
                 shutil.copytree(kept, self._folder, symlinks=True, dirs_exist_ok=True)
         self.kernel.run(PUT_NAMES_BACK)
 
-    def _read_task(self) -> None:
-        """Run the cells above the next task, and collect those of the task."""
-        self.cells = {'exercise': [], 'check': [], 'solution': []}
+    def _reach_next(self) -> None:
+        """Run the cells above the next task."""
+        above, self.cells = self._tasks[self.reached]
         self.reached += 1
-        while not self.cells['solution']:
-            assert self._position < len(self._cells), (
-                f'The lesson {self.name} has no task {self.reached}.'
-            )
-            cell = self._cells[self._position]
-            self._position += 1
-            tag, source = tag_of(cell), cell.source
-            if tag:
-                source = source.split('\n', 1)[1] if tag == 'solution' else source
-                self.cells[tag].append(source)
-            else:
-                self.kernel.run(source)
+        run_all(self.kernel, above)
         path = self.kernel.run("print(globals()['workspace'].path)") if self._folder is None else ''
         if path.startswith('/'):
             self._folder = Path(path.strip())
@@ -130,20 +138,25 @@ def run_all(kernel: Kernel, *sources: list[str]) -> str:
     return ''.join(kernel.run(source) for group in sources for source in group)
 
 
-def judge(kernel: Kernel, answers: list, key: str, cells: dict[str, list[str]]) -> None:
+def made(answers: list, key: str, cells: Cells) -> list[str]:
+    """Return the sources of the answers below a key of the file."""
+    least = LEAST[key.split()[1]]
+    assert len(answers) >= least, (
+        f'There are {len(answers)} answers below `{key}:`, and at least {least} are wanted.'
+    )
+    try:
+        return [source_of(answer, *cells['solution'], *cells['exercise']) for answer in answers]
+    except ValueError as error:
+        text = f'An answer below `{key}:` cannot be made. {error}'
+        raise pytest.fail.Exception(text, pytrace=False) from None
+
+
+def judge(kernel: Kernel, sources: list[str], key: str, cells: Cells) -> None:
     """Run each answer, and its check twice: each time it must find of which kind the answer is."""
     kind = key.split()[1]
-    assert len(answers) >= LEAST[kind], (
-        f'There are {len(answers)} answers below `{key}:`, and at least {LEAST[kind]} are wanted.'
-    )
     starters = cells['exercise']
     files = starters if len(starters) > 1 else []  # the answer changes what they have written
-    for answer in answers:
-        try:
-            source = source_of(answer, *cells['solution'], *starters)
-        except ValueError as error:
-            text = f'An answer below `{key}:` cannot be made. {error}'
-            raise pytest.fail.Exception(text, pytrace=False) from None
+    for source in sources:
         said = run_all(kernel, files, [source])
         for _ in range(2):
             said += run_all(kernel, cells['check'])
@@ -195,7 +208,13 @@ def open_lesson():
     ids=lambda value: value if isinstance(value, str) else f'task_{value:02d}',
 )
 def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson):
-    answers = answers_of(HERE / f'{lesson}.yaml')
+    answers, tasks = answers_of(HERE / f'{lesson}.yaml'), read_tasks(lesson)
+    assert task <= len(tasks), f'The lesson {lesson} has no task {task}.'
+    # Before the cells above the task have run: that takes a while.
+    wrong, right = (
+        made(answers.get(f'{task} {kind}', []), f'{task} {kind}', tasks[task - 1][1])
+        for kind in LEAST
+    )
     with open_lesson(lesson, task) as opened:
         kernel, cells = opened.kernel, opened.cells
         run_all(kernel, cells['exercise'])
@@ -205,7 +224,7 @@ def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson):
         assert [verdict['solved'] for verdict in kernel.verdicts] == [False], (
             f'The starter must be wrong. Its check said:\n{said}'
         )
-        judge(kernel, answers.get(f'{task} wrong', []), f'{task} wrong', cells)
+        judge(kernel, wrong, f'{task} wrong', cells)
         # What a right answer builds stays, so the solution comes after the wrong ones.
         run_all(kernel, cells['exercise'])
         started = time.monotonic()
@@ -214,7 +233,7 @@ def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson):
         assert [(verdict['of'], verdict['solved']) for verdict in kernel.verdicts] == [
             ('solution', True)
         ], said
-        judge(kernel, answers.get(f'{task} right', []), f'{task} right', cells)
+        judge(kernel, right, f'{task} right', cells)
 
 
 def test_each_task_of_a_lesson_has_answers():

@@ -10,8 +10,18 @@ import yaml
 
 
 def answers_of(path: Path) -> dict[str, list]:
-    """Return the answers in a file, by their task and kind: '3 wrong'."""
-    return yaml.load(path.read_text(encoding='utf-8'), yaml.BaseLoader)
+    """Return the answers in a file, by their task and kind: '3 wrong'.
+
+    Raises ValueError with the file and the line if it cannot be read.
+    """
+    try:
+        return yaml.load(path.read_text(encoding='utf-8'), yaml.BaseLoader)
+    except yaml.MarkedYAMLError as error:
+        where = error.problem_mark or error.context_mark
+        raise ValueError(
+            f'{path.name}, line {where.line + 1}: {error.problem}. YAML wants quotes around some '
+            'texts: the top of tests/answers/test_answers.py says which.'
+        ) from None
 
 
 def source_of(answer: str | dict[str, str], *sources: str) -> str:

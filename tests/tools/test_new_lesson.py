@@ -1,14 +1,17 @@
-"""A lesson is added and taken out in a copy of this checkout, where all rules still hold."""
+"""A lesson or a task is added, or a lesson taken out, in a copy of this checkout: rules hold."""
 
 import os
+import re
 import subprocess
 import sys
 
+import nbformat
 import pytest
+import yaml
 from support.checkouts import copy_checkout, git
 
-from tools.lessons import new, run
-from tools.lessons.lesson import lessons
+from tools.lessons import new, run, task
+from tools.lessons.lesson import ROOT, lessons
 
 KNOWN = lessons()[12]
 MIDDLE = 'find_your_keys'  # no test may name its file: it could not be taken out
@@ -76,6 +79,49 @@ def test_added_in_the_middle_and_at_the_end(tmp_path, capsys):
     # Of all files, only the table of exercises in notebook 00 is still that of its last run.
     changed = git(copy, 'diff', '--name-only', 'HEAD~4').split()
     assert changed == ['notebooks/00_start_here.ipynb']
+
+
+def test_a_task_is_added_and_keeps_the_rules(tmp_path, capsys):
+    copy = copied(tmp_path / 'copy')
+    assert new.main(['lose_your_keys'], copy) == 0
+    assert task.main(['lose_your_keys'], copy) == 0
+    assert 'make test-answers LESSON=lose_your_keys TASK=2' in capsys.readouterr().out
+    assert run.main([lessons(copy / 'notebooks')[-2].number], copy) == 0
+    the_rules_hold(copy)
+
+
+def test_later_tasks_follow_a_new_one():
+    texts, number, last = task.plan(KNOWN.name, '2', ROOT)
+    notebook, checks, answers = texts.values()
+    cells = nbformat.reads(notebook, as_version=4).cells
+    every = [str(count) for count in range(1, last + 1)]
+    assert number == 3
+    for pattern in (r'^### ✎ Task (\d+)', r'^check\((\d+)', r'^%%solution (\d+)'):
+        found = (re.search(pattern, cell.source, re.MULTILINE) for cell in cells)
+        assert [one[1] for one in found if one] == every
+    assert re.findall(r'^@tasks\.add\((\d+)', checks, re.MULTILINE) == every
+    assert [*yaml.safe_load(answers)] == [
+        f'{n} {kind}' for n in every for kind in ('wrong', 'right')
+    ]
+    # `make update` finds what a student has written by the ids.
+    kept = [cell.id for cell in KNOWN.notebook.cells]
+    assert [cell.id for cell in cells if cell.id in kept] == kept
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'sentence'),
+    [
+        ([''], 'Name the lesson: make task LESSON=01 AFTER=3'),
+        (['77'], "There is no single lesson '77'."),
+        (['99'], 'has no task yet'),
+        ([KNOWN.number, '--after', '77'], 'name one of them with AFTER'),
+    ],
+)
+def test_a_task_of_no_lesson_gets_one_sentence(capsys, arguments, sentence):
+    assert task.main(arguments) == 1
+    error = capsys.readouterr().err
+    assert sentence in error
+    assert error.count('\n') == 1
 
 
 def test_a_lesson_that_git_does_not_know_is_not_taken_out(tmp_path, capsys):

@@ -1,0 +1,192 @@
+"""Add a task to a lesson. The tasks after it get new numbers.
+
+    python -m tools.lessons.task 01                 after the last task
+    python -m tools.lessons.task 01 --after 3       as task 4
+
+The new task is complete and small: four cells, a check, and answers. What it is about is then
+yours to change. Headings, checks, solutions and answers of later tasks follow. Where a text calls
+a task by its number, that is printed: a person must look at these lines.
+"""
+
+import argparse
+import ast
+import re
+import sys
+from pathlib import Path
+
+import nbformat
+from nbformat import NotebookNode
+
+from tools.lessons.clean import clean, text_of, write
+from tools.lessons.lesson import ROOT, Lesson, chosen, tags
+from tools.lessons.rules import FOLDED
+
+TEXT = (
+    '### ✎ Task {number} ★: Find the largest\n\n'
+    'Say exactly what the code must do: `largest(numbers)` returns the largest number of a list, '
+    'and 0 for an empty list. A task beyond the core has a star. Without it, add its minutes to '
+    'the note of the step and to the time of the opening.'
+)
+STARTER = """def largest(numbers):
+    return 0  # Your code: the largest of the numbers."""
+SOLUTION = """%%solution {number}
+def largest(numbers):
+    return max(numbers, default=0)"""
+CHECK = """
+
+@tasks.add({number})
+def find_the_largest(largest):
+    def returns(right, *numbers):
+        found = largest([*numbers])
+        return found == right or f'for {{[*numbers]}} it returns {{found}}'
+
+    return [
+        ('it finds the largest in the middle', lambda: returns(7, 3, 7, 5), 'Try max(...).'),
+        ('it finds the largest at the end', lambda: returns(9, 1, 9), 'Look at all numbers.'),
+        ('an empty list gives 0', lambda: returns(0), 'max(..., default=...) has an answer.'),
+    ]
+"""
+ANSWERS = """
+{number} wrong:
+- 'max(numbers, default=0)': max(numbers)  # fails for an empty list
+- 'max(numbers, default=0)': min(numbers, default=0)  # the smallest
+- 'max(numbers, default=0)': numbers[-1] if numbers else 0  # the last one
+- 'max(numbers, default=0)': sum(numbers)  # all together
+- 'return max(numbers, default=0)': print(max(numbers, default=0))  # shows it, and returns None
+{number} right:
+- 'max(numbers, default=0)': sorted(numbers)[-1] if numbers else 0
+- 'max(numbers, default=0)': max([0, *numbers])
+- 'return max(numbers, default=0)': |-
+    found = 0
+    for number in numbers:
+        found = max(found, number)
+    return found
+"""
+CELLS = (('markdown', '', TEXT), ('code', 'exercise', STARTER),
+         ('code', 'check', 'check({number}, largest)'), ('code', 'solution', SOLUTION))  # fmt: skip
+
+
+def new_cells(number: int) -> list[NotebookNode]:
+    cells = []
+    for kind, tag, text in CELLS:
+        metadata = {'tags': [tag]} if tag else {}
+        if tag in FOLDED:
+            metadata['jupyter'] = {'source_hidden': True}
+        make = getattr(nbformat.v4, f'new_{kind}_cell')
+        cells.append(make(text.replace('{number}', f'{number}'), metadata=metadata))
+    return cells
+
+
+def grown(pattern: str, text: str, number: int) -> str:
+    """Add one to each number from `number` on that a pattern finds between its two groups."""
+
+    def write_number(found: re.Match) -> str:
+        before, old, after = found.groups()
+        return f'{before}{int(old) + (int(old) >= number)}{after}'
+
+    return re.sub(pattern, write_number, text, flags=re.MULTILINE)
+
+
+def notebook_with(notebook: NotebookNode, number: int) -> NotebookNode:
+    """Return the notebook with the new task, whose later tasks have new numbers."""
+    place = 0
+    for index, cell in enumerate(notebook.cells):
+        if 'solution' in tags(cell) and re.match(rf'%%solution {number - 1}\b', cell.source):
+            place = index + 1
+        if cell.cell_type == 'markdown':
+            cell.source = grown(r'^(### ✎ Task )(\d+)(\b)', cell.source, number)
+        elif 'check' in tags(cell):
+            cell.source = grown(r'^(check\()(\d+)(\b)', cell.source, number)
+        elif 'solution' in tags(cell):
+            cell.source = grown(r'^(%%solution )(\d+)(\b)', cell.source, number)
+    notebook.cells[place:place] = new_cells(number)
+    return clean(notebook)
+
+
+def checks_with(source: str, number: int) -> str:
+    """Return the module of checks with a check of the new task after the one before it."""
+    source = grown(r'^(@tasks\.add\()(\d+)(\b)', source, number)
+    ends = {
+        decorator.args[0].value: node.end_lineno
+        for node in ast.parse(source).body
+        if isinstance(node, ast.FunctionDef)
+        for decorator in node.decorator_list
+        if isinstance(decorator, ast.Call) and ast.unparse(decorator.func) == 'tasks.add'
+    }
+    lines = source.splitlines(keepends=True)
+    lines.insert(ends[number - 1], CHECK.format(number=number))
+    return ''.join(lines)
+
+
+def answers_with(text: str, number: int) -> str:
+    """Return the answers with those of the new task after those of the one before it."""
+    text = grown(r'^(["\']?)(\d+)( (?:wrong|right))', text, number)
+    new = ANSWERS.format(number=number).lstrip('\n')
+    later = re.search(rf'^["\']?{number + 1} (?:wrong|right)', text, re.MULTILINE)
+    if later is None:
+        return f'{text.rstrip()}\n{new}'
+    return text[: later.start()] + new + text[later.start() :]
+
+
+def plan(lesson: str, after: str, root: Path) -> tuple[dict[Path, str], int, int]:
+    """Return the new texts of the lesson's files, the task's number, and that of the last one.
+
+    Raises ValueError with one sentence if there is no such lesson or task.
+    """
+    path = chosen(lesson, root / 'notebooks')[0]
+    found = Lesson(path.name, nbformat.read(path, as_version=4))
+    last = len(found.tasks)
+    if not last:
+        raise ValueError(f'{path.name} has no task yet: CONTRIBUTING.md says how to write one.')
+    if after and not (after.isdecimal() and 1 <= int(after) <= last):
+        raise ValueError(f'{path.name} has the tasks 1 to {last}: name one of them with AFTER.')
+    number = int(after or last) + 1
+    checks = root / f'helpers/checks/lessons/{found.name}.py'
+    answers = root / f'tests/answers/{found.name}.yaml'
+    texts = {
+        path: text_of(notebook_with(found.notebook, number)),
+        checks: checks_with(checks.read_text(encoding='utf-8'), number),
+        answers: answers_with(answers.read_text(encoding='utf-8'), number),
+    }
+    return texts, number, last + 1
+
+
+def to_look_at(texts: dict[Path, str], number: int, root: Path) -> list[str]:
+    """Return the lines of the lesson's files that may call a task by its old number."""
+    lines = []
+    for path, text in texts.items():
+        if path.suffix == '.ipynb':  # its outputs are written by the next run
+            text = '\n'.join(cell.source for cell in nbformat.reads(text, as_version=4).cells)
+        for line in text.splitlines():
+            named = re.findall(r'(?<!✎ )\b[Tt]asks? (\d+)', line)
+            if any(int(one) >= number for one in named):
+                lines.append(f'{path.relative_to(root)}: {line.strip()[:100]}')
+    return lines
+
+
+def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
+    parser = argparse.ArgumentParser(description='Add a task to a lesson.')
+    parser.add_argument('lesson', help='its number or name, such as 01')
+    parser.add_argument('--after', default='', metavar='TASK', help='the task before it')
+    options = parser.parse_args(arguments)
+    try:
+        if not options.lesson:
+            raise ValueError('Name the lesson: make task LESSON=01 AFTER=3')
+        texts, number, last = plan(options.lesson, options.after, root)
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 1
+    for path, text in texts.items():
+        write(path, text)
+        print(f'{path.relative_to(root)}: task {number} is in it')
+    if number < last and (lines := to_look_at(texts, number, root)):
+        print('Look at these lines, which may name a task by its old number:', *lines, sep='\n')
+    print(
+        'Change the task in the three files. Then: '
+        f'make test-answers LESSON={options.lesson} TASK={number}'
+    )
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
