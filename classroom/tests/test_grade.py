@@ -18,9 +18,11 @@ from classroom.grade.results import Kept, digest_of, job_of, result_of
 from classroom.grade.submissions import submissions_of, workspace_files
 from helpers.checks.verdict import KEY
 from tools.lessons.lesson import ROOT, tags
+from tools.lessons.lesson import lessons as lessons_of_course
 
 RIGHT, WRONG = 'speed = 1.75 / 3.5\nshow(speed)', 'speed = 1.75\nshow(speed)'
 STARTER = 'task-00-1-starter'
+OF = len(lessons_of_course()[0].tasks)  # of lesson 00
 
 
 @pytest.fixture(scope='module')
@@ -387,12 +389,12 @@ def test_a_second_run_goes_on_where_the_first_one_ended(submit, capsys):
     folder = submit(**files)
     assert main([str(folder)], where) == 0
     assert where.count == 4
-    assert 'Student 001: lesson 00: 1 of 2\n' in capsys.readouterr().out
+    assert f'Student 001: lesson 00: 1 of {OF}\n' in capsys.readouterr().out
     changed = next(iter(files))
     submit(**{changed: with_answer(RIGHT), 'New_9_assignsubmission_file/a.ipynb': files[changed]})
     assert main([str(folder), '--jobs', '2'], where) == 0
     assert where.count == 6
-    assert 'Student 001: lesson 00: 1 of 2, judged before' in capsys.readouterr().out
+    assert f'Student 001: lesson 00: 1 of {OF}, judged before' in capsys.readouterr().out
     assert [row['points'] for row in rows_of(folder)] == ['0', '1', '1', '0', '1']
 
 
@@ -427,12 +429,12 @@ def test_a_line_for_each_strange_submission(submit, capsys):
     assert main([str(folder)], Stand()) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[:8] == [
-        '=cmd(): lesson 00: 0 of 2',
-        'Ada: lesson 00: 1 of 2',
+        f'=cmd(): lesson 00: 0 of {OF}',
+        f'Ada: lesson 00: 1 of {OF}',
         'Bob: 02.ipynb is lesson 02, not asked for; lesson 00 is not there',
         'Cy: no notebook, but notes.txt',
-        'Di: lesson 00: 0 of 2; nothing is written in lesson 00',
-        'Eve: lesson 00: 0 of 2; lesson 00 is there twice: a.ipynb counts',
+        f'Di: lesson 00: 0 of {OF}; nothing is written in lesson 00',
+        f'Eve: lesson 00: 0 of {OF}; lesson 00 is there twice: a.ipynb counts',
         'Fay: own.ipynb is no lesson of this course',
         f'{folder}_graded: grades.csv, feedback.zip, equal_answers.txt',
     ]
@@ -465,22 +467,27 @@ def test_moodle_takes_its_worksheet_back(submit, capsys):
     assert main([str(folder)], Stand()) == 0
     one, absent, other = rows_of(folder, 'moodle.csv')
     assert 'Student 000 is not in Grades-X.csv, by number and name' in capsys.readouterr().out
-    assert one['Grade'] == '50.00'
+    assert float(one['Grade']) == 100 / OF
     assert one['Email address'] == 'a@b.c'
     assert one['Last modified (grade)'] == '-'
     assert absent['Grade'] == other['Grade'] == ''
 
 
-@pytest.mark.parametrize(('options', 'of'), [([], 9), (['--no-stars'], 8)])
-def test_tasks_with_a_star_count_or_not(submit, capsys, options, of):
-    answers = dict.fromkeys(('task-01-2-starter', 'task-01-6-starter'), RIGHT)
-    data = json.dumps(notebook('01', **answers)).encode()
+@pytest.mark.parametrize('options', [[], ['--no-stars']])
+def test_tasks_with_a_star_count_or_not(submit, capsys, lessons, options):
+    headings = lessons['01'].lesson.tasks
+    starred = [n for n, heading in enumerate(headings, 1) if '★' in heading]
+    of = len(headings) - (len(starred) if options else 0)
+    points = 1 if options else 2
+    core = next(n for n in range(2, len(headings)) if n not in starred)
+    solved = (lessons['01'].tasks[n].exercises[0].id for n in (core, starred[0]))
+    data = json.dumps(notebook('01', **dict.fromkeys(solved, RIGHT))).encode()
     folder = submit(**{'Student_500_assignsubmission_file/lesson.ipynb': data})
     assert main([str(folder), *options], Stand()) == 0
-    points = of - 7
     assert f'Student: lesson 01: {points} of {of}\n' in capsys.readouterr().out
     [row] = rows_of(folder)
-    assert (row['points'], row['of'], row['01 task 6']) == (str(points), str(of), '1')
+    counts = row['points'], row['of'], row[f'01 task {starred[0]}']
+    assert counts == (str(points), str(of), '1')
     [row] = rows_of(folder, 'moodle.csv')
     assert float(row['Grade']) == points
 
@@ -538,7 +545,7 @@ def test_canvas_takes_its_gradebook_back(submit, capsys):
     possible, ada, alan = rows_of(folder, 'canvas.csv')
     assert list(ada) == [*tables.CANVAS, 'Start here (71)']
     assert possible['Start here (71)'] == '50'
-    assert (ada['Start here (71)'], alan['Start here (71)']) == ('25.00', '3')
+    assert (ada['Start here (71)'], alan['Start here (71)']) == (f'{50 / OF:.2f}', '3')
     assert rows_of(folder)[0]['late'] == 'late'
     assert main([str(folder), '--assignment', 'none of them'], Stand()) == 0
     assert 'Start here (71), Essay (72). Name yours with ASSIGNMENT=' in capsys.readouterr().out
@@ -548,7 +555,7 @@ def test_canvas_without_a_gradebook(submit):
     folder = submit(**{'lovelaceada_55_9_x.ipynb': with_answer(RIGHT)})
     assert main([str(folder)], Stand()) == 0
     possible, ada = rows_of(folder, 'canvas.csv')
-    assert (ada['ID'], ada['Start here'], possible['Start here']) == ('55', '1', '2')
+    assert (ada['ID'], ada['Start here'], possible['Start here']) == ('55', '1', str(OF))
 
 
 def test_feedback_has_verdicts_and_no_solution(submit):
@@ -559,7 +566,7 @@ def test_feedback_has_verdicts_and_no_solution(submit):
         text = archive.read(archive.namelist()[1]).decode()
     found = nbformat.reads(text, as_version=4)
     nbformat.validate(found)
-    assert found.cells[0].source.startswith('# 1 of 2 tasks are solved')
+    assert found.cells[0].source.startswith(f'# 1 of {OF} tasks are solved')
     [answer] = [cell for cell in found.cells if cell.id == STARTER]
     [check] = [cell for cell in found.cells if cell.id == 'check-00-1']
     assert answer.source == RIGHT
@@ -637,7 +644,7 @@ def test_real_checks_judge_and_survive(submit, capsys):
     folder = submit(**files, **{'Cy/c.ipynb': with_answer(HOSTILE)})
     assert main([str(folder), '--trust']) == 0
     assert capsys.readouterr().out.splitlines()[:3] == [
-        'Ada: lesson 00: 1 of 2',
-        'Bob: lesson 00: 0 of 2',
-        'Cy: lesson 00: 0 of 2; task 1: its code ended the kernel',
+        f'Ada: lesson 00: 1 of {OF}',
+        f'Bob: lesson 00: 0 of {OF}',
+        f'Cy: lesson 00: 0 of {OF}; task 1: its code ended the kernel',
     ]
