@@ -227,9 +227,9 @@ def round_tour(workspace, floor=ROOMS, file='rooms'):
 def send_goal(session, server, places):
     """Send a goal to another process. Return its handle, or None if no answer comes.
 
-    A server that has not discovered the client yet cannot answer: rmw_fastrtps gives it 0.1 s for
-    that, and rclpy does not begin such a goal. On a busy computer this happens, so it is sent
-    again.
+    A server that has not discovered the client yet cannot answer: rmw_fastrtps waits for it as long
+    as its writer may block, 0.1 s (rmw_response.cpp), and rclpy does not begin such a goal. On a
+    busy computer this happens, so it is sent again.
     """
     for _ in range(5):
         sent = server.send_goal_async(action().Goal(places=places))
