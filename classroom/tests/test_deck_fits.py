@@ -1,7 +1,7 @@
 """Each deck: with Space every slide is reached and seen to its end, and nothing of it is cut off.
 
-All sizes are parts of the slide's width or height: what fits one projector of a shape fits each. One
-of 4:3 is as wide in these units as one of 16:9, and higher, so two lessons tell whether it holds.
+All sizes are parts of the slide's height: what fits one projector of a shape fits each. One of 4:3
+is as wide in these units as one of 16:9, and higher, so two lessons tell whether that holds.
 """
 
 import nbformat
