@@ -59,6 +59,7 @@ SCRIPT = re.compile(r'<script>(?P<text>\(\(\).*?)</script>', re.DOTALL)
 STYLE = re.compile(r'<style>(?P<text>.*?)</style>', re.DOTALL)
 FIRST_PICTURE = 'first-picture'  # the cell of a lesson that has it
 AT_START = '<div class="replay" ', '<div class="replay" data-opens="start" '  # see view.js
+TIME = re.compile(r'^(\*\*Time\*\*.*)(?:\n\n(Steps and tasks with ★.*)\.)?$', re.MULTILINE)
 ANSWER = 'Guess first, then open the answer'
 SOLUTION = re.compile(r'^%%solution .*\n')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
@@ -103,13 +104,18 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
                 if 'text/html' in data:
                     data['text/html'] = _with_files(data['text/html'], figures)
         cells.append(cell)
-    download = (
-        f'<a class="lesson-file" href="{file}" download>Download this lesson as a notebook</a>'
-    )
-    cells[0].source += f'\n\n{download}'
+    cells[0].source = _with_download(cells[0].source, file)
     notebook.cells = cells
     notebook.metadata['language_info'] = {'name': 'python', 'pygments_lexer': 'cell'}
     return notebook
+
+
+def _with_download(opening: str, file: str) -> str:
+    """Return the first cell with a link to the lesson as it is, on one line with its time."""
+    link = f'<a class="lesson-file" href="{file}" download>Download the notebook</a>'
+    if not TIME.search(opening):
+        return f'{opening}\n\n{link}'
+    return TIME.sub(lambda found: ' · '.join([*filter(None, found.groups()), link]), opening)
 
 
 def is_widget(output: NotebookNode) -> bool:
