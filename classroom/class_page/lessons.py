@@ -8,9 +8,8 @@ from typing import NamedTuple
 from nbformat import NotebookNode
 
 from classroom.class_page.notes import of_step
-from classroom.deck.slides import heading
 from tools.lessons.code import guess_of
-from tools.lessons.lesson import Lesson, first_heading
+from tools.lessons.lesson import Lesson, first_heading, has_heading
 
 
 class Guess(NamedTuple):
@@ -39,7 +38,7 @@ class Known:
     @cached_property
     def starts(self) -> list[int]:
         """The indices of the cells with which its steps begin."""
-        return [i for i, cell in enumerate(self.cells) if i == 0 or heading(cell, '## ')]
+        return [i for i, cell in enumerate(self.cells) if i == 0 or has_heading(cell, '## ')]
 
     @cached_property
     def notes(self) -> list[dict]:

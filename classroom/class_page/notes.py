@@ -5,13 +5,12 @@ import re
 from nbconvert.filters import markdown2html
 from nbformat import NotebookNode
 
-from classroom.deck.slides import heading
-from tools.lessons.lesson import first_heading, minutes_of_note, tags
+from tools.lessons.lesson import first_heading, has_heading, minutes_of_note, tags
 
 
 def of_step(cells: list[NotebookNode], at: int) -> dict:
     """Return the notes of the step of cell `at`, and its minutes: own, to its end, in all."""
-    steps = [i for i, cell in enumerate(cells) if heading(cell, '##? ')]
+    steps = [i for i, cell in enumerate(cells) if has_heading(cell, '##? ')]
     notes = [i for i, cell in enumerate(cells) if 'notes' in tags(cell)]
     minutes = {i: minutes_of_note(cells[i].source) for i in notes}
     step = max((i for i in steps if i <= at), default=0)

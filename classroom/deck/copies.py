@@ -17,7 +17,7 @@ import nbformat
 from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell
 
-from classroom.deck.slides import folded, heading, slide_types
+from classroom.deck.slides import folded, slide_types
 from classroom.plan import NO_PLAN, Plan, plan_of
 from helpers.notebook import MARK
 from tools.lessons import lesson
@@ -100,7 +100,11 @@ class Copies:
                 cell for cell, step in zip(notebook.cells, known.steps, strict=True) if step in kept
             ]
             # The first slide promises what is shown.
-            shown = [lesson.first_heading(c.source) for c in notebook.cells if heading(c, '## ')]
+            shown = [
+                lesson.first_heading(c.source)
+                for c in notebook.cells
+                if lesson.has_heading(c, '## ')
+            ]
             notebook.cells[0].source = '\n'.join([f'# {known.number} {known.title}', '', *shown])
         names = list(self.plan.steps)
         if name in names[:-1]:

@@ -11,11 +11,10 @@ The rule knows no heights: the deck makes a slide that is too full a little smal
 """
 
 import ast
-import re
 
 from nbformat import NotebookNode
 
-from tools.lessons.lesson import tags
+from tools.lessons.lesson import has_heading, tags
 
 LINES = 18  # of code that is not folded: more of it is on the next slide
 
@@ -28,7 +27,7 @@ def slide_types(notebook: NotebookNode) -> list[str]:
             types.append('skip')
             continue
         kind = ''
-        if not slide or heading(cell, '##? '):
+        if not slide or has_heading(cell, '##? '):
             kind = 'slide'
         elif _starts(cell, slide, _code_after(notebook, index)):
             kind = 'subslide'
@@ -46,10 +45,10 @@ def _starts(cell: NotebookNode, slide: list[NotebookNode], code_follows: bool) -
     if cell.cell_type == 'code':
         lines = sum(_lines(other) for other in [*slide, cell])
         return _lines(cell) > 0 and lines > LINES and slide[-1].cell_type == 'code'
-    if heading(cell, '### Question '):
-        return any(other.cell_type == 'code' or heading(other, '### ') for other in slide)
+    if has_heading(cell, '### Question '):
+        return any(other.cell_type == 'code' or has_heading(other, '### ') for other in slide)
     has_code = any(other.cell_type == 'code' for other in slide)
-    return has_code and (code_follows or heading(cell, '### '))
+    return has_code and (code_follows or has_heading(cell, '### '))
 
 
 def _code_after(notebook: NotebookNode, index: int) -> bool:
@@ -62,11 +61,6 @@ def _lines(cell: NotebookNode) -> int:
     """Return how many lines of code of a cell a slide shows."""
     is_shown = cell.cell_type == 'code' and not folded(cell)
     return len(cell.source.splitlines()) if is_shown else 0
-
-
-def heading(cell: NotebookNode, form: str) -> bool:
-    """Return whether a cell of text begins with a heading of this form, a regular expression."""
-    return cell.cell_type == 'markdown' and bool(re.match(form, cell.source))
 
 
 def folded(cell: NotebookNode) -> bool:

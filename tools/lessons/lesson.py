@@ -152,6 +152,11 @@ def minutes_of_note(source: str) -> int:
     return int(minutes[1]) if minutes else 0
 
 
+def has_heading(cell: NotebookNode, form: str) -> bool:
+    """Return whether a cell of text begins with a heading of this form, a regular expression."""
+    return cell.cell_type == 'markdown' and bool(re.match(form, cell.source))
+
+
 def first_heading(text: str) -> str:
     return text.splitlines()[0].lstrip('# ')
 
