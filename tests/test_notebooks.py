@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from support.answers import answers_of, source_of
+from support.answers import LEAST, answers_of, source_of
 
 from helpers.checks import progress
 from tools.lessons import rules, tables
@@ -57,6 +57,8 @@ def test_each_task_has_answers_that_try_its_check(lesson):
         f'tests/answers/{file.name} lacks these, or has too many: {differ}. The top of '
         'tests/answers/test_answers.py says how answers are written.'
     )
+    few = [key for key, given in answers.items() if len(given) < LEAST[key.split()[1]]]
+    assert not few, f'{file.name} has too few answers below {", ".join(few)}: {LEAST} are wanted.'
 
 
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])

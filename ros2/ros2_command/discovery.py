@@ -28,8 +28,10 @@ POLL_S = 0.01
 # How long the first, second, ... participant of a command waits until it knows all the others.
 # Fast DDS loses the answers that come before a new participant listens, which happens in some
 # starts only: a new participant gets them sooner than the old one, to which the others say again
-# who they are every 3 s. The last one waits for that, with a second for a busy machine.
-TRIES_S = 0.15, 0.3, 0.6, 4.0
+# who they are every 3 s. The last one waits until they have said it three times: on a busy machine
+# it was not enough once. So long it only waits for one that never says it, as a program that is
+# stopped.
+TRIES_S = 0.15, 0.3, 0.6, 10.0
 
 # Each participant has said who it is and which nodes it has, and nothing new has come for so long:
 # that is all. The endpoints of a node follow each other within milliseconds.
@@ -38,6 +40,9 @@ QUIET_S = 0.08
 # The same if a participant has not said which nodes it has, and perhaps never does, as a program
 # of DDS without ROS; and how long a command waits for the topic or the node that it was asked for.
 LONGEST_S = 1.0
+
+# A graph in which always something is new is taken as it is after so long.
+RESTLESS_S = 4.0
 
 # Nothing counts the participants of other machines: that long the real command waits for them, too.
 OTHERS_S = 0.5
@@ -80,7 +85,7 @@ def knows_all(node: Node, timeout_s: float) -> bool:
 
 def wait_until_quiet(node: Node) -> None:
     """Wait until nothing new comes and everything has a name, or no longer gets one."""
-    deadline = time.monotonic() + TRIES_S[-1]
+    deadline = time.monotonic() + RESTLESS_S
     last_state, since = None, 0.0
     while (now := time.monotonic()) < deadline:
         state = (

@@ -32,7 +32,7 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from support.answers import answers_of, source_of
+from support.answers import LEAST, answers_of, source_of
 from support.kernel import NOTEBOOKS, Kernel
 
 from helpers.checks.progress import with_tasks
@@ -48,7 +48,6 @@ def put_back(names, before):
 
 put_back(get_ipython().user_ns, get_ipython().names_before)
 """
-LEAST = {'wrong': 5, 'right': 3}  # answers of a task
 Cells = dict[str, list[str]]  # of a task, by their tag
 
 FILES = sorted(HERE.glob('*.yaml'))

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import yaml
 
+LEAST = {'wrong': 5, 'right': 3}  # answers of a task
+
 
 def answers_of(path: Path) -> dict[str, list]:
     """Return the answers in a file, by their task and kind: '3 wrong'.

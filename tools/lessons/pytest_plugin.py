@@ -76,10 +76,11 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Say which notebooks differ from the lesson because somebody has solved tasks in them."""
-    failed = ' '.join(report.nodeid for report in terminalreporter.getreports('failed'))
-    files = [file for file in answered() if file in failed] if failed else []
+    failed = {report.nodeid.split('::')[0] for report in terminalreporter.getreports('failed')}
+    files = [file for file in answered() if f'notebooks/{file}' in failed] if failed else []
     if files:
         terminalreporter.write_line(
-            f'Answers of yours are in {", ".join(files)}, so the lesson prints something else. '
-            'Another clone has the lessons as they are.'
+            f'Answers of yours, or new tasks, are in {", ".join(files)}, so the lesson prints '
+            'something else. After a new task, `make notebooks` saves it; after answers, another '
+            'clone has the lessons as they are.'
         )

@@ -156,11 +156,15 @@ def to_look_at(texts: dict[Path, str], number: int, root: Path) -> list[str]:
     lines = []
     for path, text in texts.items():
         if path.suffix == '.ipynb':  # its outputs are written by the next run
-            text = '\n'.join(cell.source for cell in nbformat.reads(text, as_version=4).cells)
-        for line in text.splitlines():
-            named = re.findall(r'(?<!✎ )\b[Tt]asks? (\d+)', line)
-            if any(int(one) >= number for one in named):
-                lines.append(f'{path.relative_to(root)}: {line.strip()[:100]}')
+            cells = nbformat.reads(text, as_version=4).cells
+            parts = {f'{path.relative_to(root)}#cell-id={cell.id}': cell.source for cell in cells}
+        else:
+            parts = {str(path.relative_to(root)): text}
+        for place, part in parts.items():
+            for line in part.splitlines():
+                named = re.search(r'(?<!✎ )\b[Tt]asks? ([\d, and]+)', line)
+                if named and any(int(one) >= number for one in re.findall(r'\d+', named[1])):
+                    lines.append(f'{place}: {line.strip()}')
     return lines
 
 
@@ -182,8 +186,8 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
     if number < last and (lines := to_look_at(texts, number, root)):
         print('Look at these lines, which may name a task by its old number:', *lines, sep='\n')
     print(
-        'Change the task in the three files. Then: '
-        f'make test-answers LESSON={options.lesson} TASK={number}'
+        'In JupyterLab: File > Reload Notebook from Disk. Change the task in the three files. '
+        f'Then: make test-answers LESSON={options.lesson} TASK={number}'
     )
     return 0
 
