@@ -20,8 +20,9 @@ function drawing(image) {
   return seen(svg, image.alt);
 }
 
-// The lists and the picture of one run. A short one has its times in milliseconds.
-function panel(run, record, image, [from, until], grouped, short) {
+// The lists and the picture of one run. A short one has its times in milliseconds. What comes later is
+// covered as long as the replay is new.
+function panel(run, record, image, [from, until], grouped, short, isNew) {
   const { setup, name } = record;
   const many = setup.callbacks.length > 1;
   const names = ['threads', ...(grouped ? ['groups'] : []), 'queue', ...(many ? [] : ['lost'])];
@@ -30,6 +31,8 @@ function panel(run, record, image, [from, until], grouped, short) {
   const circle = run.end && ring();
   const svg = drawing(image);
   const cursor = svg.querySelector('.cursor');
+  const later = isNew && rect('later', { y: svg.dataset.top, height: svg.dataset.row * svg.dataset.rows.split(',').length });
+  if (later) svg.append(later);
   // No section: the deck takes each for a slide.
   const node = element('div', { class: 'replay-run', role: name ? 'group' : undefined, 'aria-label': name || undefined },
     row(name || 'time', time), ...rows, ...(circle ? [circle.node] : []), element('div', { class: 'replay-picture' }, svg));
@@ -47,18 +50,26 @@ function panel(run, record, image, [from, until], grouped, short) {
   function point(us) {
     time.textContent = short ? `${(us / 1e3).toFixed(3)} ms` : `${(us / 1e6).toFixed(3)} s`;
     const part = Math.min(Math.max((us / 1e6 - from) / (until - from), 0), 1);
-    cursor.setAttribute('transform', `translate(${(part * svg.dataset.wide).toFixed(1)})`);
+    const at = part * svg.dataset.wide;
+    cursor.setAttribute('transform', `translate(${at.toFixed(1)})`);
+    if (later) place(later, { x: +svg.dataset.left + at, width: svg.dataset.wide - at });
   }
 
   function light(is) {
     svg.querySelector('.same')?.remove();
     const at = svg.dataset.rows.split(',').indexOf(is);
     if (at < 0) return;
-    const band = document.createElementNS(svg.namespaceURI, 'rect');
     const { row, top } = svg.dataset;
-    const looks = { class: 'same', x: 0, y: +top + row * at, width: '100%', height: Math.max(row, 4) };
-    Object.entries(looks).forEach(([name, value]) => band.setAttribute(name, value));
-    svg.prepend(band);
+    svg.prepend(rect('same', { x: 0, y: +top + row * at, width: '100%', height: Math.max(row, 4) }));
+  }
+
+  function rect(kind, attributes) {
+    return place(document.createElementNS(svg.namespaceURI, 'rect'), { class: kind, ...attributes });
+  }
+
+  function place(node, attributes) {
+    Object.entries(attributes).forEach(([name, value]) => node.setAttribute(name, value));
+    return node;
   }
 
   // Return where a pointer is in the picture: microseconds, and the message of that row, if any.
@@ -108,7 +119,7 @@ function show(root, record) {
   const images = [...root.querySelectorAll('figure > img')];
   // One thread that runs one callback needs no group to be understood.
   const grouped = record.runs.some(({ setup }) => setup?.callbacks.length > 1 || setup?.threads.length > 1);
-  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped, length < SHORT_US)
+  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped, length < SHORT_US, hides && drives.length)
     : floor(runs[i], one, drawing(images[i]))));
   const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
   const slider = element('input', {
@@ -130,8 +141,9 @@ function show(root, record) {
 
   function nameSpeed() {
     const slower = +(1 / rate()).toPrecision(2);
-    faster.textContent = slower < 10 ? `${rate()}×` : `1/${slower.toLocaleString('en')}×`;
-    faster.ariaLabel = `speed ${faster.textContent}`;
+    const exact = slower < 10 ? `${rate()}×` : `1/${slower.toLocaleString('en')}×`;
+    faster.textContent = slower < 1000 ? exact : 'slow motion';
+    faster.ariaLabel = faster.title = slower < 1000 ? `speed ${exact}` : `slow motion, ${exact}`;
   }
 
   // A text that changes is read out, but not while it changes all the time.
@@ -175,8 +187,10 @@ function show(root, record) {
     back.disabled = position === 0;
     forth.disabled = position === last;
     requestAnimationFrame(keepHeight); // when the page is laid out anyway
-    if (position === last) stop();
-    else nameButton();
+    if (position === last) {
+      root.classList.remove('replay-new');
+      stop();
+    } else nameButton();
   }
 
   function nameButton() {
@@ -304,6 +318,7 @@ function show(root, record) {
   rest(telling);
   fresh = !hides;
   if (hides) {
+    root.classList.add('replay-new');
     says.textContent = 'Have you guessed? Then play it.';
     shown.nextElementSibling.remove(); // it tells the end
   } else if (bump !== undefined && outcome) says.textContent = outcome;

@@ -116,15 +116,24 @@ def test_check_and_solution_are_one_line_until_one_is_opened(file_page):
 
 def test_a_guess_comes_before_its_answer(file_page):
     with file_page(1280, 740) as tab:
-        tab.goto((SITE / LESSONS[6]).as_uri())
-        answer = tab.locator('.cell.tag_answer > details').first
-        replay = answer.get_by_role('group', name='replay').first
-        assert not replay.is_visible()
-        answer.locator('summary').click()
+        tab.goto((SITE / LESSONS[5]).as_uri())
+        replay = tab.locator('.replay[data-opens]').first
         slider, says = replay.get_by_label('step'), replay.locator('.replay-says')
         assert (slider.input_value(), says.inner_text()) == ('0', 'Have you guessed? Then play it.')
+        display = '[".all", ".later"].map(name => getComputedStyle(node.querySelector(name)).display)'
+        ends = f'node => {display}'  # the whole way, and what covers the chart
+        assert replay.evaluate(ends) == ['none', 'inline']
         slider.press('End')
         assert 'The robot hit the wall' in says.inner_text()
+        assert replay.evaluate(ends) == ['inline', 'none']
+
+        tab.goto((SITE / LESSONS[6]).as_uri())
+        answer = tab.locator('.cell.tag_answer > details').first
+        explains = tab.get_by_text('The robot drives into the wall, without an error')
+        assert not explains.is_visible()
+        answer.locator('summary').click()
+        assert explains.is_visible()
+        assert 'The answer is False.' in answer.inner_text()
 
 
 def test_on_paper_answers_are_open(file_page):

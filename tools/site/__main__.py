@@ -60,7 +60,8 @@ STYLE = re.compile(r'<style>(?P<text>.*?)</style>', re.DOTALL)
 FIRST_PICTURE = 'first-picture'  # the cell of a lesson that has it
 AT_START = '<div class="replay" ', '<div class="replay" data-opens="start" '  # see view.js
 TIME = re.compile(r'^(\*\*Time\*\*.*)(?:\n\n(Steps and tasks with ★.*)\.)?$', re.MULTILINE)
-ANSWER = 'Guess first, then open the answer'
+SHOW_ANSWER = 'I have guessed: show the answer'
+EXPLAINS = re.compile(r'(?!#)(?!.*:$)')  # a paragraph, and none that leads to the next cell
 SOLUTION = re.compile(r'^%%solution .*\n')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
 # A first picture plays once when it is loaded: so it is loaded anew when it comes into view later.
@@ -91,8 +92,7 @@ CONTENTS = """
 def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
     """Return a notebook as myst-nb shall read it, and write its figures into a folder."""
     notebook, cells = deepcopy(notebook), []
-    _hide_answers(notebook.cells)
-    for cell in notebook.cells:
+    for cell in _with_answers_hidden(notebook.cells):
         if cell.cell_type == 'raw':  # a note for the instructor
             continue
         if cell.id == FIRST_PICTURE:
@@ -112,16 +112,22 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
 
 def _with_download(opening: str, file: str) -> str:
     """Return the first cell with a link to the lesson as it is, on one line with its time."""
-    link = f'<a class="lesson-file" href="{file}" download>Download the notebook</a>'
+    link = f'<a href="{file}" download>Download the notebook</a>'
     if not TIME.search(opening):
-        return f'{opening}\n\n{link}'
-    return TIME.sub(lambda found: ' · '.join([*filter(None, found.groups()), link]), opening)
+        return f'{opening}\n\n<span class="lesson-file">{link}</span>'
+    link = f'<span class="lesson-file"> · {link}</span>'
+    return TIME.sub(lambda found: ' · '.join(filter(None, found.groups())) + link, opening)
 
 
 def is_widget(output: NotebookNode) -> bool:
     """Return whether an output is the text of a widget, such as `VBox(children=(...))`."""
     data = output.get('data', {})
     return set(data) == {'text/plain'} and bool(re.match(r'\w+\(children=', data['text/plain']))
+
+
+def is_replay(output: NotebookNode) -> bool:
+    """Return whether an output is a replay or a drive."""
+    return '<div class="replay" ' in output.get('data', {}).get('text/html', '')
 
 
 def _fold(cell: NotebookNode) -> None:
@@ -145,23 +151,43 @@ def _fold(cell: NotebookNode) -> None:
         cell.metadata['mystnb'] = {'code_prompt_show': words, 'code_prompt_hide': words}
 
 
-def _hide_answers(cells: list[NotebookNode]) -> None:
-    """Fold the output that answers a guess, and open the replays before it at their start."""
-    question = ''
+def _with_answers_hidden(cells: list[NotebookNode]) -> list[NotebookNode]:
+    """Fold what answers a guess: texts and figures, and the paragraph below them.
+
+    Replays are open, at their start: one plays them, and sees.
+    """
+    question, kept = '', []
     for cell in cells:
+        after_answer = kept and 'answer' in tags(kept[-1])
+        kept.append(cell)
         if parts := guess_of(cell):
             question = parts[1]
+        elif after_answer and cell.cell_type == 'markdown' and EXPLAINS.match(cell.source):
+            cell.source = f'{{.explains}}\n{cell.source}'
         elif cell.cell_type == 'code' and question:
-            for data in (output.get('data', {}) for output in cell.outputs):
-                if 'text/html' in data:
-                    data['text/html'] = data['text/html'].replace(*AT_START)
-            if repr(question) in cell.source:
-                question = ''
-                # One that moves from run to run is not saved: see compare_prediction.
-                if not any('The answer is' in output.get('text', '') for output in cell.outputs):
-                    continue
-                cell.metadata['tags'] = [*tags(cell), 'hide-output', 'answer']
-                cell.metadata['mystnb'] = {'code_prompt_show': ANSWER, 'code_prompt_hide': ANSWER}
+            for output in cell.outputs:
+                if is_replay(output):
+                    output.data['text/html'] = output.data['text/html'].replace(*AT_START)
+            if repr(question) not in cell.source:
+                continue
+            question = ''
+            # One that moves from run to run is not saved: see compare_prediction.
+            if any('The answer is' in output.get('text', '') for output in cell.outputs):
+                kept.append(_answer_of(cell))
+    return kept
+
+
+def _answer_of(cell: NotebookNode) -> NotebookNode:
+    """Take the answer out of a cell, and return it as a folded cell without code."""
+    answer = deepcopy(cell)
+    answer.id, answer.source = f'{cell.id}-answer', '# myst-nb leaves out a cell without code'
+    cell.outputs = [output for output in cell.outputs if is_replay(output)]
+    answer.outputs = [output for output in answer.outputs if not is_replay(output)]
+    answer.metadata = {
+        'tags': ['remove-input', 'hide-output', 'answer'],
+        'mystnb': {'code_prompt_show': SHOW_ANSWER, 'code_prompt_hide': 'The answer'},
+    }
+    return nbformat.from_dict(answer)
 
 
 def _is_plumbing(cell: NotebookNode) -> bool:

@@ -13,6 +13,7 @@ extensions = ['myst_nb']
 nb_execution_mode = 'off'  # the outputs are the saved ones
 nb_merge_streams = True
 myst_heading_anchors = 4
+myst_enable_extensions = ['attrs_block']  # a class of a paragraph
 suppress_warnings = ['mystnb.unknown_mime_type']
 
 html_theme = 'furo'
