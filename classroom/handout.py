@@ -53,6 +53,7 @@ NOT_NEEDED = re.compile(
 )
 FOR_INSTRUCTORS = re.compile(r'## \d+\. For instructors')
 NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', re.DOTALL)
+GTEST, GTEST_PYTHON = re.compile('ros-gtest-vendor=='), '3.12'  # see tools/set_up.sh
 GLIBC = ('_2_28', '_2_27', '_2_26', '_2_24', '_2_17', '_2_12', '_2_5', '2014', '2010', '1')
 
 
@@ -176,20 +177,25 @@ def download(lock: Path, folder: Path, pythons: tuple) -> None:
         raise ValueError(f'Not every package has a wheel for Python {min(unknown)}: take {known}.')
     print('Fetching the packages, about 200 MB', file=sys.stderr)
     folder.mkdir()
-    wanted, fetched = folder / 'wanted.lock', set()
+    wanted, fetched, jobs = folder / 'wanted.lock', set(), []
     for python in pythons:
         for version in (f'{python}.0', f'{python}.99'):  # a few packages ask for the last number
             pins = {pin for block in blocks if (pin := _for(block, version))}
-            wanted.write_text('\n'.join(pins - fetched))
+            jobs.append((version, pins - fetched))
             fetched = pins if version.endswith('.0') else set()
-            command = [sys.executable, '-I', ROOT / 'tools/pip.py']
-            command += ['download', '--quiet', '--no-deps']
-            command += ['--disable-pip-version-check', '--no-build-isolation', '--require-hashes']
-            command += [f'--platform=manylinux{glibc}_x86_64' for glibc in GLIBC]
-            command += ['--implementation=cp', f'--python-version={version}']
-            command += ['--requirement', wanted, '--dest', folder]
-            if subprocess.run(command).returncode:
-                raise ValueError('pip could not fetch the packages: what it said stands above.')
+    if GTEST_PYTHON not in pythons:
+        version = f'{GTEST_PYTHON}.0'
+        jobs.append((version, {_for(block, version) for block in blocks if GTEST.match(block)}))
+    for version, pins in jobs:
+        wanted.write_text('\n'.join(pins))
+        command = [sys.executable, '-I', ROOT / 'tools/pip.py']
+        command += ['download', '--quiet', '--no-deps']
+        command += ['--disable-pip-version-check', '--no-build-isolation', '--require-hashes']
+        command += [f'--platform=manylinux{glibc}_x86_64' for glibc in GLIBC]
+        command += ['--implementation=cp', f'--python-version={version}']
+        command += ['--requirement', wanted, '--dest', folder]
+        if subprocess.run(command).returncode:
+            raise ValueError('pip could not fetch the packages: what it said stands above.')
     wanted.unlink()
     Path(folder, 'pythons').write_text(' '.join(sorted(pythons, key=known.index)))
 

@@ -169,7 +169,7 @@ def node_with(callback):
 
 
 def raises(self, message):
-    message.dat = 1
+    message.dat.append(1)
 
 
 def loops(self, message):

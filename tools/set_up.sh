@@ -88,6 +88,19 @@ echo "Installing $(sed -n 's/^\([a-z].*\)==.*/\1/p' $locks | sort -u | wc -l) pa
     fail 'uv could not install requirements.lock: check the network, or name your package index with UV_DEFAULT_INDEX, then try again.'
 "$uv" pip install --quiet --offline --python .venv/bin/python --no-deps --editable . --editable ros2
 
+# The wheel of googletest for Python 3.13 holds no sources (ros-gtest-vendor 1.14.9000). That for 3.12
+# holds them, and they are the same for all.
+if [ ! -e .venv/src/gtest_vendor ]; then
+    sed -n '/^ros-gtest-vendor==/,/[^\\]$/p' "$learners" > .venv/gtest.lock
+    mkdir -p .venv/src
+    {
+        "$uv" pip install --quiet $no_index --target .venv/gtest --python-version 3.12 --no-deps \
+            --python-platform x86_64-manylinux_2_28 --only-binary :all: --require-hashes \
+            --requirement .venv/gtest.lock && mv .venv/gtest/src/gtest_vendor .venv/src
+    } || echo 'The sources of googletest are not there: one test of lesson 14 needs `sudo apt install libgtest-dev`.' >&2
+    rm -rf .venv/gtest .venv/gtest.lock
+fi
+
 mkdir -p .venv/share/jupyter/lab/settings
 mkdir -p .venv/etc/jupyter .venv/etc/ipython
 cp tools/jupyter/overrides.json .venv/share/jupyter/lab/settings

@@ -120,8 +120,9 @@ def test_a_guess_comes_before_its_answer(file_page):
         replay = tab.locator('.replay[data-opens]').first
         slider, says = replay.get_by_label('step'), replay.locator('.replay-says')
         assert (slider.input_value(), says.inner_text()) == ('0', 'Have you guessed? Then play it.')
-        display = '[".all", ".later"].map(name => getComputedStyle(node.querySelector(name)).display)'
-        ends = f'node => {display}'  # the whole way, and what covers the chart
+        display = 'getComputedStyle(node.querySelector(name)).display'
+        # The whole way, and what covers the chart.
+        ends = f'node => [".all", ".later"].map(name => {display})'
         assert replay.evaluate(ends) == ['none', 'inline']
         slider.press('End')
         assert 'The robot hit the wall' in says.inner_text()
