@@ -94,9 +94,9 @@ if [ ! -e .venv/src/gtest_vendor ]; then
     sed -n '/^ros-gtest-vendor==/,/[^\\]$/p' "$learners" > .venv/gtest.lock
     mkdir -p .venv/src
     {
-        "$uv" pip install --quiet $no_index --target .venv/gtest --python-version 3.12 --no-deps \
+        "$uv" pip sync --quiet $no_index --target .venv/gtest --python-version 3.12 \
             --python-platform x86_64-manylinux_2_28 --only-binary :all: --require-hashes \
-            --requirement .venv/gtest.lock && mv .venv/gtest/src/gtest_vendor .venv/src
+            .venv/gtest.lock && mv .venv/gtest/src/gtest_vendor .venv/src
     } || echo 'The sources of googletest are not there: one test of lesson 14 needs `sudo apt install libgtest-dev`.' >&2
     rm -rf .venv/gtest .venv/gtest.lock
 fi
