@@ -47,8 +47,12 @@ class Question(NamedTuple):
         if letter not in self.options:
             return wrap(f"Please change {answer!r}: the answer is 'A', 'B' or 'C'.", '  ')
         verdict = 'Right.' if letter == self.right else f'No, it is {self.right}.'
-        text = f'Your answer: {letter}. {verdict} {self.why} {place(self.lesson, self.step)}'
-        return wrap(text, '  ')
+        return wrap(f'Your answer: {letter}. {verdict} {self.reason}', '  ')
+
+    @property
+    def reason(self) -> str:
+        """Why the right answer is right, and where it is shown."""
+        return f'{self.why} {place(self.lesson, self.step)}'
 
 
 def remember(**answers: object) -> None:

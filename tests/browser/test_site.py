@@ -137,6 +137,15 @@ def test_a_guess_comes_before_its_answer(file_page):
         assert 'The answer is False.' in answer.inner_text()
 
 
+def test_questions_from_memory_need_no_kernel(file_page):
+    with file_page(1280, 740) as tab:
+        tab.goto((SITE / LESSONS[5]).as_uri())
+        right = tab.locator('#from-memory details', has_text='Right.')
+        assert right.count() == 2
+        right.first.locator('summary').click()
+        assert 'shows it.' in right.first.inner_text()
+
+
 def test_on_paper_answers_are_open(file_page):
     with file_page(794, 1123) as tab:
         tab.goto((SITE / LESSONS[2]).as_uri())

@@ -24,6 +24,7 @@ from nbformat import NotebookNode
 from PIL import Image
 from sphinx.cmd.build import build_main
 
+from helpers.checks import questions
 from helpers.notebook import LOOK_CSS
 from helpers.replay import level
 from tools.lessons.code import guess_of
@@ -60,6 +61,7 @@ STYLE = re.compile(r'<style>(?P<text>.*?)</style>', re.DOTALL)
 FIRST_PICTURE = 'first-picture'  # the cell of a lesson that has it
 AT_START = '<div class="replay" ', '<div class="replay" data-opens="start" '  # see view.js
 TIME = re.compile(r'^(\*\*Time\*\*.*)(?:\n\n(Steps and tasks with ★.*)\.)?$', re.MULTILINE)
+REMEMBERED = re.compile(r'(\w+)=\.\.\.')
 SHOW_ANSWER = 'I have guessed: show the answer'
 EXPLAINS = re.compile(r'(?!#)(?!.*:$)')  # a paragraph, and none that leads to the next cell
 SOLUTION = re.compile(r'^%%solution .*\n')
@@ -104,6 +106,9 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
                 if 'text/html' in data:
                     data['text/html'] = _with_files(data['text/html'], figures)
         cells.append(cell)
+        if cell.cell_type == 'code' and 'remember(' in cell.source:
+            cell.outputs = []
+            cells.append(_quiz_of(cell))
     cells[0].source = _with_download(cells[0].source, file)
     notebook.cells = cells
     notebook.metadata['language_info'] = {'name': 'python', 'pygments_lexer': 'cell'}
@@ -175,6 +180,20 @@ def _with_answers_hidden(cells: list[NotebookNode]) -> list[NotebookNode]:
             if any('The answer is' in output.get('text', '') for output in cell.outputs):
                 kept.append(_answer_of(cell))
     return kept
+
+
+def _quiz_of(cell: NotebookNode) -> NotebookNode:
+    """Return the questions that a cell asks from memory as a quiz, which needs no kernel."""
+    parts = []
+    for name in REMEMBERED.findall(cell.source):
+        question = questions()[name]
+        parts += [question.question, '']
+        for letter, option in question.options.items():
+            verdict = f'**Right.** {question.reason}' if letter == question.right else '**No.**'
+            summary = f'<summary>{letter}. {option}</summary>'
+            parts += [f'<details>{summary}', '', verdict, '', '</details>']
+        parts.append('')
+    return nbformat.v4.new_markdown_cell('\n'.join(parts), id=f'{cell.id}-quiz')
 
 
 def _answer_of(cell: NotebookNode) -> NotebookNode:
