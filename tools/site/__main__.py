@@ -63,7 +63,8 @@ AT_START = '<div class="replay" ', '<div class="replay" data-opens="start" '  # 
 TIME = re.compile(r'^(\*\*Time\*\*.*)(?:\n\n(Steps and tasks with ★.*)\.)?$', re.MULTILINE)
 REMEMBERED = re.compile(r'(\w+)=\.\.\.')
 SHOW_ANSWER = 'I have guessed: show the answer'
-EXPLAINS = re.compile(r'(?!#)(?!.*:$)')  # a paragraph, and none that leads to the next cell
+# A paragraph, and none that leads to the next cell.
+EXPLAINS = re.compile(r'(?!#)(?!.*:$)', re.MULTILINE)
 SOLUTION = re.compile(r'^%%solution .*\n')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
 # A first picture plays once when it is loaded: so it is loaded anew when it comes into view later.
