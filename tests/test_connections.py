@@ -106,9 +106,8 @@ def test_callbacks_that_wait(callback, line):
     # The interrupt ends what waits for an Event.
     with pytest.raises(KeyboardInterrupt), ros_session() as session:
         listener = Listener(callback)
-        spin(session, Talker(1), listener, threads=2)
-        with LOCK:
-            # It has heard the message a moment before it waits.
+        with LOCK:  # before a message can come
+            spin(session, Talker(1), listener, threads=2)
             waits = [f'The callback listener_callback waits at: {line}']
             session.wait_until(lambda: said_by(session.wait_until, lambda: False) == waits)
         raise KeyboardInterrupt
