@@ -53,7 +53,8 @@ NOT_NEEDED = re.compile(
 )
 FOR_INSTRUCTORS = re.compile(r'## \d+\. For instructors')
 NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', re.DOTALL)
-GTEST, GTEST_PYTHON = re.compile('ros-gtest-vendor=='), '3.12'  # see tools/set_up.sh
+GTEST = 'ros-gtest-vendor=='
+GTEST_PYTHON = '3.12'  # whose wheel holds the sources: see tools/set_up.sh
 GLIBC = ('_2_28', '_2_27', '_2_26', '_2_24', '_2_17', '_2_12', '_2_5', '2014', '2010', '1')
 
 
@@ -185,7 +186,9 @@ def download(lock: Path, folder: Path, pythons: tuple) -> None:
             fetched = pins if version.endswith('.0') else set()
     if GTEST_PYTHON not in pythons:
         version = f'{GTEST_PYTHON}.0'
-        jobs.append((version, {_for(block, version) for block in blocks if GTEST.match(block)}))
+        jobs.append(
+            (version, {_for(block, version) for block in blocks if block.startswith(GTEST)})
+        )
     for version, pins in jobs:
         wanted.write_text('\n'.join(pins))
         command = [sys.executable, '-I', ROOT / 'tools/pip.py']

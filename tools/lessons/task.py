@@ -77,14 +77,14 @@ def new_cells(number: int) -> list[NotebookNode]:
     return cells
 
 
-def grown(pattern: str, text: str, number: int) -> str:
-    """Add one to each number from `number` on that a pattern finds between its two groups."""
+def grown(before: str, text: str, number: int, after: str = r'\b') -> str:
+    """Add one to each number from `number` on, at the start of a line, between two patterns."""
 
     def write_number(found: re.Match) -> str:
-        before, old, after = found.groups()
-        return f'{before}{int(old) + (int(old) >= number)}{after}'
+        old = int(found[2])
+        return f'{found[1]}{old + (old >= number)}'
 
-    return re.sub(pattern, write_number, text, flags=re.MULTILINE)
+    return re.sub(rf'^({before})(\d+)(?={after})', write_number, text, flags=re.MULTILINE)
 
 
 def notebook_with(notebook: NotebookNode, number: int) -> NotebookNode:
@@ -94,18 +94,18 @@ def notebook_with(notebook: NotebookNode, number: int) -> NotebookNode:
         if 'solution' in tags(cell) and re.match(rf'%%solution {number - 1}\b', cell.source):
             place = index + 1
         if cell.cell_type == 'markdown':
-            cell.source = grown(r'^(### ✎ Task )(\d+)(\b)', cell.source, number)
+            cell.source = grown('### ✎ Task ', cell.source, number)
         elif 'check' in tags(cell):
-            cell.source = grown(r'^(check\()(\d+)(\b)', cell.source, number)
+            cell.source = grown(r'check\(', cell.source, number)
         elif 'solution' in tags(cell):
-            cell.source = grown(r'^(%%solution )(\d+)(\b)', cell.source, number)
+            cell.source = grown('%%solution ', cell.source, number)
     notebook.cells[place:place] = new_cells(number)
     return clean(notebook)
 
 
 def checks_with(source: str, number: int) -> str:
     """Return the module of checks with a check of the new task after the one before it."""
-    source = grown(r'^(@tasks\.add\()(\d+)(\b)', source, number)
+    source = grown(r'@tasks\.add\(', source, number)
     ends = {
         decorator.args[0].value: node.end_lineno
         for node in ast.parse(source).body
@@ -120,7 +120,7 @@ def checks_with(source: str, number: int) -> str:
 
 def answers_with(text: str, number: int) -> str:
     """Return the answers with those of the new task after those of the one before it."""
-    text = grown(r'^(["\']?)(\d+)( (?:wrong|right))', text, number)
+    text = grown('["\']?', text, number, after=' (?:wrong|right)')
     new = ANSWERS.format(number=number).lstrip('\n')
     later = re.search(rf'^["\']?{number + 1} (?:wrong|right)', text, re.MULTILINE)
     if later is None:

@@ -133,7 +133,7 @@ def is_widget(output: NotebookNode) -> bool:
 
 def is_replay(output: NotebookNode) -> bool:
     """Return whether an output is a replay or a drive."""
-    return '<div class="replay" ' in output.get('data', {}).get('text/html', '')
+    return AT_START[0] in output.get('data', {}).get('text/html', '')
 
 
 def _fold(cell: NotebookNode) -> None:
