@@ -1,4 +1,4 @@
-"""The image of the lessons, used: `make test-classroom`."""
+"""The image of the lessons, used: `make test-hub`."""
 
 import contextlib
 import shutil
