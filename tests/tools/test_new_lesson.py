@@ -47,10 +47,13 @@ def the_rules_hold(folder):
     assert done.returncode == 0, done.stdout
 
 
-def test_added_in_the_middle_and_at_the_end(tmp_path, capsys):
+def test_added_in_the_middle_and_at_the_end_with_a_task(tmp_path, capsys):
     copy = copied(tmp_path / 'copy')
     before = lessons(copy / 'notebooks')
     assert new.main(['lose_your_keys'], copy) == 0
+    commit(copy)
+    assert task.main(['lose_your_keys'], copy) == 0
+    assert 'make test-answers LESSON=lose_your_keys TASK=2' in capsys.readouterr().out
     commit(copy)
     assert new.main([MIDDLE, '--after', '04'], copy) == 0
     printed = capsys.readouterr().out
@@ -77,17 +80,8 @@ def test_added_in_the_middle_and_at_the_end(tmp_path, capsys):
         assert new.main([lesson, '--remove'], copy) == 0
         commit(copy)
     # Of all files, only the table of exercises in notebook 00 is still that of its last run.
-    changed = git(copy, 'diff', '--name-only', 'HEAD~4').split()
+    changed = git(copy, 'diff', '--name-only', 'HEAD~5').split()
     assert changed == ['notebooks/00_start_here.ipynb']
-
-
-def test_a_task_is_added_and_keeps_the_rules(tmp_path, capsys):
-    copy = copied(tmp_path / 'copy')
-    assert new.main(['lose_your_keys'], copy) == 0
-    assert task.main(['lose_your_keys'], copy) == 0
-    assert 'make test-answers LESSON=lose_your_keys TASK=2' in capsys.readouterr().out
-    assert run.main([lessons(copy / 'notebooks')[-2].number], copy) == 0
-    the_rules_hold(copy)
 
 
 def test_later_tasks_follow_a_new_one():
