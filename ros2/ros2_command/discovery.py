@@ -25,13 +25,12 @@ if TYPE_CHECKING:
 # Between two looks. A look costs about 1 ms.
 POLL_S = 0.01
 
-# How long the first, second, ... participant of a command waits until it knows all the others.
-# Fast DDS loses the answers that come before a new participant listens, which happens in some
-# starts only: a new participant gets them sooner than the old one, to which the others say again
-# who they are every 3 s. The last one waits until they have said it three times: on a busy machine
-# it was not enough once. So long it only waits for one that never says it, as a program that is
-# stopped.
-TRIES_S = 0.15, 0.3, 0.6, 10.0
+# How long the first, second, ... participant of a command waits until it knows all the others; most
+# know them after 0.2 s. Fast DDS loses the answers that come before a new participant listens (see
+# `new_threads_wait`): a new participant gets them sooner than the old one, to which the others say
+# again who they are every 3 s. The last one waits until they have said it three times: once was too
+# short on a busy machine. So long it only waits for one that never says it, as a stopped program.
+TRIES_S = 0.5, 0.5, 1.0, 10.0
 
 # Each participant has said who it is and which nodes it has, and nothing new has come for so long:
 # that is all. The endpoints of a node follow each other within milliseconds.

@@ -21,7 +21,7 @@ from ros2_command.discovery import (
     wait_until_quiet,
 )
 from ros2_command.domain import join_domain, why_nobody_is_there
-from ros2_command.guards import at_most, one_process_at_a_time, uninterrupted
+from ros2_command.guards import at_most, new_threads_wait, one_process_at_a_time, uninterrupted
 
 if TYPE_CHECKING:
     from rclpy.node import Node
@@ -49,7 +49,7 @@ class Graph:
             # rclpy's own handlers end the context in the middle of what a command does.
             signal_handler_options=SignalHandlerOptions.NO,
         )
-        with one_process_at_a_time():
+        with one_process_at_a_time(), new_threads_wait():
             self.node = rclpy.create_node(
                 name or f'{COMMAND}{os.getpid()}',
                 context=self._context,
