@@ -7,6 +7,7 @@ import hashlib
 import json
 import re
 from dataclasses import asdict, dataclass, field
+from functools import cache
 from pathlib import Path
 
 from classroom.grade.answers import SEED, Answers, Handed, Task
@@ -15,6 +16,7 @@ from helpers.checks.verdict import KEY
 from tools.lessons.lesson import ROOT, tags
 
 FORM = 2  # of the files
+LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # copies, by Python and JupyterLab
 INTERRUPTED = re.compile(r'Interrupted after (\d+) s\.')  # as judge.py says it
 UNKNOWN = re.compile(r"NameError: name '(\w+)' is not defined")
 FILE = re.compile(r'\((\d+\.py|<tokenize>), line')  # a cell of a kernel is no file for a reader
@@ -48,10 +50,10 @@ class Result:
 
 
 def digest_of(handed: Handed, answers: Answers, files: dict[str, bytes]) -> str:
-    """Return what changes if an answer, the lesson or its checks do."""
-    checks = ROOT / f'helpers/checks/lessons/{handed.module}.py'
-    digest = hashlib.sha256(checks.read_bytes() if checks.exists() else b'')
+    """Return what changes if an answer, the lesson or what judges it does."""
+    digest = hashlib.sha256()
     for part in (
+        _digest_of_files(ROOT / 'helpers'),
         [[cell.id, cell.cell_type, cell.source] for cell in handed.cells],
         sorted(answers.sources.items()),
         sorted(answers.looks.items()),
@@ -59,6 +61,20 @@ def digest_of(handed: Handed, answers: Answers, files: dict[str, bytes]) -> str:
         [[name, hashlib.sha256(data).hexdigest()] for name, data in sorted(files.items())],
     ):
         digest.update(json.dumps(part).encode())
+    return digest.hexdigest()
+
+
+@cache  # for a run: a hundred students need it
+def _digest_of_files(folder: Path) -> str:
+    """Return what changes if a file below the folder does.
+
+    A check stands on most of the helpers: on benches, on robots with faults, on CMake files.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(folder.rglob('*')):
+        if path.is_file() and LEFT_OUT.isdisjoint(path.parts):
+            name, content = path.relative_to(folder), path.read_bytes()
+            digest.update(f'{name} {hashlib.sha256(content).hexdigest()}\n'.encode())
     return digest.hexdigest()
 
 

@@ -11,7 +11,7 @@ import zipfile
 import nbformat
 import pytest
 
-from classroom.grade import alike, runner, tables
+from classroom.grade import alike, results, runner, tables
 from classroom.grade.__main__ import main
 from classroom.grade.answers import answers_of, cells_of, handed_out, lesson_of
 from classroom.grade.results import Kept, digest_of, job_of, result_of
@@ -611,6 +611,28 @@ def test_what_is_kept_is_that_of_the_same_answers_and_lesson(lessons, tmp_path):
     assert kept.get('ada', digest, 20) is None  # it has more time now
     (tmp_path / 'judged/ada.json').write_text('{')
     assert kept.get('ada', digest, 20) is None
+
+
+@pytest.mark.parametrize(
+    ('file', 'is_new'),
+    [
+        ('checks/bench.py', True),
+        ('checks/questions.yaml', True),
+        ('workspace/cmake/FindPython3.cmake', True),
+        ('checks/__pycache__/bench.pyc', False),
+        ('checks/.ipynb_checkpoints/bench.py', False),
+    ],
+)
+def test_what_is_kept_is_that_of_the_same_helpers(lessons, tmp_path, monkeypatch, file, is_new):
+    _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
+    digests = []
+    for text in ('old', 'new'):
+        path = tmp_path / text / 'helpers' / file
+        path.parent.mkdir(parents=True)
+        path.write_text(text)
+        monkeypatch.setattr(results, 'ROOT', tmp_path / text)
+        digests.append(digest_of(lessons['00'], answers, {}))
+    assert (digests[0] != digests[1]) == is_new
 
 
 def test_the_number_of_a_lesson_that_draws_its_task(lessons):
