@@ -22,6 +22,7 @@ SCRIPT = ROOT / 'classroom/container/run.sh'
 MOST_SAID = 30_000_000  # bytes that are read of what it says
 NOT_STARTED = 'it could not be judged: '
 LATE = 'it was ended after'
+INTERRUPTED = 'it was interrupted'
 
 
 @dataclass
@@ -98,11 +99,15 @@ class Trusted(Where):
 
 def run(job: dict, where: Where, limit_s: float) -> Said:
     """Run a job for at most `limit_s` seconds, and return what was said until then."""
+    if where.stopped:
+        return Said(trouble=INTERRUPTED, is_ours=True)
     said, begun = Said(), time.monotonic()
     with tempfile.TemporaryFile() as errors:
         pipes = {'stdin': subprocess.PIPE, 'stdout': subprocess.PIPE, 'stderr': errors}
         process, end = where.start(**pipes)
         where.ends.add(end)
+        if where.stopped:  # while this job started, so that nobody has ended it
+            end()
         late = threading.Event()
 
         def stop() -> None:
@@ -129,7 +134,7 @@ def run(job: dict, where: Where, limit_s: float) -> Said:
             process.wait()
         said.seconds = time.monotonic() - begun
         if where.stopped:
-            said.trouble, said.is_ours = 'it was interrupted', True
+            said.trouble, said.is_ours = INTERRUPTED, True
         elif late.is_set():
             said.trouble = f'{LATE} {limit_s / 60:.0f} min'
         elif not said.ended and not said.trouble:

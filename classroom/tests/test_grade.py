@@ -375,6 +375,23 @@ def test_what_does_not_end_is_ended(monkeypatch, script, limit_s, trouble):
     assert said.is_ours == ('image' in script)  # tried again
 
 
+def test_no_job_goes_on_after_ctrl_c():
+    """Neither one that starts at this moment, nor that of the student's next lesson."""
+
+    class Interrupted(Stand):
+        def start(self, **pipes):
+            started = super().start(**pipes)
+            self.stop()
+            return started
+
+    where = Interrupted('import time; time.sleep(60)')
+    for _ in range(2):
+        said = runner.run({}, where, limit_s=5)
+        assert (said.trouble, said.is_ours) == ('it was interrupted', True)
+        assert said.seconds < 5
+    assert where.count == 1
+
+
 # --- A class --------------------------------------------------------------------------------------
 
 
