@@ -1,9 +1,12 @@
 """What a lesson does without a class. classroom/tests has classes that students join."""
 
+import contextlib
+import queue
 import socket
 
 import pytest
 from support.students import GUESSES, VALUES, in_kernel, student
+from support.waits import LIMIT_S
 
 from helpers.checks import classroom
 
@@ -63,3 +66,34 @@ def test_a_file_that_is_damaged_fails_no_lesson(tmp_path):
     assert 'remove this file, then join again.' in said
     assert said.endswith(classroom.NOT_JOINED)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_cannot_be_used_gets_one_sentence(folder, capsys):
+    folder.joinpath('ros2_notebooks_class.sqlite').mkdir()
+    classroom.leave_class()
+    said = ' '.join(capsys.readouterr().out.split())
+    assert said.startswith('Nothing is sent to the class, because ')
+    assert said.endswith('remove this file, then join again.')
+
+
+def test_a_class_that_is_joined_while_the_thread_ends(folder, monkeypatch):
+    """The thread has just seen that there is no class when the student joins one and guesses."""
+    outbox, told, real = classroom._Outbox(), queue.Queue(), classroom._class
+    guesses = iter([{'id': 'b', 'kind': 'guess'}])
+
+    def join(db):
+        if (known := real(db)) is None and (guess := next(guesses, None)):
+            with contextlib.closing(classroom._open(classroom._file())) as other, other:
+                other.execute("INSERT INTO class VALUES ('', '', 1e12)")
+            outbox.put(guess)
+        return known
+
+    monkeypatch.setattr(classroom, '_class', join)
+    monkeypatch.setattr(classroom, '_ask', lambda known, what, body: told.put(body))
+    outbox.put({'id': 'a', 'kind': 'guess'})
+    thread = outbox._thread
+    assert told.get(timeout=LIMIT_S)['events'][-1]['id'] == 'b'
+    classroom.leave_class()
+    outbox.put({'id': 'c', 'kind': 'guess'})
+    thread.join(LIMIT_S)
+    assert not thread.is_alive()

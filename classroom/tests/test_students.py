@@ -1,5 +1,6 @@
 """What a lesson sends to the class that its student has joined."""
 
+import pytest
 from support.processes import running
 from support.students import BEGIN, GUESSES, VALUES, in_kernel, kernel, student
 
@@ -67,6 +68,25 @@ def test_membership_lasts_until_the_student_leaves(opened, tmp_path):
     in_kernel(tmp_path, f'guess({QUESTION!r}, 3)')
     assert opened.events() == []
     assert in_kernel(tmp_path, 'leave_class()') == classroom.NOT_JOINED
+
+
+@pytest.mark.parametrize('elsewhere', [False, True])
+def test_a_guess_after_joining_again_is_sent(opened, tmp_path, elsewhere):
+    """Also if it is another kernel of the student that leaves and joins."""
+    again = f'leave_class()\n{join(opened)}'
+    script = f"""
+guess({QUESTION!r}, 1)
+sys.stdin.readline()
+{'' if elsewhere else again}
+guess({QUESTION!r}, 2)
+sys.stdin.read()
+"""
+    with running(BEGIN + join(opened) + script, **student(tmp_path)) as process:
+        opened.wait_for(lambda view: view['guesses'][0]['answered'])
+        if elsewhere:
+            in_kernel(tmp_path, again)
+        print(file=process.stdin, flush=True)
+        opened.wait_for(lambda view: opened.events() == [('guess', QUESTION, 2)])
 
 
 def test_the_steps_of_the_cells_that_run(opened, tmp_path):

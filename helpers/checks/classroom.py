@@ -141,24 +141,15 @@ def join_class(address: str = '', code: str = '', name: str = '') -> None:
 
 
 def leave_class() -> None:
-    """Leave the class: it is asked to delete what it has, and nothing more is sent."""
-    text, known = NOT_JOINED, None
-    if path := _file_of_class():
-        with suppress(sqlite3.Error), closing(_open(path)) as db, db:
-            known = _class(db)
-            db.execute('DELETE FROM waiting')
-            db.execute('DELETE FROM class')
-            if os.environ.get(HUB_VARIABLE):
-                db.execute("INSERT INTO class VALUES ('', '', 0)")
-        if not os.environ.get(HUB_VARIABLE):
-            path.unlink()
-    if known:
-        try:
-            _ask(known, 'leave', {})
-            text = 'You have left the class. What you sent is deleted.'
-        except (OSError, ValueError):
-            text = 'You have left the class. It did not answer: what you sent stays there.'
-    print(text)
+    """Leave the class: it is asked to delete what it has, and nothing more is sent.
+
+    What does not work is said in one sentence; nothing is raised.
+    """
+    try:
+        text = _leave()
+    except OSError as problem:
+        text = UNUSABLE.format(_file(), problem)
+    print(*wrap(text), sep='\n')
 
 
 def raise_hand() -> None:
@@ -206,13 +197,18 @@ class _Outbox:
 
     def put(self, event: dict) -> None:
         """Take over an event. It does not wait: one that finds no room is lost."""
-        if len(self._events) < WAITING:
-            self._events.append(event)
-        self._came.set()
         with self._lock:
+            if len(self._events) < WAITING:
+                self._events.append(event)
+            self._came.set()
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._run, daemon=True, name='class')
                 self._thread.start()
+
+    def drop(self) -> None:
+        """Lose the events that are not in the file yet."""
+        with self._keeping:
+            self._events.clear()
 
     def say_trouble(self) -> None:
         """Print one line if the class has not answered since the last line."""
@@ -224,7 +220,7 @@ class _Outbox:
         """End if there is no class, or if the file cannot be used; `put` starts again."""
         try:
             with closing(_open(_file())) as db:
-                while _class(db) is not None:
+                while self._goes_on(db):
                     self._came.clear()
                     self._keep(db)
                     time.sleep(TOGETHER_S)
@@ -233,7 +229,23 @@ class _Outbox:
                     self._came.wait(TRY_AGAIN_S if waiting else None)
         except (OSError, sqlite3.Error) as problem:
             self._trouble = UNUSABLE.format(_file(), problem)
-        self._events.clear()
+            with self._lock:
+                self._end()
+
+    def _goes_on(self, db: sqlite3.Connection) -> bool:
+        """Return whether there is a class; if there is none, let the thread end."""
+        if _class(db) is None:
+            with self._lock:
+                # In between, a student may have joined a class and guessed.
+                if _class(db) is None:
+                    self._end()
+                    return False
+        return True
+
+    def _end(self) -> None:
+        """Let the next event start another thread. `_lock` is held: no event comes meanwhile."""
+        self.drop()
+        self._thread = None
 
     def _at_exit(self) -> None:
         """Keep what came while the thread waited for an answer: a next kernel sends it."""
@@ -345,6 +357,32 @@ def _join(address: str, code: str, name: str) -> str:
         'raise_hand() says that you are lost, leave_class() ends it; in the next lesson import '
         'them again, as here.'
     )
+
+
+def _leave() -> str:
+    path, known = _file_of_class(), None
+    if path is None:
+        return NOT_JOINED
+    hub = os.environ.get(HUB_VARIABLE)
+    _outbox.drop()
+    try:
+        # The file stays, empty: the kernels that have it open find the next class in it.
+        with closing(_open(path)) as db, db:
+            known = _class(db)
+            db.execute('DELETE FROM waiting')
+            db.execute('DELETE FROM class')
+            if hub:
+                db.execute("INSERT INTO class VALUES ('', '', 0)")
+    except sqlite3.Error:
+        if not hub:
+            path.unlink()
+    if known is None:
+        return NOT_JOINED
+    try:
+        _ask(known, 'leave', {})
+    except (OSError, ValueError):
+        return 'You have left the class. It did not answer: what you sent stays there.'
+    return 'You have left the class. What you sent is deleted.'
 
 
 def _ask(known: Class, what: str, body: object) -> dict:
