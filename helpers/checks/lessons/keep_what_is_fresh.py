@@ -467,7 +467,7 @@ def stop_while_looking(make_brake):
 
 @tasks.add(9)
 def a_watchdog(LaserWatchdog):
-    long_s, short_s = 1.3, 0.3
+    long_s, middle_s, short_s = 1.3, 0.9, 0.3
 
     @once
     def trial():
@@ -522,11 +522,11 @@ def a_watchdog(LaserWatchdog):
         """Return how long after one scan it stopped (s), or None."""
         with Bench() as bench:
             stops = hear_stops(bench)
-            bench.spin(LaserWatchdog(long_s))
+            bench.spin(LaserWatchdog(middle_s))
             begun_s = time.monotonic()
             bench.say('scan', scan_with(bench, 0, age_s))
             with clock_set_by(set_s):
-                bench.wait(lambda: stops, long_s + LATE_S)
+                bench.wait(lambda: stops, middle_s + LATE_S)
         return stops[0] - begun_s if stops else None
 
     def counts_when_a_scan_came():
@@ -541,9 +541,9 @@ def a_watchdog(LaserWatchdog):
         ):
             waited_s = silence_until_a_stop(age_s, set_s)
             if waited_s is None:
-                return f'{what}, and in {long_s + LATE_S} s no stop came'
-            if waited_s < long_s:
-                return f'{what}, and with most_s={long_s} it stopped after {waited_s:.1f} s'
+                return f'{what}, and in {middle_s + LATE_S} s no stop came'
+            if waited_s < middle_s:
+                return f'{what}, and with most_s={middle_s} it stopped after {waited_s:.1f} s'
         return True
 
     def needs_no_clock():
