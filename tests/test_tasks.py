@@ -271,6 +271,69 @@ def test_a_cell_that_failed_is_not_judged_by_what_it_was_before():
         assert 'Found: it is 3' in kernel.run('check(1, two)')
 
 
+@pytest.mark.parametrize(
+    'cell',
+    [
+        'two = 3\n!true\n%config\n',
+        '%%time\ntwo = 3',
+        'with open("/dev/null"):\n    two = 3',
+        'if True:\n    for two in [3]:\n        pass',
+        'import os; two: int = 3; os.sep',
+    ],
+)
+def test_a_name_is_found_wherever_a_cell_assigns_it(cell):
+    with Kernel() as kernel:
+        kernel.run(f'{LESSON}\ntwo = 2')
+        kernel.run(f'{cell}\n1 / 0')
+        assert 'The last cell that defines two' in kernel.run('check(1, two)')
+        kernel.run(cell)
+        assert 'Found: it is 3' in kernel.run('check(1, two)')
+
+
+@pytest.mark.parametrize('cell', ['two = (3', 'def two(:\n    pass', 'class two\n    pass'])
+def test_a_name_is_found_in_a_cell_that_python_cannot_read(cell):
+    with Kernel() as kernel:
+        kernel.run(f'{LESSON}\ntwo = 2')
+        kernel.run(cell)
+        assert 'The last cell that defines two' in kernel.run('check(1, two)')
+
+
+@pytest.mark.parametrize(
+    'cell',
+    [
+        'def one():\n    two = 3\n1 / 0',
+        '1 / 0\ndel two',
+        '1 / 0\nimport two',
+        'print(two == 2',
+        '%%write two.py\ntwo = (',
+    ],
+)
+def test_a_failed_cell_that_assigns_another_name_is_nothing_to_the_check(cell):
+    with Kernel() as kernel:
+        kernel.run(f'{LESSON}\ntwo = 2')
+        kernel.run(cell)
+        assert 'All done.' in kernel.run('check(1, two)')
+
+
+def test_the_solution_mends_a_cell_that_failed_if_it_runs():
+    lesson = f'{LESSON}\ntasks.add(2)(lambda two: [("it is 4", lambda: two == 4, "")])'
+    with Kernel() as kernel:
+        kernel.run(lesson)
+        kernel.run('two = 1 / 0')
+        kernel.run('%%solution 1\ntwo = 4')
+        assert 'All done.' in kernel.run('check(2, two)')
+        kernel.run('two = 2\ncheck(1, two)')
+        kernel.run('two = 1 / 0')
+        assert 'goes on with your code' in kernel.run('%%solution 1\ntwo = 4')
+        assert 'The last cell that defines two' in kernel.run('check(1, two)')
+
+
+def test_an_interrupt_outside_of_a_cell_prints_nothing_more():
+    with Kernel() as kernel:
+        kernel.run(LESSON)
+        assert kernel.run("get_ipython().events.trigger('post_run_cell', None)") == ''
+
+
 def test_a_check_before_its_task_says_what_to_run():
     with Kernel() as kernel:
         kernel.run(f'%load_ext helpers.notebook.kernel\nimport helpers.ros.session{LESSON}')

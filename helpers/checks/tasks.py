@@ -31,9 +31,9 @@ check: the task cannot be judged, and the verdict says in which line.
 
 from __future__ import annotations
 
-import ast
 import inspect
 import os
+import re
 import threading
 import time
 import traceback
@@ -49,13 +49,15 @@ from helpers.checks import classroom, progress
 from helpers.checks.apart import Apart, Ending
 from helpers.checks.errors import Failed, NeverEnds, own_line, place_of, places, sentence
 from helpers.checks.verdict import Point, Verdict, bundle
-from helpers.notebook import frames, somebody_watches
+from helpers.notebook import frames, names_of, somebody_watches
 
 CPU_LIMIT_S = 5.0  # of one point: an endless loop uses it up
 LIMIT_S = 30.0  # of one point by the clock
 SHOW_AFTER_S = 1.0
 ENDLESS = 'it did not end. Is there an endless loop, or a spin() that never returns?'
 NOT_TRIED = 'not tried, because the one above did not end'
+# Magics that run the lines below them in the notebook:
+RUNS_PYTHON = re.compile(r'\A(\s*%%(time|capture)\b.*\n)+')
 
 Test = tuple[str, Callable[[], object], str]
 
@@ -175,6 +177,7 @@ def solution(line: str, cell: str) -> None:
         for name, value in names.items()
         if name not in before or before[name] is not value
     }
+    _failed_names.difference_update(_given[task])
     if task not in _checks:
         print(f'The solution of task {task} has run, but its check has not.')
         return
@@ -345,36 +348,17 @@ _failed_names: set[str] = set()  # that a cell should have defined, which ended 
 
 
 def _after_cell(result: object) -> None:
+    if result is None:  # the Interrupt came in IPython's own code
+        return
     source = result.info.raw_cell or ''
-    names = _defined_in(source)
-    if not source.startswith('%%solution'):
-        for given in _given.values():
-            for name in names & given.keys():
-                del given[name]  # now it is the student's
+    names = names_of(RUNS_PYTHON.sub('', source)).given
+    for given in _given.values():
+        for name in names & given.keys():
+            del given[name]  # now it is the student's
     if result.success or isinstance(result.error_in_exec, KeyboardInterrupt):
         _failed_names.difference_update(names)
     else:
         _failed_names.update(names)
-
-
-def _defined_in(source: str) -> set[str]:
-    try:
-        statements = ast.parse(source).body
-    except (SyntaxError, ValueError):
-        # The names of a cell that Python cannot read: at least its classes and functions.
-        lines = [line.replace('(', ' ').replace(':', ' ').split() for line in source.splitlines()]
-        return {words[1] for words in lines if len(words) > 1 and words[0] in ('class', 'def')}
-    names = set()
-    for statement in statements:
-        if isinstance(statement, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            names.add(statement.name)
-        elif isinstance(statement, ast.Assign | ast.AnnAssign | ast.AugAssign):
-            names |= {
-                node.id
-                for node in ast.walk(statement)
-                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-            }
-    return names
 
 
 # --- Showing --------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ MODULES = {
     'interrupts': ('at_each_signal', 'uninterrupted'),
     'kernel': ('can_ask', 'hear_while_a_cell_runs'),
     'look': ('LOOK', 'LOOK_CSS', 'LOOK_FILE'),
+    'names': ('names_of',),
     'progress_bar': ('ProgressBar', 'somebody_watches'),
     'text': ('table', 'wrap'),
     'threads': ('frames',),

@@ -2,9 +2,7 @@
 
 import ast
 import re
-import symtable
 from collections.abc import Iterator
-from typing import NamedTuple
 
 from IPython.core.inputtransformer2 import TransformerManager
 from nbformat import NotebookNode
@@ -33,30 +31,6 @@ def guess_of(cell: NotebookNode) -> tuple[str, str, object] | None:
     except (SyntaxError, ValueError):  # of a lesson that is being written
         pass
     return None
-
-
-class Names(NamedTuple):
-    """The names in a cell: those it assigns, those it imports, and those of other cells it uses."""
-
-    given: set[str] = set()
-    imported: set[str] = set()
-    taken: set[str] = set()
-
-
-def names_of(source: str) -> Names:
-    """Return the names in the source of a cell; none of a lesson that is being written."""
-    try:
-        plain = TransformerManager().transform_cell(source)
-        top = symtable.symtable(plain, 'cell', 'exec')
-    except SyntaxError:
-        return Names()
-    given = {symbol.get_name() for symbol in top.get_symbols() if symbol.is_assigned()}
-    imported, used, tables = set(), set(), [top]
-    for table in tables:
-        imported |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_imported()}
-        used |= {symbol.get_name() for symbol in table.get_symbols() if symbol.is_global()}
-        tables += table.get_children()
-    return Names(given, imported, used - given - imported)
 
 
 def recalled(source: str) -> set[str] | None:

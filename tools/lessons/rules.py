@@ -14,7 +14,8 @@ from nbformat import NotebookNode
 
 from helpers.checks import questions
 from helpers.checks.verdict import KEY
-from tools.lessons.code import given_away, guess_of, names_of, recalled
+from helpers.notebook import names_of
+from tools.lessons.code import given_away, guess_of, recalled
 from tools.lessons.comparison import comment_markers, metadata_tags
 from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, called, tags
 
