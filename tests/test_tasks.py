@@ -4,6 +4,7 @@ import threading
 from html.parser import HTMLParser
 
 import numpy as np
+import psutil
 import pytest
 from support.kernel import Kernel
 
@@ -154,6 +155,27 @@ def test_interrupt_is_no_try(capsys, number, monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             tried(capsys, number)
     assert 'Hint' not in str(tried(capsys, number, second=False))
+
+
+def test_an_interrupt_takes_the_message_of_a_running_check_away(capsys, number, monkeypatch):
+    shown = []
+
+    class Shown:
+        def __init__(self, data, **_):
+            shown.append(data['text/html'])
+
+        def update(self, data, **_):
+            shown.append(data['text/html'])
+            if shown[-1]:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr(module, 'somebody_watches', lambda: True)
+    monkeypatch.setattr(module, 'SHOW_AFTER_S', 0)
+    monkeypatch.setattr(module, 'display', Shown)
+    with pytest.raises(KeyboardInterrupt):
+        tried(capsys, number)
+    assert shown == ['Checking: 0 of 2 …', 'Checking: 1 of 2 …', '']
+    assert psutil.Process().children() == []
 
 
 def test_long_lines_are_broken_at_blanks(capsys, number):

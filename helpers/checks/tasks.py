@@ -197,24 +197,23 @@ def _judge(
     """Fill the verdict with the points of a task, judged in a process apart."""
     started = time.monotonic()
     hints: list[str] = []
-    running = Running(verdict)
     apart = Apart(lambda send: _worker(points, send), cpu_s, limit_s)
     tried = 0
-    for kind, content in apart:
-        if kind == 'points':
-            verdict.points = [Point(what) for what, _ in content]
-            hints = [hint for _, hint in content]
-        elif kind == 'mistake':
-            verdict.note = f'This task cannot be judged: {content}.'
-        else:
-            verdict.points[tried].ok, verdict.points[tried].found, names_line = content
-            if names_line:
-                hints[tried] = ''  # the line says more, and a hint for another mistake misleads
-            tried += 1
-        running.update(time.monotonic() - started)
+    with Running(verdict) as running:
+        for kind, content in apart:
+            if kind == 'points':
+                verdict.points = [Point(what) for what, _ in content]
+                hints = [hint for _, hint in content]
+            elif kind == 'mistake':
+                verdict.note = f'This task cannot be judged: {content}.'
+            else:
+                verdict.points[tried].ok, verdict.points[tried].found, names_line = content
+                if names_line:
+                    hints[tried] = ''  # the line says more; a hint for another mistake misleads
+                tried += 1
+            running.update(time.monotonic() - started)
     verdict.seconds = time.monotonic() - started
     _add_ending(verdict, tried, apart.ending)
-    running.end()
     if apart.ending.printed:
         print(apart.ending.printed, end='' if apart.ending.printed.endswith('\n') else '\n')
     if verdict.of == 'solution':
@@ -365,12 +364,15 @@ def _after_cell(result: object) -> None:
 
 
 class Running:
-    """Says while a check runs how far it is, if a person watches and it takes a while."""
+    """Says how far a check is, if a person watches and it takes a while. Nothing of it stays."""
 
     def __init__(self, verdict: Verdict) -> None:
         self._verdict = verdict
         self._watched = somebody_watches()
         self._display = None
+
+    def __enter__(self) -> Running:
+        return self
 
     def update(self, waited_s: float) -> None:
         """Show how many points were tried, once the check has taken `SHOW_AFTER_S`."""
@@ -383,8 +385,7 @@ class Running:
         else:
             self._display.update(data, raw=True)
 
-    def end(self) -> None:
-        """Take the message away."""
+    def __exit__(self, *exception) -> None:
         if self._display is not None:
             self._display.update({'text/html': ''}, raw=True)
 
