@@ -4,7 +4,6 @@ import inspect
 import threading
 import time
 
-from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Twist
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
@@ -13,7 +12,7 @@ from rclpy.node import Node
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci as Patrol
 
-from helpers.checks.bench import Bench
+from helpers.checks.bench import STATUS, Bench
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
 from helpers.replay import ActionRecording, replay_action
@@ -21,12 +20,6 @@ from helpers.robot import Floor
 
 tasks = Tasks()
 check = tasks.check
-
-STATUS = {
-    GoalStatus.STATUS_SUCCEEDED: 'SUCCEEDED',
-    GoalStatus.STATUS_CANCELED: 'CANCELED',
-    GoalStatus.STATUS_ABORTED: 'ABORTED',
-}
 
 
 @tasks.add(1)
