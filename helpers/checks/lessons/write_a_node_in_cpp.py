@@ -11,7 +11,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 
 from helpers.checks.bench import RELIABLE, Bench
-from helpers.checks.builds import why_it_failed
+from helpers.checks.builds import build
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
 
@@ -56,21 +56,19 @@ def write_try_nearest(workspace):
     workspace.write('src/scan_tools/src/try_nearest.cpp', TRY_NEAREST)
 
 
-def build(workspace, *packages):
+def install_anew(workspace, *packages):
     """Build packages. Raises Failed with the first error.
 
     A build takes nothing away: what an earlier try of the last package has installed would stay.
+    It is removed before. The other packages stay, and need not be compiled again.
     """
     shutil.rmtree(workspace.file(f'install/{packages[-1]}'), ignore_errors=True)
-    result = workspace.build(*packages)
-    if not result.ok:
-        raise Failed(why_it_failed(result))
-    return True
+    return build(workspace, *packages)
 
 
 @tasks.add(1, limit_s=BUILD_S)
 def the_nearest_range(workspace):
-    built = once(lambda: build(workspace, 'scan_tools'))
+    built = once(lambda: install_anew(workspace, 'scan_tools'))
 
     def nearest_is(right, range_min, range_max, *ranges):
         built()
@@ -188,7 +186,7 @@ def code_of(workspace, file):
 @tasks.add(2, limit_s=BUILD_S)
 def its_cmakelists(workspace):
     packages = 'scan_tools', 'small_rclcpp', 'std_msgs'
-    built = once(lambda: build(workspace, 'scan_tools', 'small_rclcpp', 'watcher'))
+    built = once(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'watcher'))
 
     def finds_the_packages():
         """Test the text: a package that another one has found is there, too."""
@@ -229,7 +227,7 @@ def brakes(workspace, *pairs, pause_s=0.0):
 
 @tasks.add(3, limit_s=BUILD_S)
 def a_node_of_your_own(workspace):
-    built = once(lambda: build(workspace, 'scan_tools', 'small_rclcpp', 'brake'))
+    built = once(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake'))
 
     def drives(*pairs):
         return built() and brakes(workspace, *pairs)
@@ -297,7 +295,7 @@ def another_robot(workspace, ARGUMENTS):
         if isinstance(ARGUMENTS, str):
             raise Failed('ARGUMENTS is one text: write several, in ( )')
         if not workspace.file('install/brake/lib/brake/brake').exists():
-            build(workspace, 'scan_tools', 'small_rclcpp', 'brake')
+            install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake')
         topics = set()
         with Bench() as bench, workspace.run('brake', 'brake', *ARGUMENTS) as process:
 
@@ -420,7 +418,7 @@ def your_executor(workspace):
         code = code_of(workspace, 'src/brake/src/brake.cpp')
         if not re.search(r'\bmy_spin\s*\(', code):
             raise Failed(CALLS_MY_SPIN)
-        return build(workspace, 'scan_tools', 'small_rclcpp', 'brake')
+        return install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake')
 
     def drives(*pairs, pause_s=0.0):
         return built() and brakes(workspace, *pairs, pause_s=pause_s)
@@ -431,7 +429,7 @@ def your_executor(workspace):
         workspace.write('src/try_spin/CMakeLists.txt', TRY_SPIN_CMAKE)
         workspace.write('src/try_spin/package.xml', TRY_SPIN_XML)
         try:
-            build(workspace, 'try_spin')
+            install_anew(workspace, 'try_spin')
             with workspace.run('try_spin', 'try_spin') as process:
                 process.wait()
         finally:
