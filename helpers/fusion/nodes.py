@@ -329,13 +329,12 @@ def localize(
         for name, messages in heard.items():
             listener.create_subscription(Odometry, f'{name}/odometry', messages.append, DEPTH)
         trip(robot, executor, seconds=seconds)
-    of_filters = [
-        {of: getattr(node, name) for of, node in zip(heard, filters, strict=True)}
-        for name in Localized._fields[3:]
-    ]
+    by_name = dict(zip(heard, filters, strict=True))
     return Localized(
-        {name: table_of(messages) for name, messages in heard.items()},
-        robot.record.table('poses').rename(columns={'t_s': 't'}),
-        pd.DataFrame(list(frames.values()), columns=['parent', 'child', 'publisher']),
-        *of_filters,
+        estimates={name: table_of(messages) for name, messages in heard.items()},
+        truth=robot.record.table('poses').rename(columns={'t_s': 't'}),
+        frames=pd.DataFrame(list(frames.values()), columns=['parent', 'child', 'publisher']),
+        parts={name: node.parts for name, node in by_name.items()},
+        used={name: node.used for name, node in by_name.items()},
+        two_d={name: node.two_d for name, node in by_name.items()},
     )
