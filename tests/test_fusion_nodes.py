@@ -68,6 +68,20 @@ def test_a_variance_of_zero_is_the_least_one():
 
 
 @pytest.mark.parametrize(
+    ('parents', 'yaw'),
+    [
+        ({'imu': ('plate', 0.5), 'plate': ('base', 0.25)}, 0.75),
+        ({'imu': ('plate', 0.5), 'plate': ('imu', -0.5)}, None),
+        ({'imu': ('imu', 0.5)}, None),
+        ({'imu': ('base', 0.5), 'base': ('plate', 0.0), 'plate': ('base', 0.0)}, 0.5),
+    ],
+)
+def test_the_way_to_the_base_ends_also_in_a_circle(parents, yaw):
+    node = SimpleNamespace(_parents=parents, base='base')
+    assert EkfNode._yaw_in_base(node, 'imu') == yaw
+
+
+@pytest.mark.parametrize(
     ('waits', 'x'), [('wait_for_datum: true, ', 100.0), ('wait_for_datum: false, ', 0.0), ('', 0.0)]
 )
 def test_the_datum_counts_only_with_wait_for_datum(waits, x, tmp_path):

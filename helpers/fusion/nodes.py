@@ -181,6 +181,8 @@ class EkfNode(_Configured):
             yaw, way = 0.0, {end: 0.0}
             while end in self._parents:
                 end, turn = self._parents[end]
+                if end in way:  # the frames form a circle
+                    break
                 yaw += turn
                 way[end] = yaw
             ways.append(way)
