@@ -452,6 +452,32 @@ def test_an_interrupt_while_a_process_ends_leaves_none(tmp_path):
     assert psutil.Process().children() == []
 
 
+# At each Ctrl+C it says so. It ends after some time, or never.
+SLOW = """
+import signal, sys, time
+def end(*_):
+    print('Ctrl+C', flush=True)
+    time.sleep(0.3)
+    sys.exit() if {ends} else None
+signal.signal(signal.SIGINT, end)
+print('ready', flush=True)
+while True:
+    time.sleep(1)
+"""
+
+
+@pytest.mark.parametrize('ends', [True, False])
+def test_an_interrupted_process_has_time_to_end_and_is_not_killed(ends, tmp_path, monkeypatch):
+    monkeypatch.setattr(processes, 'STOP_TIMEOUT_S', 0.1)
+    command = [sys.executable, '-c', SLOW.format(ends=ends)]
+    with Process('slow', command, dict(os.environ), tmp_path) as process:
+        process.wait_for('ready')
+        process.interrupt(limit_s=5 if ends else 0.6)
+        assert process.running != ends
+        assert process.lines == ['ready', 'Ctrl+C']
+    process.interrupt()  # it has ended
+
+
 # --- Terminals -----------------------------------------------------------------------------------
 
 

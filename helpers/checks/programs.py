@@ -6,10 +6,7 @@ file, its line, its text. builds.py does it for builds.
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
-import signal
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -17,11 +14,9 @@ from pathlib import Path
 from catkin_pkg.package import InvalidPackage, Package, parse_package
 
 from helpers.checks.errors import Failed, is_students
-from helpers.workspace import Process, Workspace, without_folders
+from helpers.workspace import DIED, Process, Workspace, without_folders
 
 POLL_S = 0.02
-DIED = 'process has died'
-LAUNCH_ENDS_S = 15.0  # it waits 5 s, and once more, for a program that does not end
 TRACEBACK = 'Traceback (most recent call last)'
 FRAME = re.compile(r'\s*File "(.*?)", line (\d+)')
 CHAINED = re.compile(r'During handling of|The above exception')
@@ -143,20 +138,8 @@ def launch(
 
         wait_until(is_over, limit_s)
         text = '\n'.join(process.lines)
-        end_launch(process)
+        process.interrupt()
     return without_folders(text, workspace.path)
-
-
-def end_launch(process: Process) -> None:
-    """Press Ctrl+C, and wait for all programs of a launch.
-
-    It gives each of them five seconds, then sends a second signal. Were it killed meanwhile, its
-    programs would go on.
-    """
-    if process.running:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGINT)
-    wait_until(lambda: not process.running, LAUNCH_ENDS_S)
 
 
 def started(text: str) -> list[str]:

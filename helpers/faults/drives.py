@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-import os
-import signal
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,18 +11,17 @@ import numpy as np
 from helpers.faults.cases import Case
 from helpers.robot import CORRIDOR, TURTLEBOT3, DriveRecord, Floor, Pose, Robot, watch
 from helpers.ros import Session, ros_session
-from helpers.workspace import Process, without_folders
+from helpers.workspace import DIED, Process, without_folders
 
 DRIVER = TURTLEBOT3.but(max_speed=0.5)  # twice as fast as a real one, which is slow to look at
 LAUNCH = 'source install/setup.bash\nros2 launch {name} bringup.launch.xml robot:=false'
 # Once its nodes are known: so long, or longer if it has not heard a command yet, a robot may stand.
 READY_S, PATIENCE_S, SILENT_S = 30.0, 3.0, 6.0
 STILL_S, LONGEST_S = 1.2, 12.0
-ENDS_S = 15.0  # launch waits 5 s, and once more, for a program that does not end
+LIMIT_S = 57.0  # of a drive in which nothing is decided
 TROUBLE_M, TROUBLE_S, PUSH_S = 0.4, 1.4, 0.5
 AHEAD = np.radians(np.arange(-10.0, 11.0))
 NODES = 3  # of the package
-DIED = 'process has died'
 
 
 @dataclass(frozen=True)
@@ -93,8 +88,8 @@ def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', pa
             watch(robot, name=name)
         with workspace.start(words, f'the launch of {case.name}') as program:
             watcher = Watcher(session, robot, program, trouble)
-            robot.run(READY_S + LONGEST_S + ENDS_S, until=watcher.is_over)
-            end_launch(program)
+            robot.run(LIMIT_S, until=watcher.is_over)
+            program.interrupt()
         for record in session.records():  # what programs log stands in their terminal
             record.printed = True
         x, y, yaw = robot.pose
@@ -197,21 +192,7 @@ class Watcher:
         return now_s - self._ready_s > max(patience_s, 1.5 * (self._ready_s - self._begun_s))
 
 
-def end_launch(process: Process) -> None:
-    """Press Ctrl+C, and wait for all programs of a launch."""
-    if process.running:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGINT)
-    _wait(lambda: not process.running, ENDS_S)
-
-
 def end_launches(processes) -> None:
     """End the launches of terminals that are still open, of which robots would hear."""
     for process in [*processes]:
-        end_launch(process)
-
-
-def _wait(condition: Callable[[], bool], limit_s: float) -> None:
-    end_s = time.monotonic() + limit_s
-    while not condition() and time.monotonic() < end_s:
-        time.sleep(0.02)
+        process.interrupt()

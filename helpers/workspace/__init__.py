@@ -16,7 +16,7 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
 """
 
 from helpers.workspace.build_output import BuildResult, lines_that_matter, without_folders
-from helpers.workspace.processes import Process
+from helpers.workspace.processes import DIED, Process
 from helpers.workspace.tf2_msgs import provide_tf2_msgs
 from helpers.workspace.wheels import fix_wheels
 from helpers.workspace.workspace import BEGIN_EMPTY, COLLEAGUE, SMALL_RCLCPP, Workspace
@@ -24,6 +24,7 @@ from helpers.workspace.workspace import BEGIN_EMPTY, COLLEAGUE, SMALL_RCLCPP, Wo
 __all__ = [
     'BEGIN_EMPTY',
     'COLLEAGUE',
+    'DIED',
     'SMALL_RCLCPP',
     'BuildResult',
     'Process',

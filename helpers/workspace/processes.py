@@ -22,6 +22,8 @@ from helpers.ros import NOT_OF_A_LESSON, nearly
 from helpers.workspace.folders import locks
 
 STOP_TIMEOUT_S = 5.0
+DIED = 'process has died'  # what a launch prints of a program
+LAUNCH_ENDS_S = 15.0  # it waits 5 s, and once more, for a program that does not end
 POLL_S = 0.02
 # The process ends with the kernel, also when the kernel is killed: 1 is Linux's PR_SET_PDEATHSIG.
 # In a terminal, so do all that it has started: its window closes, which is a SIGHUP.
@@ -157,6 +159,18 @@ class Process:
         if lines and re.match(r'[\w.]+(Error|Exception)\b', lines[-1]):
             return f'Its last line: {lines[-1]}'
         return f'Its last lines: {" / ".join(lines[-3:]) or "none"}'
+
+    def interrupt(self, limit_s: float = LAUNCH_ENDS_S) -> None:
+        """Press Ctrl+C, and wait until it has ended, at most `limit_s` seconds. Nothing is killed.
+
+        So a launch has the time to end its programs. Were it killed meanwhile, they would go on.
+        """
+        end_s = time.monotonic() + limit_s
+        if self.running:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self.pid, signal.SIGINT)
+        while self.running and time.monotonic() < end_s:
+            time.sleep(POLL_S)
 
     def stop(self) -> None:
         """End it as Ctrl+C does. One that does not end within a few seconds is killed."""

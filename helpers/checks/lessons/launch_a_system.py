@@ -7,7 +7,6 @@ import time
 
 from helpers.checks.builds import builds
 from helpers.checks.programs import (
-    end_launch,
     error_in,
     error_of_launch,
     launch,
@@ -394,7 +393,7 @@ def guarded(workspace, words, kill=False):
             if len(ids) > most:
                 break
             time.sleep(0.05)
-        end_launch(process)
+        process.interrupt()
     log = workspace.file('log/ros/latest/launch.log')
     text = '\n'.join(process.lines).replace(f'{workspace.path}/', '')
     return (log.read_text() if started(text) else ''), text

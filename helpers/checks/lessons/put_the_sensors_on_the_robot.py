@@ -19,7 +19,7 @@ from urdf_parser_py.urdf import URDF
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build
 from helpers.checks.errors import Failed
-from helpers.checks.programs import DIED, end_launch, error_of_launch, started
+from helpers.checks.programs import DIED, error_of_launch, started
 from helpers.checks.tasks import Tasks, once
 from helpers.fusion import VARIANCES, localize
 from helpers.ros import quaternion, seconds_of, stamp_of, yaw_of
@@ -666,7 +666,7 @@ def watch_launch(workspace, file):
                 {topic: {pose.header.frame_id for pose in heard} for topic, heard in poses.items()},
                 set(children),
             )
-            end_launch(process)
+            process.interrupt()
     if error := error_of_launch(without_folders(text, workspace.path)):
         raise Failed(error)
     return launched
