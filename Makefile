@@ -18,11 +18,8 @@ site: set_up ## write the lessons as a web site into site/, to read offline
 lab-container: ## open the lessons in a container: PORT=8890, LESSONS=FOLDER for your notebooks
 	@classroom/container/run.sh lab
 
-clean: ## remove the environment, caches and what lessons built; what you wrote stays
-	if [ -d .jupyter ]; then find .jupyter -mindepth 1 -maxdepth 1 ! -name hub -exec rm -rf {} +; fi
-	rm -rf .venv .uv scratch handout site .site .hypothesis .pytest_cache .ruff_cache
-	find . \( -name .git -o -path ./my_lessons -o -path ./presentation -o -path ./.jupyter/hub \) -prune -o \
-		\( -name __pycache__ -o -name .ipynb_checkpoints \) -prune -exec rm -rf {} +
+clean: ## remove the environment, caches and builds; files that you wrote and your progress stay
+	@tools/clean.sh
 
 ## Teach
 

@@ -2,7 +2,9 @@
 
 import ast
 import re
+import shutil
 import xml.dom.minidom
+from types import SimpleNamespace
 
 import pytest
 import yaml
@@ -35,7 +37,7 @@ def results(points):
 
 
 class Offline(Workspace):
-    """A folder in which nothing runs."""
+    """A folder in which nothing runs. A build copies the package."""
 
     def __init__(self, path):
         self.path, self._parts, self._ran = path, {}, []
@@ -43,6 +45,10 @@ class Offline(Workspace):
     def terminal(self, commands):
         self._ran.append((commands, ''))
         return ''
+
+    def build(self, name, symlink_install):
+        shutil.copytree(self.path / 'src' / name, self.path / 'install' / name)
+        return SimpleNamespace(ok=True)
 
 
 def check_syntax(path, text):
@@ -87,6 +93,23 @@ def test_the_core_has_four_and_each_other_one_a_name():
     assert {*CORE.values()} <= {*FAULTS}
     assert len(OTHERS) >= len(FAULTS), 'Add a name to OTHERS in find_the_fault.py.'
     assert len({*CORE, *OTHERS}) == len(CORE) + len(OTHERS)
+
+
+@pytest.mark.parametrize('name', ['deaf_brake', 'old_build'])
+def test_a_robot_whose_build_was_cleaned_is_built_as_it_was_left(name, tmp_path):
+    workspace = Offline(tmp_path)
+    robot = take(workspace, FAULTS[name], 'eve')
+    built = robot.named(next(iter(robot.fault.installed), 'courier/brake.py'))
+    installed = workspace.file('install/eve') / built
+    before = installed.read_text()
+    robot.mend(robot.fault.wrong[0])
+    (robot.folder / 'notes.txt').write_text('mine')
+    left = robot.files
+    shutil.rmtree(tmp_path / 'install')
+    assert take(workspace, FAULTS[name], 'eve').files == left != robot.given
+    assert installed.exists()
+    if robot.fault.installed:  # the old build is its fault
+        assert installed.read_text() == before != (robot.folder / built).read_text()
 
 
 def test_a_file_that_does_not_say_all_is_named(tmp_path):

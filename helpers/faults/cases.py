@@ -249,11 +249,19 @@ class Case:
         self.workspace.write(f'{GIVEN}/COLCON_IGNORE', '')
         for path, text in self.given.items():
             self.workspace.write(f'{GIVEN}/{self.name}/{path}', text)
+        self.build()
+
+    def build(self) -> None:
+        """Build its package: if an old build is the fault, with other files than those in src."""
+        in_src = self.given | self.files
         self.write(self.fault.installed)
-        result = self.workspace.build(self.name, symlink_install=not self.fault.installed)
+        try:
+            result = self.workspace.build(self.name, symlink_install=not self.fault.installed)
+        finally:
+            for path in map(self.named, self.fault.installed):
+                self.workspace.write(f'src/{self.name}/{path}', in_src[path])
         if not result.ok:
             raise RuntimeError(str(result))
-        self.write(self.fault.files)
 
     def mend(self, mend: Mend) -> None:
         """Change it. Raises ValueError if an old text is not there exactly once."""
@@ -270,7 +278,8 @@ class Case:
 def take(workspace: Workspace, fault: Fault, name: str, anew: bool = False) -> Case:
     """Put a robot with a fault into the workspace, and build its package.
 
-    If it is there already, with the same fault, it stays as it was left. `anew` begins again.
+    If it is there already, with the same fault, it stays as it was left, and is built only if no
+    build is there, as after `make clean`. `anew` begins again.
     Raises ValueError for a name that no package can have, RuntimeError if it cannot be built.
     """
     if not re.fullmatch('[a-z][a-z0-9_]*', name):
@@ -279,4 +288,6 @@ def take(workspace: Workspace, fault: Fault, name: str, anew: bool = False) -> C
     before = _files(workspace.file(f'{GIVEN}/{name}'))
     if anew or not case.folder.exists() or before != case.given:
         case.reset()
+    elif not workspace.file(f'install/{name}').exists():
+        case.build()
     return case

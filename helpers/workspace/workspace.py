@@ -38,7 +38,8 @@ CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has don
 
 # The parts of the files that several cells write, in a workspace.
 PARTS = '.parts.json'
-# Marks the workspace of a person: another run puts it aside, and removes nothing.
+# Marks the workspace of a person: another run puts it aside, and removes nothing. tools/clean.sh
+# removes what was built.
 OWNED = '.owned'
 BUILT = ('build', 'install', 'log')  # by colcon
 # Set by a program that shows lessons from their start, such as slides: begin each workspace empty.

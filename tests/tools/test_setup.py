@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from support.processes import put
 
+from helpers.workspace.workspace import OWNED
 from tools.lessons.lesson import ROOT
 
 LOCKS = Path('tools/locks')
@@ -267,3 +268,46 @@ def test_another_ros_and_other_settings_stay_out(tmp_path):
     assert mine.items() <= seen.items()
     for name in ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'IPYTHONDIR', 'MPLCONFIGDIR'):
         assert seen[name].startswith(f'{tmp_path}/.jupyter')
+
+
+def test_what_somebody_wrote_is_not_cleaned(tmp_path):
+    removed = [
+        '.venv/bin/python',
+        '.jupyter/lab/workspaces/tabs',
+        '.jupyter/data/kernels/kernel.json',
+        'helpers/__pycache__/one.pyc',
+        'scratch/.lesson_09.lock',
+        'scratch/.lesson_19.lock',
+        'scratch/lesson_09/src/of_a_run_without_a_person.py',
+        'scratch/lesson_19/build/ada/setup.py',
+        'scratch/lesson_19/install/setup.bash',
+        'scratch/lesson_19/log/COLCON_IGNORE',
+        'scratch/lesson_19/src/ada/__pycache__/brake.pyc',
+    ]
+    kept = [
+        'notebooks/02_lose_messages.ipynb',
+        '.jupyter/hub/jupyterhub.sqlite',
+        '.jupyter/data/ros2_notebooks_progress.txt',
+        'scratch/by_hand/build/notes.txt',
+        f'scratch/lesson_09.before_1/{OWNED}',
+        'scratch/lesson_09.before_1/src/talker.py',
+        f'scratch/lesson_19/{OWNED}',
+        'scratch/lesson_19/src/ada/ada/brake.py',
+        'scratch/lesson_19/record.txt',
+    ]
+    root = tmp_path / 'élève one'
+    for name in (*removed, *kept):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text('text')
+    (root / 'tools').mkdir()
+    for name in ('Makefile', 'tools/clean.sh'):
+        shutil.copy(ROOT / name, root / name)
+    for _ in range(2):  # the second time there is nothing to do
+        command = ['make', '--silent', 'clean']
+        answer = subprocess.run(command, cwd=root, capture_output=True, text=True)
+        assert (answer.returncode, answer.stdout, answer.stderr) == (0, '', '')
+        left = {str(path.relative_to(root)) for path in root.rglob('*') if path.is_file()}
+        assert left == {*kept, 'Makefile', 'tools/clean.sh'}
+    shutil.rmtree(root / 'scratch')
+    shutil.rmtree(root / '.jupyter')
+    subprocess.run(command, cwd=root, check=True)  # as before the first lesson
