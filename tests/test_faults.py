@@ -4,12 +4,22 @@ import ast
 import re
 import shutil
 import xml.dom.minidom
+from itertools import cycle
 from types import SimpleNamespace
 
 import pytest
 import yaml
 
-from helpers.checks.lessons.find_the_fault import CORE, OTHERS, found, mended
+from helpers.checks import progress
+from helpers.checks.lessons.find_the_fault import (
+    CORE,
+    LAST,
+    OTHERS,
+    found,
+    mended,
+    next_robot,
+    order_of,
+)
 from helpers.faults import FAULTS, KINDS, OTHER, Case, drive, take
 from helpers.faults.cases import FILE, HEALTHY, edited, read
 from helpers.workspace import Workspace
@@ -110,6 +120,35 @@ def test_a_robot_whose_build_was_cleaned_is_built_as_it_was_left(name, tmp_path)
     assert installed.exists()
     if robot.fault.installed:  # the old build is its fault
         assert installed.read_text() == before != (robot.folder / built).read_text()
+
+
+@pytest.mark.parametrize('seeds', [[1], [3], range(32)])
+def test_after_the_others_all_robots_come_again_each_with_its_fault(seeds, tmp_path, monkeypatch):
+    monkeypatch.setenv(progress.FILE_VARIABLE, str(tmp_path / 'progress.txt'))
+    monkeypatch.setenv('JPY_SESSION_NAME', 'notebooks/19_find_the_fault.ipynb')
+    workspace, seeds, came = Offline(tmp_path), cycle(seeds), []
+    others = {*FAULTS} - {*CORE.values()}
+    rounds = [others, {*FAULTS}, {*FAULTS}]
+    for _ in range(sum(map(len, rounds))):
+        seed = next(seeds)
+        robot = next_robot(workspace, seed)
+        assert robot.files == robot.given
+        robot.mend(robot.fault.right[0])
+        (robot.folder / 'notes.txt').write_text('mine')
+        assert next_robot(workspace, seed).files == robot.files  # it is not judged yet
+        progress.record(LAST, robot.fault.name)
+        progress.record(LAST, robot.fault.name)  # the check is run again
+        came.append(robot.fault.name)
+    for faults in rounds:
+        assert {*came[: len(faults)]} == faults
+        del came[: len(faults)]
+
+
+def test_a_number_tells_in_which_order_the_robots_come():
+    order, known = order_of(7), []
+    for fault in order:  # UNIVERSITY.md prints the first three
+        assert order_of(7, known)[0] == fault
+        known.append(fault)
 
 
 def test_a_file_that_does_not_say_all_is_named(tmp_path):

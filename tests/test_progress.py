@@ -99,11 +99,11 @@ def test_without_a_file_there_is_no_total(monkeypatch):
 def test_what_a_task_was_about_is_kept_if_it_differs(kept):
     tasks = Tasks()
     tasks.add(1, about=str.lower)(lambda word: [('it is right', lambda: word != 'WRONG', '')])
-    for word in ('WRONG', 'ADA', 'BO', 'ADA'):
+    for word in ('WRONG', 'ADA', 'ADA', 'BO', 'ADA'):
         tasks.check(1, word)
-    assert progress.about(1) == ['ada', 'bo']
+    assert progress.about(1) == ['ada', 'bo', 'ada']
     assert progress.about(2) == []
-    assert kept.read_text().splitlines()[0] == 'lose_them 1'
+    assert kept.read_text().splitlines().count('lose_them 1') == 1
 
 
 def test_kernels_that_write_at_once_lose_nothing(kept, capsys):

@@ -80,6 +80,7 @@ def file() -> Path | None:
 def record(task: int, about: str = '') -> None:
     """Keep that this task of the running lesson is solved, and about what it was, in one word.
 
+    What it was about is kept each time that it differs from the time before: `about` returns it.
     If the file cannot be written nothing happens, since no lesson may fail because of it. `show`
     says so.
     """
@@ -87,9 +88,13 @@ def record(task: int, about: str = '') -> None:
     if path is None or not lesson:
         return
     with suppress(OSError):
-        for key in (f'{lesson} {task}', f'{lesson} {task} {about}'.strip()):
-            if key not in _read(path).splitlines():
-                add(key)
+        key = f'{lesson} {task}'
+        lines = _read(path).splitlines()
+        if key not in lines:
+            add(key)
+        earlier = [line for line in lines if line.startswith(f'{key} ')]
+        if about and earlier[-1:] != [f'{key} {about}']:
+            add(f'{key} {about}')
 
 
 def add(line: str) -> None:
@@ -116,7 +121,10 @@ def number_of(lesson: str) -> str:
 
 
 def about(task: int) -> list[str]:
-    """Return what this task of the running lesson was about whenever it was solved."""
+    """Return what this task of the running lesson was about whenever it was solved, in order.
+
+    It is never the same twice in a row: to check an answer again is not to solve another task.
+    """
     path, start = file(), f'{this_lesson()} {task} '
     if path is None:
         return []

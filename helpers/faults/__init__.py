@@ -12,7 +12,7 @@ tempting and wrong. Another fault is another folder: CONTRIBUTING.md says what i
     drives   drive it, in the page or to judge it
 """
 
-from helpers.faults.cases import FAULTS, KINDS, Case, Fault, Mend, mend_in_words, take
+from helpers.faults.cases import FAULTS, KINDS, Case, Fault, Mend, forget, mend_in_words, take
 from helpers.faults.drives import OTHER, SEEN, Drive, drive
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     'Fault',
     'Mend',
     'drive',
+    'forget',
     'mend_in_words',
     'take',
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -291,3 +291,9 @@ def take(workspace: Workspace, fault: Fault, name: str, anew: bool = False) -> C
     elif not workspace.file(f'install/{name}').exists():
         case.build()
     return case
+
+
+def forget(workspace: Workspace, names: Iterable[str]) -> None:
+    """Let robots begin again when they are taken the next time. Their packages stay until then."""
+    for name in names:
+        shutil.rmtree(workspace.file(f'{GIVEN}/{name}'), ignore_errors=True)

@@ -3,12 +3,13 @@
 import random
 import re
 import time
+from collections import Counter
 
 from helpers.checks import progress
 from helpers.checks.errors import Failed
 from helpers.checks.programs import error_of_launch
 from helpers.checks.tasks import Tasks, once
-from helpers.faults import FAULTS, KINDS, OTHER, mend_in_words, take
+from helpers.faults import FAULTS, KINDS, OTHER, forget, mend_in_words, take
 from helpers.faults import drive as drive_apart
 
 tasks = Tasks()
@@ -36,18 +37,27 @@ def robot(workspace, name):
 def next_robot(workspace, seed):
     """Return the next robot: the number decides in which order they come.
 
-    First those come that have not been mended yet, without those of the core. Then all of them.
+    First those come that have not been mended yet, without those of the core. Then all of them,
+    again and again. Until it is mended, a robot stays as it was left.
     """
     known = progress.about(LAST)
-    return take(workspace, FAULTS[order_of(seed, known)[0]], OTHERS[len(known) % len(OTHERS)])
+    name = OTHERS[len(known) % len(OTHERS)]
+    forget(workspace, {*OTHERS} - {name})  # a later one of this name may have the same fault
+    return take(workspace, FAULTS[order_of(seed, known)[0]], name)
 
 
 def order_of(seed, known=()):
-    """Return the faults in the order that a number gives them, without those that are known."""
-    left = [fault for fault in FAULTS if fault not in {*known, *CORE.values()}]
-    order = sorted(left or FAULTS)
+    """Return the faults that are left in this round, in the order that a number gives them.
+
+    `known` are those that were mended, in all rounds. The first round is without the core.
+    """
+    times = Counter([*CORE.values(), *known])
+    least = min(times[fault] for fault in FAULTS)
+    order = sorted(fault for fault in FAULTS if least or fault not in CORE.values())
     random.Random(seed).shuffle(order)
-    return order
+    left = [fault for fault in order if times[fault] == least]
+    # The last one of a round does not begin the next: progress keeps none twice in a row.
+    return sorted(left, key=lambda fault: fault in known[-1:])
 
 
 def drive(case):
