@@ -116,7 +116,7 @@ test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
 .PHONY: help lab present class test test-ros2 test-tools test-packages test-answers test-browser test-classroom test-hub image lab-container hub handout grade update notebooks \
-	lesson site soak bench release lint lock licences clean set_up
+	lesson task site soak bench release lint lock licences clean set_up
 
 PYTHON := .venv/bin/python
 

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 
@@ -102,6 +103,28 @@ def test_later_tasks_follow_a_new_one():
     assert [cell.id for cell in cells if cell.id in kept] == kept
 
 
+def test_lines_that_may_name_a_task_by_its_old_number_are_printed(tmp_path, capsys):
+    number, name = KNOWN.number, KNOWN.name
+    for path in (f'notebooks/{KNOWN.file}', *(path.format(name=name) for path in new.BESIDE)):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / path, tmp_path / path)
+    texts = {
+        'exam.md': f'# Lesson {number}\n\nTake a pen.\nIt is tasks 1 to 4.\n# Home\nTask 3\n',
+        'made.md': f'<!-- made by `make notebooks`: x -->\n\n| {number} | task 4 |\n<!-- end -->',
+        'grade.sh': f'LESSON={name} TASKS="1 4"\nLESSON={number} TASK=2\nTASK=4\n',
+    }
+    for path, text in texts.items():
+        (tmp_path / path).write_text(text, encoding='utf-8')
+    git(tmp_path, 'init', '-q')
+    commit(tmp_path)
+    assert task.main([number, '--after', '2'], tmp_path) == 0
+    printed = capsys.readouterr().out.partition('Look at these lines')[2].splitlines()
+    assert [line for line in printed if line.startswith(tuple(texts))] == [
+        'exam.md: It is tasks 1 to 4.',
+        f'grade.sh: LESSON={name} TASKS="1 4"',
+    ]
+
+
 @pytest.mark.parametrize(
     ('arguments', 'sentence'),
     [
@@ -109,6 +132,7 @@ def test_later_tasks_follow_a_new_one():
         (['77'], "There is no single lesson '77'."),
         (['99'], 'has no task yet'),
         ([KNOWN.number, '--after', '77'], 'name one of them with AFTER'),
+        (['find_the_fault'], 'for each of the tasks 1 to 10: write the new task by hand'),
     ],
 )
 def test_a_task_of_no_lesson_gets_one_sentence(capsys, arguments, sentence):

@@ -270,6 +270,12 @@ def test_another_ros_and_other_settings_stay_out(tmp_path):
         assert seen[name].startswith(f'{tmp_path}/.jupyter')
 
 
+def test_a_file_with_the_name_of_a_command_changes_nothing():
+    text = (ROOT / 'Makefile').read_text().replace('\\\n', '')
+    commands = set(re.findall(r'^([a-z0-9_-]+):(?!=)', text, re.MULTILINE))
+    assert commands == set(re.search(r'^\.PHONY:(.*)', text, re.MULTILINE)[1].split())
+
+
 def test_what_somebody_wrote_is_not_cleaned(tmp_path):
     removed = [
         '.venv/bin/python',

@@ -93,7 +93,7 @@ def plan_to_add(name: str, after: str, root: Path) -> Plan:
             raise ValueError('The glossary stays at the end: name another lesson with AFTER.')
         place = numbered.index(before.stem) + 1 if before.stem in numbered else 0
     numbered.insert(place, '')
-    texts, moved = _move(_texts_of(root), numbered)
+    texts, moved = _move(all_texts(root), numbered)
     new = f'{place + 1:02d}_{name}'
     before = tables.lessons_of(texts)[place]
     part = before.part if before.is_lesson else 'nodes'
@@ -112,7 +112,7 @@ def plan_to_remove(lesson: str, root: Path) -> Plan:
         raise ValueError(f'{old} is no lesson: it stays.')
     numbered.remove(old)
     removed = [path for path in [_path(old), *_beside(old[3:])] if (root / path).exists()]
-    texts = {path: text for path, text in _texts_of(root).items() if path not in removed}
+    texts = {path: text for path, text in all_texts(root).items() if path not in removed}
     texts |= tables.updated(texts)
     if named := sorted(path for path, text in texts.items() if old in text):
         raise ValueError(
@@ -172,7 +172,7 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
     parser.add_argument('--remove', action='store_true', help='take the lesson out')
     options = parser.parse_args(arguments)
     try:
-        before = _texts_of(root)
+        before = all_texts(root)
         if options.remove:
             plan = plan_to_remove(options.name, root)
         else:
@@ -217,7 +217,7 @@ def _path(stem: str) -> str:
     return f'notebooks/{stem}.ipynb'
 
 
-def _texts_of(root: Path) -> tables.Texts:
+def all_texts(root: Path) -> tables.Texts:
     """Return all texts that git knows, but those of this tool, and all notebooks."""
     texts = {}
     for path in _git(root, 'ls-files', '-z').split('\0'):

@@ -12,14 +12,17 @@ import argparse
 import ast
 import re
 import sys
+from collections.abc import Collection
 from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
 
 from tools.lessons.clean import clean, text_of, write
-from tools.lessons.lesson import ROOT, Lesson, chosen, tags
+from tools.lessons.lesson import ROOT, Lesson, chosen, read, tags
+from tools.lessons.new import all_texts
 from tools.lessons.rules import FOLDED
+from tools.lessons.tables import BLOCK, Texts
 
 TEXT = (
     '### ✎ Task {number} ★: Find the largest\n\n'
@@ -64,6 +67,8 @@ ANSWERS = """
 """
 CELLS = (('markdown', '', TEXT), ('code', 'exercise', STARTER),
          ('code', 'check', 'check({number}, largest)'), ('code', 'solution', SOLUTION))  # fmt: skip
+# How a text calls tasks, but for their own headings: `task 3`, `tasks 9 and 10`, `TASKS="9 10"`.
+CALLED = re.compile(r'(?<!✎ )\b(?:[Tt]asks? |TASKS?="?)([\d, andto]+)')
 
 
 def new_cells(number: int) -> list[NotebookNode]:
@@ -106,16 +111,19 @@ def notebook_with(notebook: NotebookNode, number: int) -> NotebookNode:
 def checks_with(source: str, number: int) -> str:
     """Return the module of checks with a check of the new task after the one before it."""
     source = grown(r'@tasks\.add\(', source, number)
-    ends = {
-        decorator.args[0].value: node.end_lineno
-        for node in ast.parse(source).body
-        if isinstance(node, ast.FunctionDef)
-        for decorator in node.decorator_list
-        if isinstance(decorator, ast.Call) and ast.unparse(decorator.func) == 'tasks.add'
-    }
     lines = source.splitlines(keepends=True)
-    lines.insert(ends[number - 1], CHECK.format(number=number))
+    lines.insert(ends_of_checks(source)[number - 1], CHECK.format(number=number))
     return ''.join(lines)
+
+
+def ends_of_checks(source: str) -> dict[int, int]:
+    """Return the last line of the function of each task, where `@tasks.add(2)` stands above it."""
+    ends = {}
+    for node in ast.parse(source).body:
+        for decorator in getattr(node, 'decorator_list', []):
+            if found := re.match(r'tasks\.add\((\d+)', ast.unparse(decorator)):
+                ends[int(found[1])] = node.end_lineno
+    return ends
 
 
 def answers_with(text: str, number: int) -> str:
@@ -131,7 +139,8 @@ def answers_with(text: str, number: int) -> str:
 def plan(lesson: str, after: str, root: Path) -> tuple[dict[Path, str], int, int]:
     """Return the new texts of the lesson's files, the task's number, and that of the last one.
 
-    Raises ValueError with one sentence if there is no such lesson or task.
+    The first of them is the notebook. Raises ValueError with one sentence if there is no such
+    lesson or task, or if its checks are written in another way.
     """
     path = chosen(lesson, root / 'notebooks')[0]
     found = Lesson(path.name, nbformat.read(path, as_version=4))
@@ -143,29 +152,55 @@ def plan(lesson: str, after: str, root: Path) -> tuple[dict[Path, str], int, int
     number = int(after or last) + 1
     checks = root / f'helpers/checks/lessons/{found.name}.py'
     answers = root / f'tests/answers/{found.name}.yaml'
+    source = checks.read_text(encoding='utf-8')
+    if {*ends_of_checks(source)} != {*range(1, last + 1)}:
+        raise ValueError(
+            f'{checks.relative_to(root)} has no @tasks.add(...) above a function for each of the '
+            f'tasks 1 to {last}: write the new task by hand, as CONTRIBUTING.md says.'
+        )
     texts = {
         path: text_of(notebook_with(found.notebook, number)),
-        checks: checks_with(checks.read_text(encoding='utf-8'), number),
+        checks: checks_with(source, number),
         answers: answers_with(answers.read_text(encoding='utf-8'), number),
     }
     return texts, number, last + 1
 
 
-def to_look_at(texts: dict[Path, str], number: int, root: Path) -> list[str]:
-    """Return the lines of the lesson's files that may call a task by its old number."""
+def to_look_at(texts: Texts, own: Collection[str], stem: str, number: int) -> list[str]:
+    """Return the lines that may call a task of a lesson by its old number.
+
+    `stem` is the lesson's, such as 02_lose_messages, and `own` are the paths of its files. In those
+    of others a task counts if the lesson is named near it.
+    """
+    two_digits, name = stem[:2], stem[3:]
+    # `lessons 01 and 02`, `LESSON=02`, `[02 Lose messages](...)`, `| 02, step 3 |`, `02 task 3`.
+    lesson = re.compile(
+        rf'(?:[Ll]essons? (?:\d\d(?:,| and| or| to)* )*|LESSON="?|[|[] ?){two_digits}\b'
+        rf'|\b{two_digits},? task|{name}'
+    )
     lines = []
-    for path, text in texts.items():
-        if path.suffix == '.ipynb':  # its outputs are written by the next run
-            cells = nbformat.reads(text, as_version=4).cells
-            parts = {f'{path.relative_to(root)}#cell-id={cell.id}': cell.source for cell in cells}
-        else:
-            parts = {str(path.relative_to(root)): text}
-        for place, part in parts.items():
+    for path, text in sorted(texts.items()):
+        for place, part in parts_of(path, text):
+            if path not in own and not lesson.search(part):
+                continue
             for line in part.splitlines():
-                named = re.search(r'(?<!✎ )\b[Tt]asks? ([\d, and]+)', line)
-                if named and any(int(one) >= number for one in re.findall(r'\d+', named[1])):
+                tasks = re.findall(r'\d+', ' '.join(CALLED.findall(line)))
+                if any(int(task) >= number for task in tasks):
                     lines.append(f'{place}: {line.strip()}')
     return lines
+
+
+def parts_of(path: str, text: str) -> list[tuple[str, str]]:
+    """Return where each cell of a notebook, section of a document or other line is, and its text.
+
+    What is written anew is left out: the outputs of notebooks, and the tables of documents.
+    """
+    if path.endswith('.ipynb'):
+        cells = read(text, Path(path).name).notebook.cells
+        return [(f'{path}#cell-id={cell.id}', cell.source) for cell in cells]
+    if path.endswith('.md'):
+        return [(path, part) for part in re.split('^(?=#)', BLOCK.sub('', text), flags=re.M)]
+    return [(path, line) for line in text.splitlines()]
 
 
 def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
@@ -177,13 +212,17 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
         if not options.lesson:
             raise ValueError('Name the lesson: make task LESSON=01 AFTER=3')
         texts, number, last = plan(options.lesson, options.after, root)
+        lines = []
+        if number < last:
+            own = {str(path.relative_to(root)): text for path, text in texts.items()}
+            lines = to_look_at(all_texts(root) | own, own, next(iter(texts)).stem, number)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1
     for path, text in texts.items():
         write(path, text)
         print(f'{path.relative_to(root)}: task {number} is in it')
-    if number < last and (lines := to_look_at(texts, number, root)):
+    if lines:
         print('Look at these lines, which may name a task by its old number:', *lines, sep='\n')
     print(
         'In JupyterLab: File > Reload Notebook from Disk. Change the task in the three files. '
