@@ -20,9 +20,10 @@ for mark in scratch/*/.owned; do
 done
 rmdir scratch 2> /dev/null || true # unless something of a person is in it
 
-# JupyterLab's state. What students on a hub have written stays, and the progress of the student here.
+# JupyterLab's state. What students on a hub have written stays, a class until its teacher ends it, and
+# the progress of the student here.
 if [ -d .jupyter ]; then
-    find .jupyter -mindepth 1 -maxdepth 1 ! -name hub ! -name data -exec rm -rf {} +
+    find .jupyter -mindepth 1 -maxdepth 1 ! -name hub ! -name class ! -name data -exec rm -rf {} +
 fi
 if [ -d .jupyter/data ]; then
     find .jupyter/data -mindepth 1 -maxdepth 1 ! -name 'ros2_notebooks_*' -exec rm -rf {} +

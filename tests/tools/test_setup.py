@@ -293,6 +293,7 @@ def test_what_somebody_wrote_is_not_cleaned(tmp_path):
     kept = [
         'notebooks/02_lose_messages.ipynb',
         '.jupyter/hub/jupyterhub.sqlite',
+        '.jupyter/class/class.sqlite',
         '.jupyter/data/ros2_notebooks_progress.txt',
         'scratch/by_hand/build/notes.txt',
         f'scratch/lesson_09.before_1/{OWNED}',
