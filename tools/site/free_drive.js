@@ -62,7 +62,7 @@ function body({ walls, start: [x, y, yaw], limits: [radius, acceleration, turnin
   return { now, step, range };
 }
 
-const HELLO = 'Come to A, B and C. Click the floor, then hold arrow keys, two for a curve; or hold the buttons, or a place of the floor.';
+const HELLO = 'Come to A, B and C. Click the floor, then hold arrow keys, two for a curve; or hold a button, or a place on the floor.';
 const list = names => names.join(', ').replace(/, (?=[^,]*$)/, ' and ');
 const bumped = count => (count ? `with ${count} ${count > 1 ? 'bumps' : 'bump'}` : 'without a bump');
 
