@@ -16,7 +16,8 @@ from helpers.workspace import DIED, Process, without_folders
 DRIVER = TURTLEBOT3.but(max_speed=0.5)  # twice as fast as a real one, which is slow to look at
 LAUNCH = 'source install/setup.bash\nros2 launch {name} bringup.launch.xml robot:=false'
 # Once its nodes are known: so long, or longer if it has not heard a command yet, a robot may stand.
-READY_S, PATIENCE_S, SILENT_S = 30.0, 3.0, 6.0
+# Two of its nodes may know each other only when one says again who it is: in Fast DDS every 3 s.
+READY_S, PATIENCE_S, SILENT_S = 30.0, 5.0, 6.0
 STILL_S, LONGEST_S = 1.2, 12.0
 LIMIT_S = 57.0  # of a drive in which nothing is decided
 TROUBLE_M, TROUBLE_S, PUSH_S = 0.4, 1.4, 0.5
