@@ -149,7 +149,8 @@ class Bench:
     def as_tester(self, function: Callable, *arguments: object):
         """Let the tester's executor call a function, and return what it returns.
 
-        An answer to a request of another thread may get lost: https://github.com/ros2/rclpy/issues/1123
+        An answer to a goal that another thread sends may get lost:
+        https://github.com/ros2/rclpy/issues/1123
         """
         task = self._own_executor.create_task(function, *arguments)
         self.wait(task.done)
