@@ -12,7 +12,7 @@ CONFTEST = """import pytest
 def sensor():
     raise OSError('no camera')
 """
-TESTS = """import os
+TESTS = """import os, threading
 
 import pytest
 
@@ -54,8 +54,7 @@ def test_missing(again):
 
 
 def test_endless():
-    while True:
-        pass
+    threading.Event().wait()
 
 
 def test_exit():
@@ -79,7 +78,7 @@ SAID = {
     'OSError: no camera',
     'missing': 'test_missing fails, line 38 of test_speed.py: def test_missing(again). '
     "fixture 'again' not found",
-    'endless': 'test_endless does not end',
+    'endless': 'test_endless does not end. Line 43 of test_speed.py: threading.Event().wait()',
     'exit': 'test_exit ends Python itself',
     'skipped': 'no test has run',
     'nothing': 'there are no tests',

@@ -16,6 +16,8 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from helpers.checks.errors import own_line
+
 RUNNER = Path(__file__).with_name('planted_runner.py')
 LONGEST = 160  # characters of a message
 
@@ -117,8 +119,10 @@ def run_tests(
 def _test_run(result: dict, folder: Path) -> TestRun:
     if result['code'] < 0:
         test = result['test'] or 'the file of the tests'
-        ending = 'does not end' if result['code'] == -1 else 'ends Python itself'
-        return TestRun(problem=f'{test} {ending}')
+        if result['code'] == -2:
+            return TestRun(problem=f'{test} ends Python itself')
+        place = own_line((str(folder / file), int(line)) for file, line, _ in result['places'])
+        return TestRun(problem=f'{test} does not end. {place}'.rstrip('. '))
     failed = [
         Failure(**entry | {'file': str(folder / entry['file'])}) for entry in result['failed']
     ]

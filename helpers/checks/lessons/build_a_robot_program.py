@@ -1309,14 +1309,14 @@ WHAT_TO_TEST = {
 }
 
 
-@tasks.add(16, limit_s=120)
+@tasks.add(16, limit_s=90)
 def test_the_logic(workspace, tests):
     return judged_tests(
         workspace, tests, 'logic', LOGIC, WRONG_LOGICS, 'Is each line what tasks 3 and 6 say?'
     )
 
 
-@tasks.add(17, limit_s=120)
+@tasks.add(17, limit_s=90)
 def test_the_node(workspace, tests):
     return judged_tests(workspace, tests, 'patrol', NODE, WRONG_NODES, 'What does task 12 say?')
 

@@ -81,7 +81,7 @@ ROWS = {
 }
 
 
-@tasks.add(1, limit_s=90)
+@tasks.add(1, limit_s=60)
 def test_the_function(workspace, tests):
     versions = {'our': '', 'another': SPEED, **WRONG_SPEEDS}
     runs = once(lambda: run_tests(workspace, PACKAGE, tests, 'brake_pkg.speed', versions))
@@ -138,7 +138,7 @@ def test_again_ends():
 """
 
 
-@tasks.add(2, limit_s=90)
+@tasks.add(2, limit_s=60)
 def a_domain_of_its_own(workspace):
     @once
     def runs():
@@ -197,7 +197,7 @@ def run_busy(workspace, tests='test/test_brake.py'):
     return runs['busy']
 
 
-@tasks.add(3, limit_s=90)
+@tasks.add(3, limit_s=60)
 def catch_it(workspace, tests):
     busy = once(lambda: run_busy(workspace, tests))
 
@@ -244,7 +244,7 @@ def test_waits(ticks, wanted, limit_s):
 """
 
 
-@tasks.add(4, limit_s=90)
+@tasks.add(4, limit_s=60)
 def wait_for_an_event(workspace):
     @once
     def runs():
@@ -263,7 +263,7 @@ def wait_for_an_event(workspace):
     ]
 
 
-@tasks.add(5, limit_s=90)
+@tasks.add(5, limit_s=60)
 def fix_the_flaky_test(workspace, tests):
     @once
     def runs():
