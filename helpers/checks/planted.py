@@ -121,7 +121,7 @@ def _test_run(result: dict, folder: Path) -> TestRun:
         test = result['test'] or 'the file of the tests'
         if result['code'] == -2:
             return TestRun(problem=f'{test} ends Python itself')
-        place = own_line((str(folder / file), int(line)) for file, line, _ in result['places'])
+        place = own_line((str(folder / file), int(line)) for file, line in result['places'])
         return TestRun(problem=f'{test} does not end. {place}'.rstrip('. '))
     failed = [
         Failure(**entry | {'file': str(folder / entry['file'])}) for entry in result['failed']

@@ -56,7 +56,8 @@ def new_threads_wait() -> Iterator[None]:
     SCHED_BATCH do not interrupt each other, and here they share a processor.
     """
     before = _threads()
-    processors = os.sched_getaffinity(0)
+    processors, policy = os.sched_getaffinity(0), os.sched_getscheduler(0)
+    priority = os.sched_getparam(0)
     with contextlib.suppress(OSError):  # a container may refuse it
         os.sched_setaffinity(0, {random.choice([*processors])})
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
@@ -66,7 +67,7 @@ def new_threads_wait() -> Iterator[None]:
         for thread in {0} | _threads() - before:
             with contextlib.suppress(OSError):  # it has ended
                 os.sched_setaffinity(thread, processors)
-                os.sched_setscheduler(thread, os.SCHED_OTHER, os.sched_param(0))
+                os.sched_setscheduler(thread, policy, priority)
 
 
 def _threads() -> set[int]:

@@ -301,8 +301,8 @@ def leave_a_robot_that_stands(workspace, file):
             if not process.running:
                 return f'it ends by itself: {error_in(process.lines)}'
             time.sleep(0.3)  # now it waits
-            os.kill(process.pid, signal.SIGINT)
-            ended = wait_until(lambda: not process.running, 3)
+            process.interrupt(limit_s=3)
+            ended = not process.running
         return ended or 'while no callback is due, Ctrl+C does not end it'
 
     no_handler = 'SignalHandlerOptions.NO, and node.stop() in finally, before try_shutdown().'
