@@ -3,7 +3,6 @@
 import contextlib
 import math
 import signal
-import tempfile
 import time
 
 import numpy as np
@@ -197,27 +196,29 @@ def test_the_brake_is_a_law(depth, hits):
 # --- Its life
 
 
-def test_a_robot_in_another_process_is_heard_and_ends():
+def test_a_robot_in_another_process_is_heard_and_ends(tmp_path):
+    """Also in a folder with a file that has the name of one of Python's own modules."""
+    (tmp_path / 'copy.py').write_text('raise RuntimeError')
     with ros_session() as session:
         node = Node('listener')
         heard = []
         node.create_subscription(LaserScan, '/far/scan', heard.append, 10)
         spin(session, node)
-        with robot_process('corridor', '--ros-args', '-r', '__ns:=/far') as process:
+        with robot_process(tmp_path, 'corridor', '--ros-args', '-r', '__ns:=/far') as process:
             process.wait_for('drives', LIMIT_S)
             session.wait_until(lambda: heard, LIMIT_S)
             assert heard[0].header.frame_id == 'far/base_scan'
         assert process.wait() == 0
         gone = pytest.raises(RuntimeError, match='No such file.*nowhere.txt')
-        with robot_process('nowhere.txt') as process, gone:
+        with robot_process(tmp_path, 'nowhere.txt') as process, gone:
             process.wait_for('drives', LIMIT_S)
 
 
-def robot_process(floor, *arguments):
+def robot_process(folder, floor, *arguments):
     """Start the robot as a launch file does: as a package that is installed beside ROS 2."""
     environment = build_environment()
     command = [*command_of('simulated_robot', 'robot', environment), '--floor', floor, *arguments]
-    return Process('robot', command, environment | graph_environment(), tempfile.gettempdir())
+    return Process('robot', command, environment | graph_environment(), folder)
 
 
 def test_an_interrupt_ends_the_robot():

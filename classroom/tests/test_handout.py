@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+import tempfile
 
 import nbformat
 import pytest
@@ -154,7 +155,11 @@ def test_the_lessons_of_a_hub_have_their_pictures(tmp_path):
     assert {path.name for path in (lessons / PICTURES).iterdir()} == names
 
 
-def test_packages_are_those_of_the_wanted_pythons(tmp_path):
+def test_packages_are_those_of_the_wanted_pythons(tmp_path, monkeypatch):
+    """Also if the folder for temporary files has one with the name of one of Python's modules."""
+    (tmp_path / 'copy.py').write_text('raise RuntimeError')
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
+    monkeypatch.setenv('TMPDIR', str(tmp_path))
     head, *blocks = re.split(r'\n(?=[a-z])', (ROOT / 'tools/locks/requirements.lock').read_text())
     names = ('cycler', 'markupsafe', 'empy')
     # One that only some Pythons need, by their last number, too: 3.11.2 of Debian 12 is one.
