@@ -171,6 +171,20 @@ def test_an_interrupt_ends_the_check_and_all_it_started(capsys):
     assert psutil.Process().children(recursive=True) == []
 
 
+def test_an_interrupt_while_the_guard_begins(capsys, monkeypatch):
+    fork = apart._fork
+
+    def interrupted():
+        process = fork()
+        signal.raise_signal(signal.SIGINT)  # in this process, and in the guard
+        return process
+
+    monkeypatch.setattr(apart, '_fork', interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        points_of(sleeps_for_ever, capsys)
+    assert psutil.Process().children(recursive=True) == []
+
+
 KILLED = """
 import subprocess, time
 from helpers.checks.tasks import Tasks

@@ -83,14 +83,16 @@ class Apart:
         leave_ros()
         messages, guards_end = Pipe(duplex=False)
         alive, hold = os.pipe()  # the guard reads its end when nobody holds the other one any more
-        guard = _fork()
-        if guard == 0:
-            messages.close()
-            os.close(hold)
-            _be_guard(self._function, self._limits, guards_end, alive)
-        guards_end.close()
-        os.close(alive)
+        guard = 0
         try:
+            with uninterrupted():  # a guard needs somebody who ends it
+                guard = _fork()
+                if guard == 0:
+                    messages.close()
+                    os.close(hold)
+                    _be_guard(self._function, self._limits, guards_end, alive)
+                guards_end.close()
+                os.close(alive)
             while True:
                 try:
                     message = messages.recv()
@@ -104,7 +106,8 @@ class Apart:
             with uninterrupted():
                 os.close(hold)
                 messages.close()
-                os.waitpid(guard, 0)
+                if guard:
+                    os.waitpid(guard, 0)
 
 
 def _fork() -> int:
