@@ -851,6 +851,18 @@ def the_whole_node(workspace):
         tour.run(1)
         return (tour.status() == 'CANCELED' and tour.robot.stopped) or tour.status()
 
+    def cancel_without_scans(tour):
+        tour.send(2)
+        tour.run(1)
+        tour.cable.plugged = False
+        tour.run(0.2)
+        tour.handle.cancel_goal_async()
+        limit = time.monotonic() + 10
+        while not tour.ended() and time.monotonic() < limit:
+            time.sleep(0.02)  # the timer may have a clock of its own
+            tour.run(0.02)
+        return tour.status() == 'CANCELED' or tour.status()
+
     def speed(tour):
         def is_set(value):
             return tour.node.set_parameters([Parameter('speed', value=value)])[0].successful
@@ -926,6 +938,11 @@ def the_whole_node(workspace):
         ),
         ('it visits two places', toured(two_places), 'self.command(*steer(...))'),
         ('a cancel stops it', toured(cancel), 'job.place() is None then.'),
+        (
+            'a cancel ends the job also if no scan comes',
+            toured(cancel_without_scans),
+            'self.create_timer(0.1, self.job.place)',
+        ),
         ('its speed is a parameter', toured(speed), rule),
         ('also at the start', wrong_at_the_start, 'First the callback, then declare_parameter.'),
         ('a low battery ends the job', toured(low_battery, empty), 'self.job.end()'),
@@ -1205,6 +1222,7 @@ class Patrol(Node):
         self.job = Job(self, lambda: not self.battery.low)
         self.watchdog = Watchdog(self, self.stop, 'scan')
         self.create_subscription(LaserScan, 'scan', self.on_scan, LASER)
+        self.create_timer(0.1, self.job.place)
 
     def judge(self, parameters):
         speeds = [parameter.value for parameter in parameters if parameter.name == 'speed']
