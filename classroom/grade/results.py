@@ -54,6 +54,7 @@ def digest_of(handed: Handed, answers: Answers, files: dict[str, bytes]) -> str:
     digest = hashlib.sha256()
     for part in (
         _digest_of_files(ROOT / 'helpers'),
+        _digest_of_files(ROOT / 'ros2'),  # whose command many answers call
         [[cell.id, cell.cell_type, cell.source] for cell in handed.cells],
         sorted(answers.sources.items()),
         sorted(answers.looks.items()),
