@@ -49,6 +49,7 @@ def built():
         workspace.write('src/user_pkg/CMakeLists.txt', f'{cmake}install(CODE "")\n')
         depends = '<exec_depend>talker_pkg</exec_depend>'
         workspace.write('src/user_pkg/package.xml', package_xml('user_pkg', 'cmake', depends))
+        workspace.write('copy.py', 'raise RuntimeError')  # as a module of Python is called
         workspace.result = workspace.build()
         workspace.environment()  # sourced in the hostile environment, and kept
     yield workspace

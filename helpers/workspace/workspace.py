@@ -221,9 +221,10 @@ class Workspace:
 
     def _colcon(self, arguments: list[str], total: int) -> list[str]:
         """Run colcon in the workspace with a progress bar, and return the lines it printed."""
-        # The entry point, because the script `colcon` may be of another environment.
+        # The entry point: the script `colcon` may be of another environment. As with the script,
+        # no file of the workspace hides a module of Python (-P).
         main = 'import sys; from colcon_core.command import main; sys.exit(main())'
-        command = [sys.executable, '-c', main, '--log-base', 'log', *arguments]
+        command = [sys.executable, '-P', '-c', main, '--log-base', 'log', *arguments]
         environment = self._underlay.environment() if self._underlay else build_environment()
         # If it were killed, its compilers would go on without an owner: it builds to its end.
         with Process('colcon', command, environment, self.path, ends_with_kernel=False) as colcon:
