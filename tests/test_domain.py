@@ -4,6 +4,10 @@ import contextlib
 import fcntl
 import os
 import random
+import socket
+import subprocess
+import sys
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -141,6 +145,44 @@ def test_hostile_variables(monkeypatch, shared_id):
             assert 'ROS_LOCALHOST_ONLY' not in os.environ
         assert graph_environment() == narrow
     configure_discovery('LOCALHOST')  # also if nothing is to be removed
+
+
+PLAIN = """
+import rclpy, sys
+rclpy.init()
+node = rclpy.create_node('plain')
+sys.stdin.read()
+"""
+
+
+def test_a_session_announces_itself_often():
+    """While a plain participant says twice more who it is, a session says so five times, or more.
+
+    Both send to the ports of participants that may be there: here to that of the twentieth.
+    """
+    announced = Counter()
+    with ros_session(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+        port.bind(('127.0.0.1', 7400 + 250 * domain_of_session() + 10 + 2 * 20))
+        port.settimeout(LIMIT_S)
+        ours = sender_of(port)
+        environment = os.environ | graph_environment()
+        environment.pop('FASTRTPS_DEFAULT_PROFILES_FILE', None)
+        command = [sys.executable, '-c', PLAIN]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, env=environment) as plain:
+            while (theirs := sender_of(port)) == ours:
+                pass
+            while announced[theirs] < 6:  # it begins with five, 0.1 s apart
+                announced[sender_of(port)] += 1
+            announced.clear()
+            while announced[theirs] < 2:
+                announced[sender_of(port)] += 1
+            plain.stdin.close()
+    assert announced[ours] >= 5
+
+
+def sender_of(port):
+    """Return which participant sends the next RTPS message: the prefix of its GUID."""
+    return port.recv(65536)[8:20]
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,15 @@ import rclpy
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 
+from helpers.ros.domain import announce_often
+
 
 def run_program(make_node: Callable[[], Node]) -> None:
     """Initialize rclpy with the arguments of this process, and spin a node until it is ended.
 
     Raises what `make_node()` raises. No such program drives a robot, so none sends a stop.
     """
+    announce_often()
     rclpy.init(args=sys.argv)
     try:
         rclpy.spin(make_node())
