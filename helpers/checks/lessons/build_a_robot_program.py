@@ -143,15 +143,18 @@ def one_command_a_scan(robot):
     return scans - 2 <= commands <= scans or f'{commands} commands for {scans} scans'
 
 
-FAILS = """import rclpy
-from patrol_pkg import main, patrol
+FAILS = """from patrol_pkg import main, patrol
+from rclpy.qos import qos_profile_sensor_data
+from sensor_msgs.msg import LaserScan
 
 
 class Fails(patrol.Patrol):
-    scans = 0
+    def __init__(self, **options):
+        super().__init__(**options)
+        self.scans = 0
+        self.create_subscription(LaserScan, 'scan', self.fail, qos_profile_sensor_data)
 
-    def on_scan(self, scan):
-        super().on_scan(scan)
+    def fail(self, scan):
         self.scans += 1
         if self.scans > 15:
             raise RuntimeError('planted')
@@ -815,7 +818,7 @@ def the_watchdog(workspace):
     ]
 
 
-@tasks.add(12, cpu_s=20)
+@tasks.add(12, cpu_s=20, limit_s=60)
 def the_whole_node(workspace):
     def toured(story, *options):
         def test():
@@ -823,6 +826,10 @@ def the_whole_node(workspace):
                 return story(Tour(workspace, *options))
 
         return test
+
+    def has_parts(tour):
+        missing = [name for name in ('battery', 'job') if not hasattr(tour.node, name)]
+        return not missing or f'it has no attribute {" and no ".join(missing)}'
 
     def stands(tour):
         speeds = tour.speeds(0.2)
@@ -924,7 +931,7 @@ def the_whole_node(workspace):
         with ros_session():
             try:
                 Tour(workspace, Parameter('speed', value=5.0))
-            except InvalidParameterValueException:
+            except (InvalidParameterValueException, ValueError):
                 return True
         return 'it starts with the speed 5.0'
 
@@ -936,6 +943,7 @@ def the_whole_node(workspace):
             toured(stands),
             'self.command(0.0, 0.0)',
         ),
+        ('its attributes battery and job', toured(has_parts), 'self.job = Job(...)'),
         ('it visits two places', toured(two_places), 'self.command(*steer(...))'),
         ('a cancel stops it', toured(cancel), 'job.place() is None then.'),
         (
