@@ -33,6 +33,14 @@ class NamedCell(IPyNbCell):
     def repr_failure(self, excinfo: object) -> str:
         return super().repr_failure(excinfo).replace(f'Cell {self.cell_num}: ', f'{self.name}: ', 1)
 
+    def compare_outputs(self, test: list, ref: list, skip_compare: object = None) -> bool:
+        """Compare as nbval does. If they differ, say all that the cell has printed, too."""
+        same = super().compare_outputs(test, ref, skip_compare)
+        if not same:
+            printed = [output['text'] for output in test if output.get('output_type') == 'stream']
+            self.comparison_traceback.append(f'All that it has printed: {"".join(printed)!r}')
+        return same
+
 
 def masked(text: str) -> str:
     """Return what nbval compares of an output."""
