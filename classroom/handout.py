@@ -14,7 +14,6 @@ one with fewer.
 """
 
 import argparse
-import os
 import re
 import shutil
 import subprocess
@@ -190,20 +189,16 @@ def download(lock: Path, folder: Path, pythons: tuple) -> None:
         jobs.append(
             (version, {_for(block, version) for block in blocks if block.startswith(GTEST)})
         )
-    # A pip that comes as a wheel, as for .venv, starts a build with a script in the folder for
-    # temporary files. A stray copy.py beside it would hide Python's own: this folder is a new one.
-    with tempfile.TemporaryDirectory() as private:
-        environment = os.environ | {'TMPDIR': private}
-        for version, pins in jobs:
-            wanted.write_text('\n'.join(pins))
-            command = [sys.executable, '-I', ROOT / 'tools/pip.py']
-            command += ['download', '--quiet', '--no-deps']
-            command += ['--disable-pip-version-check', '--no-build-isolation', '--require-hashes']
-            command += [f'--platform=manylinux{glibc}_x86_64' for glibc in GLIBC]
-            command += ['--implementation=cp', f'--python-version={version}']
-            command += ['--requirement', wanted, '--dest', folder]
-            if subprocess.run(command, env=environment).returncode:
-                raise ValueError('pip could not fetch the packages: what it said stands above.')
+    for version, pins in jobs:
+        wanted.write_text('\n'.join(pins))
+        command = [sys.executable, '-I', ROOT / 'tools/pip.py']
+        command += ['download', '--quiet', '--no-deps']
+        command += ['--disable-pip-version-check', '--no-build-isolation', '--require-hashes']
+        command += [f'--platform=manylinux{glibc}_x86_64' for glibc in GLIBC]
+        command += ['--implementation=cp', f'--python-version={version}']
+        command += ['--requirement', wanted, '--dest', folder]
+        if subprocess.run(command).returncode:
+            raise ValueError('pip could not fetch the packages: what it said stands above.')
     wanted.unlink()
     Path(folder, 'pythons').write_text(' '.join(sorted(pythons, key=known.index)))
 

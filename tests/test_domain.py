@@ -5,8 +5,6 @@ import fcntl
 import os
 import random
 import socket
-import subprocess
-import sys
 from collections import Counter
 from pathlib import Path
 
@@ -165,10 +163,7 @@ def test_a_session_announces_itself_often():
         port.bind(('127.0.0.1', 7400 + 250 * domain_of_session() + 10 + 2 * 20))
         port.settimeout(LIMIT_S)
         ours = sender_of(port)
-        environment = os.environ | graph_environment()
-        environment.pop('FASTRTPS_DEFAULT_PROFILES_FILE', None)
-        command = [sys.executable, '-c', PLAIN]
-        with subprocess.Popen(command, stdin=subprocess.PIPE, env=environment) as plain:
+        with running(PLAIN, FASTRTPS_DEFAULT_PROFILES_FILE=None, **graph_environment()):
             while (theirs := sender_of(port)) == ours:
                 pass
             while announced[theirs] < 6:  # it begins with five, 0.1 s apart
@@ -176,7 +171,6 @@ def test_a_session_announces_itself_often():
             announced.clear()
             while announced[theirs] < 2:
                 announced[sender_of(port)] += 1
-            plain.stdin.close()
     assert announced[ours] >= 5
 
 

@@ -185,6 +185,17 @@ class Tour:
         """Let simulated time go on."""
         return self.robot.run(seconds, self.executor, until=until)
 
+    def wait(self, condition, limit_s=10.0):
+        """Let time go on until a condition holds, also that of timers with a clock of their own.
+
+        Return whether it does within `limit_s` seconds.
+        """
+        limit = time.monotonic() + limit_s
+        while not condition() and time.monotonic() < limit:
+            time.sleep(0.02)
+            self.run(0.02)
+        return bool(condition())
+
     def send(self, places):
         """Send a goal. Return whether it was accepted."""
         if not self.client.server_is_ready():

@@ -864,10 +864,7 @@ def the_whole_node(workspace):
         tour.cable.plugged = False
         tour.run(0.2)
         tour.handle.cancel_goal_async()
-        limit = time.monotonic() + 10
-        while not tour.ended() and time.monotonic() < limit:
-            time.sleep(0.02)  # the timer may have a clock of its own
-            tour.run(0.02)
+        tour.wait(tour.ended)
         return tour.status() == 'CANCELED' or tour.status()
 
     def speed(tour):
@@ -900,10 +897,8 @@ def the_whole_node(workspace):
         tour.run(0.1)
         commands = tour.robot.record.commands
         before, limit = len(commands), time.monotonic() + 10
-        while len(commands) == before and time.monotonic() < limit:
-            time.sleep(0.02)  # the watchdog has a clock of its own
-            tour.run(0.02)
-        if len(commands) == before or any(commands[before][1:]):
+        stops = tour.wait(lambda: len(commands) > before)
+        if not stops or any(commands[before][1:]):
             return 'it does not stop'
         said = 'error', 'No scan comes: I stop'
         while said not in tour.ear.heard and time.monotonic() < limit:
