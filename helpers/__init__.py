@@ -13,6 +13,8 @@ from behind it. A room imports only from the rooms that stand above it in this l
     robot      a small robot behind real messages, and how one sees it
     fusion     one pose from several imperfect sensors
     faults     somebody else's robots, each with a fault that one finds and mends
+    patrol     robots that are driven by the program that a learner writes in the last lesson
+    trials     what code of a learner does where a lesson puts it: a gate, a stop, a step that fails
     checks     guesses and tasks: what is right, what the student's code did, and a hint
 
 tests/test_doors.py reads the list, and checks the imports.

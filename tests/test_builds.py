@@ -2,9 +2,9 @@
 
 import pytest
 
-from helpers.checks.builds import build, compile_error, first_error
+from helpers.checks.builds import build
 from helpers.checks.errors import Failed
-from helpers.workspace import Workspace
+from helpers.workspace import Workspace, compile_error, first_error
 from helpers.workspace.build_output import lines_that_matter
 
 COMPILER = """\

@@ -10,17 +10,10 @@ from types import SimpleNamespace
 import pytest
 import yaml
 
-from helpers.checks import progress
-from helpers.checks.lessons.find_the_fault import (
-    CORE,
-    LAST,
-    OTHERS,
-    found,
-    mended,
-    next_robot,
-    order_of,
-)
-from helpers.faults import FAULTS, KINDS, OTHER, Case, drive, take
+from helpers.checks import next_robot, progress
+from helpers.checks.lessons.find_the_fault import found, mended
+from helpers.checks.other_robots import LAST
+from helpers.faults import CORE, FAULTS, KINDS, OTHER, OTHERS, Case, drive, order_of, take
 from helpers.faults.cases import FILE, HEALTHY, edited, read
 from helpers.workspace import Workspace
 
@@ -101,7 +94,7 @@ def test_a_mend_can_be_made_and_is_known(fault, mend, tmp_path):
 
 def test_the_core_has_four_and_each_other_one_a_name():
     assert {*CORE.values()} <= {*FAULTS}
-    assert len(OTHERS) >= len(FAULTS), 'Add a name to OTHERS in find_the_fault.py.'
+    assert len(OTHERS) >= len(FAULTS), 'Add a name to OTHERS in helpers/faults/robots.py.'
     assert len({*CORE, *OTHERS}) == len(CORE) + len(OTHERS)
 
 

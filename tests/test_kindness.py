@@ -13,7 +13,7 @@ import pytest
 from std_msgs.msg import Header
 from support.kernel import NOTEBOOKS
 
-from helpers.checks.robot_program import LAST
+from helpers.patrol import LAST
 from helpers.robot import KIND, TURTLEBOT3, Robot
 from helpers.robot.messages import laser_scan
 from helpers.ros import ros_session

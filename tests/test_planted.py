@@ -2,7 +2,7 @@
 
 import pytest
 
-from helpers.checks.planted import planted, run_tests
+from helpers.trials import planted, run_tests
 from helpers.workspace import Workspace
 
 SPEED = 'def speed(distance_m):\n    return 0.25 if distance_m > 0.5 else 0.0\n'

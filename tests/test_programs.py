@@ -3,16 +3,8 @@
 import pytest
 
 from helpers.checks.errors import Failed
-from helpers.checks.programs import (
-    error_in,
-    error_of_launch,
-    launch,
-    line_of,
-    manifest,
-    started,
-    wait_until,
-)
-from helpers.workspace import Workspace
+from helpers.checks.programs import launch, line_of, manifest
+from helpers.workspace import Workspace, error_in, error_of_launch, started, wait_until
 
 TRACEBACK = """[INFO] [listener]: I begin
 Traceback (most recent call last):

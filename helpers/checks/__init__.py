@@ -3,6 +3,7 @@
 from helpers.checks.classroom import guess, join_class, leave_class, lower_hand, raise_hand
 from helpers.checks.guesses import compare_prediction
 from helpers.checks.memory import questions, remember
+from helpers.checks.other_robots import next_robot
 
 __all__ = [
     'compare_prediction',
@@ -10,6 +11,7 @@ __all__ = [
     'join_class',
     'leave_class',
     'lower_hand',
+    'next_robot',
     'questions',
     'raise_hand',
     'remember',

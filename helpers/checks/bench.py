@@ -21,7 +21,6 @@ from collections.abc import Callable
 from contextlib import ExitStack
 
 import rclpy
-from action_msgs.msg import GoalStatus
 from rclpy.action import ActionClient
 from rclpy.clock import ClockType
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
@@ -30,9 +29,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
-from helpers.checks.errors import Failed, NeverEnds, own_line, places
-from helpers.notebook import frames
-from helpers.ros import ros_session
+from helpers.checks.errors import Failed, NeverEnds
+from helpers.notebook import frames, own_line, places
+from helpers.ros import STATUS, ros_session
 
 WAIT_S = 2.0  # for what a right answer does at once
 QUIET_S = 6.0
@@ -41,11 +40,6 @@ POLL_S = 0.005
 ALL = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)  # hears every publisher
 # As the base of a robot subscribes: a program that ends can wait until its last message is here.
 RELIABLE = QoSProfile(depth=1000)
-STATUS = {
-    GoalStatus.STATUS_SUCCEEDED: 'SUCCEEDED',
-    GoalStatus.STATUS_CANCELED: 'CANCELED',
-    GoalStatus.STATUS_ABORTED: 'ABORTED',
-}
 
 
 class Bench:

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import linecache
 import os
 import re
-import sys
-import sysconfig
 import traceback
-from collections.abc import Iterable, Iterator
 from pathlib import Path
-from types import FrameType
 
-HELPERS = str(Path(__file__).resolve().parents[1]) + os.sep
-LESSONS = os.path.join(HELPERS, 'checks', 'lessons') + os.sep
-INSTALLED = tuple(
-    os.path.realpath(sysconfig.get_path(name)) + os.sep for name in ('stdlib', 'purelib', 'platlib')
-)
+from helpers.notebook import own_line
+
+LESSONS = str(Path(__file__).with_name('lessons')) + os.sep
 # What rclpy's TypeErrors without a text mean, by the function that raises them.
 WITHOUT_TEXT = {
     'send_response': 'the callback of a service has returned no response of its type',
     'call': 'a service is called with something that is no request of its type',
     'call_async': 'a service is called with something that is no request of its type',
 }
-CELL = re.compile(r'[/\\]ipykernel_\d+[/\\]|^<(?:ipython-input|cell)')
 
 
 class Failed(Exception):  # noqa: N818 - a verdict, and no error
@@ -32,34 +24,6 @@ class Failed(Exception):  # noqa: N818 - a verdict, and no error
 
 class NeverEnds(Failed):
     """What a check has found, if each later point of the task would wait as long for the same."""
-
-
-def is_students(filename: str) -> bool:
-    """Return whether a file holds code of the student: a cell, or a file of the workspace."""
-    if CELL.search(filename):
-        return True
-    if filename.startswith('<') or not os.path.isabs(filename):
-        return False
-    path = os.path.realpath(filename)
-    return not path.startswith((HELPERS, *INSTALLED)) and not filename.startswith(sys.prefix)
-
-
-def own_line(frames: Iterable[tuple[str, int]]) -> str:
-    """Return the first of these places that is the student's, as `Line 7: x = 1`, or nothing."""
-    for filename, number in frames:
-        if is_students(filename):
-            line = linecache.getline(filename, number).strip()
-            where = '' if CELL.search(filename) else f' of {os.path.basename(filename)}'
-            if line:
-                return f'Line {number}{where}: {line}'
-    return ''
-
-
-def places(frame: FrameType | None) -> Iterator[tuple[str, int]]:
-    """Yield file and line of a frame and of those that called it, the innermost first."""
-    while frame is not None:
-        yield frame.f_code.co_filename, frame.f_lineno
-        frame = frame.f_back
 
 
 def place_of(error: BaseException) -> str:

@@ -47,9 +47,9 @@ from IPython.display import display
 
 from helpers.checks import classroom, progress
 from helpers.checks.apart import Apart, Ending
-from helpers.checks.errors import Failed, NeverEnds, own_line, place_of, places, sentence
+from helpers.checks.errors import Failed, NeverEnds, place_of, sentence
 from helpers.checks.verdict import Point, Verdict, bundle
-from helpers.notebook import frames, names_of, somebody_watches
+from helpers.notebook import frames, names_of, own_line, places, somebody_watches
 
 CPU_LIMIT_S = 5.0  # of one point: an endless loop uses it up
 LIMIT_S = 30.0  # of one point by the clock

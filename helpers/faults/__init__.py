@@ -10,12 +10,41 @@ tempting and wrong. Another fault is another folder: CONTRIBUTING.md says what i
 
     cases    read the folders, put a robot into a workspace, mend it
     drives   drive it, in the page or to judge it
+    robots   the robots of the lesson: which comes next, what it did, by what its fault is seen
 """
 
 from helpers.faults.cases import FAULTS, KINDS, Case, Fault, Mend, forget, mend_in_words, take
 from helpers.faults.drives import OTHER, SEEN, Drive, drive
+from helpers.faults.robots import (
+    CORE,
+    OTHERS,
+    TURNED,
+    give_up,
+    mend,
+    order_of,
+    proves,
+    robot,
+    seen,
+    show_drive,
+    take_next,
+    wait_until_up,
+    words,
+)
 
 __all__ = [
+    'words',
+    'wait_until_up',
+    'take_next',
+    'show_drive',
+    'seen',
+    'robot',
+    'proves',
+    'order_of',
+    'mend',
+    'give_up',
+    'TURNED',
+    'OTHERS',
+    'CORE',
     'FAULTS',
     'KINDS',
     'OTHER',

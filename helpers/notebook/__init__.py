@@ -12,6 +12,7 @@ MODULES = {
     'kernel': ('can_ask', 'hear_while_a_cell_runs'),
     'look': ('LOOK', 'LOOK_CSS', 'LOOK_FILE'),
     'names': ('names_of',),
+    'own_code': ('is_students', 'own_line', 'places'),
     'progress_bar': ('ProgressBar', 'somebody_watches'),
     'text': ('table', 'wrap'),
     'threads': ('frames',),

@@ -6,11 +6,15 @@ that cannot be drawn raises TypeError or ValueError, with one sentence.
 """
 
 from helpers.plots.alt_text import describe, show
+from helpers.plots.bags import draw_bag
 from helpers.plots.comparisons import bars, sweep
 from helpers.plots.drives import error, frame_tree, gate, path, scans
+from helpers.plots.explorer import model_with_sliders
 from helpers.plots.runs import before_and_after, latency, queue_length, sequence_gaps, timeline
 
 __all__ = [
+    'draw_bag',
+    'model_with_sliders',
     'bars',
     'before_and_after',
     'describe',

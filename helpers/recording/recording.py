@@ -350,3 +350,9 @@ def _surround(callback: Callable, start: Callable, finish: Callable) -> Callable
                 finish(run)
 
     return recorded_callback
+
+
+def most_at_once(table: pd.DataFrame) -> int:
+    """Return the largest number of callbacks in a recording that ran at the same time."""
+    begun, ended = table['started_s'].dropna(), table['finished_s'].dropna()
+    return max(int(((begun <= time_s) & (ended > time_s)).sum()) for time_s in begun)

@@ -1,8 +1,9 @@
 """A ROS session in a kernel: its domain, its threads, its log, and what waits for what."""
 
 from helpers.ros.connections import NOT_OF_A_LESSON, nearly
-from helpers.ros.conversions import START_NS, quaternion, seconds_of, stamp_of, yaw_of
+from helpers.ros.conversions import START_NS, STATUS, quaternion, seconds_of, stamp_of, yaw_of
 from helpers.ros.domain import one_process_at_a_time, remove_dead_segments
+from helpers.ros.executors import spin_each, spun
 from helpers.ros.program import run_program
 from helpers.ros.session import (
     Session,
@@ -17,6 +18,7 @@ from helpers.ros.session import (
 __all__ = [
     'NOT_OF_A_LESSON',
     'START_NS',
+    'STATUS',
     'Session',
     'current_session',
     'find',
@@ -30,6 +32,8 @@ __all__ = [
     'ros_session',
     'run_program',
     'seconds_of',
+    'spin_each',
+    'spun',
     'stamp_of',
     'yaw_of',
 ]

@@ -1,10 +1,11 @@
-"""Stamps and orientations: what the lessons write and read of messages, and do not teach."""
+"""Stamps, orientations, the ends of goals: what lessons read of messages, and do not teach."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
+from action_msgs.msg import GoalStatus
 from rclpy.time import Time
 
 if TYPE_CHECKING:
@@ -12,6 +13,12 @@ if TYPE_CHECKING:
     from geometry_msgs.msg import Quaternion
 
 START_NS = 1_000_000_000  # the stamp of second 0 of a drive
+# How a goal of an action has ended:
+STATUS = {
+    GoalStatus.STATUS_SUCCEEDED: 'SUCCEEDED',
+    GoalStatus.STATUS_CANCELED: 'CANCELED',
+    GoalStatus.STATUS_ABORTED: 'ABORTED',
+}
 
 
 def stamp_of(t: float) -> Stamp:

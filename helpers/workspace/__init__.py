@@ -10,20 +10,43 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
     processes     a process that prints lines, and ends
     tf2_msgs      the package of the message of /tf, which the wheels lack
     build_output  what a build says, and which of its lines matter
+    first_error   the first error of a build, a program, a launch
     small_rclcpp  a package in C++: the part of rclcpp that lesson 15 needs, over rcl
-    colleague.sh  makes the repository of somebody else that lesson 10 brings in
+    given         files of somebody else: the repository that lesson 10 brings in, a small program
+    rosdep        rosdep, with rules of a lesson
     sourcing      what `source install/setup.bash` gives, for a kernel that already runs
 """
 
 from helpers.workspace.build_output import BuildResult, lines_that_matter, without_folders
-from helpers.workspace.processes import DIED, Process
+from helpers.workspace.first_error import (
+    compile_error,
+    error_in,
+    error_of_launch,
+    first_error,
+    started,
+    why_it_failed,
+)
+from helpers.workspace.given import play_colleague, write_try_nearest
+from helpers.workspace.processes import DIED, Process, show_launch, wait_until
+from helpers.workspace.rosdep import rosdep, run_rosdep
 from helpers.workspace.tf2_msgs import provide_tf2_msgs
 from helpers.workspace.wheels import fix_wheels
-from helpers.workspace.workspace import BEGIN_EMPTY, COLLEAGUE, SMALL_RCLCPP, Workspace
+from helpers.workspace.workspace import BEGIN_EMPTY, SMALL_RCLCPP, Workspace
 
 __all__ = [
+    'play_colleague',
+    'write_try_nearest',
+    'rosdep',
+    'run_rosdep',
+    'show_launch',
+    'wait_until',
+    'why_it_failed',
+    'started',
+    'first_error',
+    'error_of_launch',
+    'error_in',
+    'compile_error',
     'BEGIN_EMPTY',
-    'COLLEAGUE',
     'DIED',
     'SMALL_RCLCPP',
     'BuildResult',

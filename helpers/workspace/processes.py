@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import psutil
@@ -243,3 +243,25 @@ def _after_cell(result) -> None:
     if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
         _stop_each(_of_this_cell)
     _of_this_cell.clear()
+
+
+def wait_until(condition: Callable[[], object], limit_s: float) -> bool:
+    """Wait until a condition holds, at most `limit_s` seconds. Return whether it holds."""
+    end = time.monotonic() + limit_s
+    while not condition():
+        if time.monotonic() > end:
+            return False
+        time.sleep(POLL_S)
+    return True
+
+
+def show_launch(process: Process, pattern: str) -> None:
+    """Print the lines of a launch that have a pattern, sorted by program.
+
+    What differs from run to run is left out: commands, and numbers of processes.
+    """
+    text = re.sub(r", cmd '.*'", '', '\n'.join(process.lines))
+    text = re.sub(r'(?<=\[pid )\d+', '...', text)
+    lines = re.findall(rf'^.*?\[(\w+-\d+)\](.*(?:{pattern}).*)', text, re.MULTILINE)
+    for program, said in sorted(lines, key=lambda line: line[0]):
+        print(f'[{program}]{said}')

@@ -31,8 +31,6 @@ MOVING = r'(?<=\w) \[-?[\d.]+s(, .*)?\]$|^\[-?[\d.]+s\] WARNING.*any .local_setu
 MOVING += r'|^\[-?[\d.]+s\] (?=WARNING:|ERROR:)'
 # A package in C++ for lessons: copy it into `src`.
 SMALL_RCLCPP = Path(__file__).with_name('small_rclcpp')
-# A script for a terminal: the repository of somebody else, on a server.
-COLLEAGUE = Path(__file__).with_name('colleague.sh')
 TERMINAL_LIMIT_S = 60.0  # of the commands in a terminal that closes
 CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has done
 

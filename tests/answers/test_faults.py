@@ -6,8 +6,8 @@ A fault is a folder in helpers/faults: another folder is tested without another 
 import pytest
 
 from helpers.checks.errors import Failed
-from helpers.checks.lessons.find_the_fault import found, mended, seen, wait_until_up
-from helpers.faults import FAULTS, drive, take
+from helpers.checks.lessons.find_the_fault import found, mended
+from helpers.faults import FAULTS, drive, seen, take, wait_until_up
 from helpers.faults.drives import end_launches
 from helpers.workspace import Workspace
 

@@ -4,9 +4,10 @@ import math
 import re
 
 from helpers.checks.builds import builds
-from helpers.checks.programs import error_in, manifest, needed
+from helpers.checks.programs import manifest, needed
 from helpers.checks.tasks import Tasks, once
-from helpers.workspace import COLLEAGUE
+from helpers.trials import imports
+from helpers.workspace import error_in, run_rosdep
 
 tasks = Tasks()
 check = tasks.check
@@ -317,56 +318,18 @@ main()'
     ]
 
 
-# --- The colleague, and rosdep
-
-
-def play_colleague(workspace):
-    """Make a repository with three packages on the server, with the branches jazzy and humble."""
-    workspace.terminal(f'bash {COLLEAGUE}')
-
-
-def rosdep(workspace, words, rules):
-    """Run rosdep with these rules, and no others. Return its lines, its commands sorted.
-
-    It writes its commands in any order.
-    """
-    lines = _rosdep(workspace, rules, f'rosdep {words}').splitlines()
-    steps = sorted(line for line in lines if line.startswith('  '))
-    return [line for line in lines if not line.startswith('  ')] + steps
+# --- rosdep
 
 
 def resolve(workspace, rules, *systems):
     """Return what rosdep says of the two keys of task 3 on each system, as lines."""
     resolve_keys = 'rosdep resolve python3-numpy python3-yaml'
     commands = '; echo -----; '.join(f'{resolve_keys} --os={system}' for system in systems)
-    parts = _rosdep(workspace, rules, commands).split('-----\n')
+    parts = run_rosdep(workspace, rules, commands).split('-----\n')
     return {system: part.splitlines() for system, part in zip(systems, parts, strict=True)}
 
 
-def _rosdep(workspace, rules, commands):
-    """Run commands of rosdep, which reads these rules and no list from the network."""
-    index = '%YAML 1.1\n---\ndistributions: {}\ntype: index\nversion: 4\n'
-    workspace.write('rosdep/index-v4.yaml', index)
-    workspace.write('rosdep/my.list', f'yaml file://{workspace.path}/rosdep/python.yaml\n')
-    workspace.write('rosdep/python.yaml', rules)
-    update = 'rosdep update > rosdep/log 2>&1 || cat rosdep/log'
-    said = workspace.terminal(f"""
-        export ROSDEP_SOURCE_PATH=$PWD/rosdep ROS_HOME=$PWD/rosdep/home ROS_DISTRO=jazzy
-        export ROSDISTRO_INDEX_URL=file://$PWD/rosdep/index-v4.yaml ROS_PYTHON_VERSION=3
-        ({update}; {commands}) 2>&1""")
-    return said.replace('sudo -H ', '')
-
-
-# --- What is built, and what takes effect
-
-
-def imports(workspace, module):
-    """Return whether a terminal that has sourced the workspace can import a module, or why not."""
-    lines = workspace.terminal(f"""
-        source install/setup.bash
-        python -c 'import {module}; print("found")'
-    """).splitlines()
-    return lines[-1:] == ['found'] or error_in(lines)
+# --- What is built
 
 
 def build_overlay(workspace):
@@ -382,28 +345,3 @@ def build_overlay(workspace):
 def last_of(printed):
     """Return the last line that commands have printed."""
     return ([''] + printed.splitlines())[-1]
-
-
-def make_three_changes(workspace):
-    """Make the changes A, B and C. Return which take effect at once, and which after a build."""
-    setup = 'src/brake/brake/setup.py'
-    files = {'B': 'share/brake/config/fast.yaml', 'C': 'lib/brake/stop'}
-    install = workspace.file('install/brake')
-
-    def in_effect():
-        letters = {letter for letter, file in files.items() if (install / file).exists()}
-        return letters | ({'A'} if imports(workspace, 'brake_tools.word') is True else set())
-
-    before = workspace.file(setup).read_text()
-    marker = "('share/' + package_name, ['package.xml']),"
-    after = before.replace(marker, f"{marker} ('share/brake/config', ['config/fast.yaml']),")
-    workspace.write(setup, after.replace("['brake =", "['stop = brake.brake:main', 'brake ="))
-    workspace.write('src/brake/brake_tools/brake_tools/word.py', "WORD = 'new'\n")
-    workspace.write('src/brake/brake/config/fast.yaml', 'speed: 1.0\n')
-    for file in files.values():
-        (install / file).unlink(missing_ok=True)
-    at_once = in_effect()
-    workspace.build('brake_tools', 'brake', symlink_install=True)
-    built = in_effect()
-    workspace.write(setup, before)
-    return at_once, built

@@ -1,16 +1,10 @@
-"""What the tasks of the lesson "Call a service from a callback" are judged by, and its runs."""
+"""What the tasks of the lesson "Call a service from a callback" are judged by."""
 
 import math
 import threading
-import time
-import traceback
 import warnings
-from contextlib import suppress
-from types import SimpleNamespace
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.clock import Clock, ClockType
-from rclpy.duration import Duration
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import LaserScan
@@ -20,10 +14,8 @@ from std_srvs.srv import Trigger
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
-from helpers.notebook import frames
-from helpers.recording import CallbackRecording
-from helpers.replay import replay_calls
 from helpers.ros import ros_session
+from helpers.trials import Camera, scan
 
 tasks = Tasks()
 check = tasks.check
@@ -391,36 +383,6 @@ def three_callbacks_four_threads(Explorer):
 # --- What the tasks share -------------------------------------------------------------------------
 
 
-class Camera(Node):
-    """The camera of the lesson. With a gate, it answers when the gate is open."""
-
-    def __init__(self, sees='a wall', takes_s=0.1, gate=None):
-        super().__init__('camera')
-        self.sees, self.takes_s, self.gate = sees, takes_s, gate
-        self.asked = self.looks = 0
-        self.service = self.create_service(Trigger, 'look', self.look_callback)
-
-    def look_callback(self, request, response):
-        self.asked += 1
-        if self.gate:
-            self.gate.wait(timeout=20)
-        else:
-            time.sleep(self.takes_s)
-        self.looks += 1
-        response.success, response.message = self.sees == 'a wall', self.sees
-        return response
-
-
-def scan(distance, age_s=0.0):
-    """Return a scan of now. All its ranges are the same; NaN is a laser that sees nothing."""
-    now = Clock(clock_type=ClockType.ROS_TIME).now() - Duration(nanoseconds=round(age_s * 1e9))
-    step = math.pi / 180
-    message = LaserScan(angle_min=-90 * step, angle_max=90 * step, angle_increment=step)
-    message.range_min, message.range_max, message.ranges = 0.12, 8.0, [distance] * 181
-    message.header.stamp = now.to_msg()
-    return message
-
-
 def two_groups():
     return MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
 
@@ -452,56 +414,3 @@ def stops_for(make_brake, make_executor, sees, distance):
                 waits = f'. Its callback still waits. {waits}'
             raise Failed(f'{found} {does}{waits}')
     return True
-
-
-# --- The runs of the lesson -----------------------------------------------------------------------
-
-
-def run(make_brake, make_executor):
-    """Show one scan of a wall to a brake, wait until nothing happens any more, and look at it."""
-    stops = []
-    with ros_session() as session:
-        brake, camera, tester = make_brake(), Camera(), Node('tester')
-        tester.create_subscription(Empty, 'stop', stops.append, 10)
-        scans = tester.create_publisher(LaserScan, 'scan', 10)
-        recording = CallbackRecording(
-            scan_callback=brake.subscription, look_callback=camera.service, client=brake.client
-        )
-        executor, other = make_executor(), SingleThreadedExecutor()
-        for node in (brake, camera):
-            executor.add_node(node)
-        other.add_node(tester)
-        session.spin(executor)
-        session.spin(other)
-        scans.publish(scan(0.5))
-        session.wait_until(lambda: recording.runs['scan_callback'])
-        thread_free = session.wait_until_quiet(executor)
-        session.wait_until_quiet(other)
-        return SimpleNamespace(
-            stopped=bool(stops),
-            looks=camera.looks,
-            thread_free=thread_free,
-            group_free=brake.client.callback_group.can_execute(brake.client),
-            stacks=stacks_in('scan_callback'),
-            replay=replay_of(recording, make_executor),
-        )
-
-
-def stacks_in(function):
-    """Return the calls, from this function on, of each thread that is inside it."""
-    hidden = {'recorded_call', 'recorded'}  # of the recording
-    stacks = []
-    for _, frame in frames(threading.enumerate()):
-        names = [entry.name for entry in traceback.extract_stack(frame)]
-        if function in names:
-            calls = names[names.index(function) :]
-            stacks.append(' > '.join(name for name in calls if name not in hidden))
-    return stacks
-
-
-def replay_of(recording, make_executor):
-    """Return the replay of a recording, with as many threads as its executor has."""
-    used = {thread for table in recording.tables().values() for thread in table['thread']}
-    threads = 1 if make_executor is SingleThreadedExecutor else max(2, len(used))
-    with suppress(ValueError):  # a callback that awaits has none
-        return replay_calls(recording, threads)

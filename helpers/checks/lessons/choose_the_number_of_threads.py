@@ -1,14 +1,8 @@
 """What the tasks of the lesson "Choose the number of threads" are judged by."""
 
-import os
-import subprocess
-import sys
 import threading
 import time
 
-import ipywidgets as widgets
-import matplotlib.pyplot as plt
-import psutil
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
@@ -16,7 +10,6 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
-from helpers import plots
 from helpers.checks.bench import Bench, must_define, must_have
 from helpers.checks.tasks import Tasks
 from helpers.recording import explain, predict
@@ -330,58 +323,3 @@ def spin_it_yourself(spin_until):
 
 
 # --- What cells of the lesson show
-
-PROGRAM = """
-import rclpy
-from rclpy.executors import SingleThreadedExecutor
-from rclpy.experimental import EventsExecutor
-rclpy.init()
-node, executor = rclpy.create_node('resting'), {executor}()
-executor.add_node(node)
-print('it spins', flush=True)
-executor.spin()
-"""
-# It needs no other process, and would leave its shared memory behind when it is killed.
-ALONE = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'OFF', 'FASTDDS_BUILTIN_TRANSPORTS': 'UDPv4'}
-SPIN_S = 2.0
-
-
-def cpu_of_spin(executor):
-    """Return the CPU time (s) of two seconds of `spin()` in which nothing happens.
-
-    The executor, by its name, spins in a program of its own, which is killed.
-    """
-    command = [sys.executable, '-c', PROGRAM.format(executor=executor)]
-    with subprocess.Popen(command, env=os.environ | ALONE, stdout=subprocess.PIPE) as program:
-        try:
-            program.stdout.readline()
-            process = psutil.Process(program.pid)
-            before = process.cpu_times()
-            time.sleep(SPIN_S)
-            after = process.cpu_times()
-        finally:
-            program.kill()
-    return after.user + after.system - before.user - before.system
-
-
-def model_with_sliders():
-    """Return sliders for the model of a queue, and two pictures of it."""
-
-    def draw(period_ms, callback_ms, depth, threads):
-        model = predict(period_ms / 1000, callback_ms / 1000, depth, threads, messages=100)
-        figure, panels = plt.subplots(1, 2, figsize=(11, 4.2), dpi=90, layout='constrained')
-        plots.sequence_gaps(model, depth=depth, ax=panels[0])
-        plots.queue_length(model, depth, ax=panels[1])
-        plt.show()
-
-    ranges = {
-        'period_ms': (50, 5, 200),
-        'callback_ms': (200, 5, 500),
-        'depth': (10, 1, 50),
-        'threads': (1, 1, 8),
-    }
-    sliders = {
-        name: widgets.IntSlider(*numbers, description=name, continuous_update=False)
-        for name, numbers in ranges.items()
-    }
-    return widgets.VBox([*sliders.values(), widgets.interactive_output(draw, sliders)])

@@ -1,132 +1,20 @@
 """What the tasks of the lesson "Find the fault" are judged by."""
 
-import random
 import re
-import time
-from collections import Counter
 
-from helpers.checks import progress
 from helpers.checks.errors import Failed
-from helpers.checks.programs import error_of_launch
+from helpers.checks.other_robots import LAST
 from helpers.checks.tasks import Tasks, once
-from helpers.faults import FAULTS, KINDS, OTHER, forget, mend_in_words, take
+from helpers.faults import KINDS, OTHER, TURNED, proves, words
 from helpers.faults import drive as drive_apart
+from helpers.workspace import error_of_launch
 
 tasks = Tasks()
 check = tasks.check
 
-CORE = {'ada': 'deaf_brake', 'bo': 'unread_limit', 'cleo': 'slow_look', 'dan': 'second_voice'}
-OTHERS = 'eve', 'finn', 'gus', 'hana', 'ivo', 'joy', 'kim', 'leo', 'mia', 'noa', 'oli', 'pia'
-LAST = 10  # the task that mends one of the others
-UP_S = 60.0
-NODES = '/brake', '/manager', '/robot', '/route'
 STOP_M = 0.9  # in the file of the drive that judges
 NEARER_M, FARTHER_M = 0.35, 0.15  # it may stop so far from that: it is heard late, and measured
-TURNED = 0.3  # rad, to both sides
 LEAST = 3  # letters of a line
-
-
-# --- Robots
-
-
-def robot(workspace, name):
-    """Return the robot ada, bo, cleo or dan; its package is in src."""
-    return take(workspace, FAULTS[CORE[name]], name)
-
-
-def next_robot(workspace, seed):
-    """Return the next robot: the number decides in which order they come.
-
-    First those come that have not been mended yet, without those of the core. Then all of them,
-    again and again. Until it is mended, a robot stays as it was left.
-    """
-    known = progress.about(LAST)
-    name = OTHERS[len(known) % len(OTHERS)]
-    forget(workspace, {*OTHERS} - {name})  # a later one of this name may have the same fault
-    return take(workspace, FAULTS[order_of(seed, known)[0]], name)
-
-
-def order_of(seed, known=()):
-    """Return the faults that are left in this round, in the order that a number gives them.
-
-    `known` are those that were mended, in all rounds. The first round is without the core.
-    """
-    times = Counter([*CORE.values(), *known])
-    least = min(times[fault] for fault in FAULTS)
-    order = sorted(fault for fault in FAULTS if least or fault not in CORE.values())
-    random.Random(seed).shuffle(order)
-    left = [fault for fault in order if times[fault] == least]
-    # The last one of a round does not begin the next: progress keeps none twice in a row.
-    return sorted(left, key=lambda fault: fault in known[-1:])
-
-
-def drive(case):
-    """Drive a robot in the page, and say what it did."""
-    end = drive_apart(case, name=case.name)
-    print(case.name, did(end))
-
-
-def did(end):
-    """Return what a robot did, in words that do not move."""
-    if end.how in ('stops', 'hits', 'goes on') and abs(end.turned) > TURNED:
-        return 'turns away.'
-    if end.how == 'stops':
-        near = end.free_m < 0.8
-        return 'stops near the wall.' if near else 'stops far away from the wall.'
-    if end.how == 'died':
-        return f'cannot be launched: {error_of_launch(end.said)}'
-    return {
-        'stands': 'does not move.',
-        'hits': 'hits the wall.',
-        'goes on': 'drives on and on.',
-    }[end.how]
-
-
-def wait_until_up(case):
-    """Wait until the robot and the three nodes of its package are there."""
-    end_s = time.monotonic() + UP_S
-    while not set(NODES) <= set(case.workspace.terminal('ros2 node list').splitlines()):
-        if time.monotonic() > end_s:
-            raise TimeoutError(f'Of {case.name} not all nodes have come: does its launch run?')
-
-
-def seen(case):
-    """Run the command that shows what is wrong. Return the kind, the command and its line."""
-    fault, look = case.fault, case.named(case.fault.look)
-    if look.startswith('ros2 launch'):
-        case.workspace.terminals[case.name].wait_for(fault.line, UP_S)
-        return fault.kind, look, fault.line
-    end_s = time.monotonic() + UP_S
-    while time.monotonic() < end_s:  # what a robot commands takes some time to show it
-        said = case.workspace.terminal(f'source install/setup.bash\n{look}').splitlines()
-        for one in said:
-            if fault.line in one or proves(case, look, words(one)):
-                return fault.kind, look, one
-    return fault.kind, look, fault.line
-
-
-def proves(case, command, line):
-    """Return whether a line of what a command printed shows the fault."""
-    return any(
-        re.search(case.named(pair.command), command) and re.search(pair.line, line)
-        for pair in case.fault.evidence
-    )
-
-
-def mend(case):
-    """Begin with the robot as it was, and mend it."""
-    case.write(case.fault.files)
-    case.mend(case.fault.right[0])
-
-
-def give_up(case):
-    """Say what is wrong with a robot, how it is seen, and what mends it."""
-    fault = case.fault
-    print(f'{fault.broken}\nSeen by: {case.named(fault.look)}\nIts line: {fault.line}')
-    print(*(case.named(line) for line in mend_in_words(fault)), sep='\n')
-
-
-# --- Tasks
 
 
 def found(case, kind, command, line):
@@ -251,11 +139,6 @@ def fault_of(case, *answer):
 for number in (1, 3, 5, 7, LAST - 1):
     tasks.add(number, about=fault_of)(found)
     tasks.add(number + 1, limit_s=120, cpu_s=60, about=fault_of)(mended)
-
-
-def words(text):
-    """Return a text without what white space means nothing."""
-    return ' '.join(str(text).split()) if text is not ... else ''
 
 
 def params(case):

@@ -3,13 +3,12 @@
 import math
 import threading
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 
 from geometry_msgs.msg import Twist
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
@@ -21,6 +20,7 @@ from helpers.checks.bench import Bench, must_define
 from helpers.checks.errors import Failed, sentence
 from helpers.checks.tasks import Tasks, once
 from helpers.ros import ros_session
+from helpers.trials import stop_while_looking
 
 tasks = Tasks()
 check = tasks.check
@@ -430,39 +430,6 @@ def a_worker(NewestBrake):
         ('it stops for a scan that is old, or from the future', tests_the_age, looks),
         ('its worker ends', worker_ends, 'Test for None first: None ends the loop.'),
     ]
-
-
-def stop_while_looking(make_brake):
-    """Press stop while the look at scan 0 waits, and 1 to 20 have come.
-
-    Return whether stop was heard, and the numbers of the scans that were looked at.
-    """
-    gate, stopped, looked_at = threading.Event(), False, []
-
-    def look(scan):
-        looked_at.append(number_of(scan))
-        return 9.0 if gate.wait(timeout=20) else 0.0
-
-    with suppress(TimeoutError), ros_session() as session:
-        tester, brake = Node('tester'), make_brake(1, most_s=60, look=look)
-        scans = tester.create_publisher(LaserScan, 'scan', 10)
-        stop = tester.create_publisher(Empty, 'stop', 10)
-        executor = SingleThreadedExecutor()
-        executor.add_node(brake)
-        session.spin(executor)
-        try:
-            for number in range(21):
-                scan = LaserScan(ranges=[float(number)] * 181)
-                scan.header.stamp = tester.get_clock().now().to_msg()
-                scans.publish(scan)
-                session.wait_until(lambda: looked_at, timeout_s=3)
-            stop.publish(Empty())
-            session.wait_until_quiet(executor)
-            stopped = brake.stopped.is_set()
-        finally:
-            gate.set()
-        session.wait_until(lambda: 20 in looked_at, timeout_s=2)
-    return stopped, looked_at
 
 
 @tasks.add(9)

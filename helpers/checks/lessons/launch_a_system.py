@@ -6,16 +6,9 @@ import signal
 import time
 
 from helpers.checks.builds import builds
-from helpers.checks.programs import (
-    error_in,
-    error_of_launch,
-    launch,
-    manifest,
-    needed,
-    started,
-    wait_until,
-)
+from helpers.checks.programs import launch, manifest, needed
 from helpers.checks.tasks import Tasks, once
+from helpers.workspace import error_in, error_of_launch, started, wait_until
 
 tasks = Tasks()
 check = tasks.check
@@ -359,15 +352,6 @@ def says(text, *lines):
 def starts(text, *names):
     programs = started(text)
     return programs == sorted(names) or f'started: {", ".join(programs) or "nothing"}'
-
-
-def show(terminal, pattern):
-    """Print lines of a launch, sorted by program, without what differs from run to run."""
-    text = re.sub(r", cmd '.*'", '', '\n'.join(terminal.lines))
-    text = re.sub(r'(?<=\[pid )\d+', '...', text)
-    lines = re.findall(rf'^.*?\[(\w+-\d+)\](.*(?:{pattern}).*)', text, re.MULTILINE)
-    for program, said in sorted(lines, key=lambda line: line[0]):
-        print(f'[{program}]{said}')
 
 
 # --- A program that is started again

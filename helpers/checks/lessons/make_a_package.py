@@ -3,23 +3,16 @@
 import re
 import time
 
-import pandas as pd
 import psutil
 from std_msgs.msg import String
 
 from helpers.checks.bench import Bench
 from helpers.checks.builds import builds
 from helpers.checks.errors import Failed
-from helpers.checks.programs import (
-    error_in,
-    line_of,
-    manifest,
-    needed,
-    open_terminal,
-    sourced,
-    wait_until,
-)
+from helpers.checks.programs import line_of, manifest, needed, open_terminal, sourced
 from helpers.checks.tasks import Tasks, once
+from helpers.trials import times_printed
+from helpers.workspace import error_in, wait_until
 
 tasks = Tasks()
 check = tasks.check
@@ -199,10 +192,10 @@ def build_source_run(workspace):
             wait_until(lambda: all_published() or not listening.running, 60)
             if not listening.running:
                 return f'new_listener has ended: {error_in(listening.lines)}'
-            first_s = times(talking).min()
-            if not wait_until(lambda: 40 in times(listening, first_s), 8):
+            first_s = times_printed(talking).min()
+            if not wait_until(lambda: 40 in times_printed(listening, first_s), 8):
                 return 'the listener does not hear the new talker'
-            heard = times(listening, first_s)
+            heard = times_printed(listening, first_s)
         # One thread starts a callback 0.2 s after the one before, or later.
         old = 'the listener that runs is the old one, with one thread'
         return bool(heard.diff().min() < 0.199) or old
@@ -330,56 +323,10 @@ def run_main(workspace, file, texts, before='', last=None):
     return process.lines, went_on
 
 
-# --- What two terminals have printed
-
-
-def times(process, start_s=0.0):
-    """Return the time of each message that a terminal has printed, by its number."""
-    pattern = re.compile(r'Hello World: (\d+)" at ([\d.]+)')
-    pairs = pattern.findall('\n'.join(process.lines))
-    return pd.Series({int(number): float(t) for number, t in pairs if float(t) >= start_s})
-
-
-def as_table(talking, listening):
-    """Return what a talker and a listener have printed as a table, such as a recording gives.
-
-    It waits until both have printed the last message of the talker, which is the 41st.
-    """
-    line_of(talking, 'World: 40')
-    published = times(talking)
-    wait_until(lambda: 40 in times(listening, published.min()), 10)
-    heard = times(listening, published.min())
-    table = pd.DataFrame({'published_s': published, 'started_s': heard}) - published.min()
-    table = table.rename_axis('seq').reset_index()
-    return table.assign(finished_s=table['started_s'] + 0.2, thread=None)
-
-
 def words_of(terminal):
     """Return the words of the command that runs in a terminal, the innermost one."""
     programs = psutil.Process(terminal.pid).children(recursive=True)
     return next((words for p in reversed(programs) if '--ros-args' in (words := p.cmdline())), [])
-
-
-# --- The package with a program that prints a letter
-
-
-def play(workspace, moves):
-    """Play the moves with a package of one small program. Return what its runs have printed."""
-    workspace.terminal("""rm -rf build/letter_pkg install/letter_pkg src/letter_pkg; cd src
-        ros2 pkg create letter_pkg --build-type ament_python --node-name letter""")
-    letters, printed = iter('ABCDEFGHIJ'), ''
-    for move in ['edit', *moves]:
-        if move == 'edit':
-            text = f'def main():\n    print({next(letters)!r})\n'
-            workspace.write('src/letter_pkg/letter_pkg/letter.py', text)
-        elif move == 'build':
-            workspace.build('letter_pkg')
-        elif move == 'run':
-            said = sourced(workspace, 'ros2 run letter_pkg letter')
-            printed += said if len(said) == 1 else '-'
-        elif move == 'delete':
-            workspace.terminal('rm -rf build/letter_pkg install/letter_pkg')
-    return printed
 
 
 # --- Somebody else's package

@@ -19,11 +19,10 @@ from urdf_parser_py.urdf import URDF
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build
 from helpers.checks.errors import Failed
-from helpers.checks.programs import DIED, error_of_launch, started
 from helpers.checks.tasks import Tasks, once
 from helpers.fusion import VARIANCES, localize
 from helpers.ros import quaternion, seconds_of, stamp_of, yaw_of
-from helpers.workspace import without_folders
+from helpers.workspace import DIED, error_of_launch, started, without_folders
 
 tasks = Tasks()
 check = tasks.check

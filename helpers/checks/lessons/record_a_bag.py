@@ -6,7 +6,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import matplotlib.pyplot as plt
 from geometry_msgs.msg import Twist, TwistStamped
 from mcap import records
 from mcap.stream_reader import StreamReader
@@ -26,7 +25,6 @@ from std_msgs.msg import Bool
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed, sentence
 from helpers.checks.tasks import Tasks
-from helpers.plots import describe, show
 
 tasks = Tasks()
 check = tasks.check
@@ -492,20 +490,3 @@ def write_bag(path, rows, qos=()):
 
 
 # --- The picture of the lesson --------------------------------------------------------------------
-
-
-def draw_bag(scans, walls, age_s):
-    """Draw when messages came, and how old the scans were on which the brake acted."""
-    figure, (rows, ages) = plt.subplots(2, 1, figsize=(7, 3.6), sharex=True, layout='constrained')
-    scan_s, wall_s = (
-        [(recorded_ns - scans[0][0]) / 1e9 for recorded_ns, _ in messages]
-        for messages in (scans, walls)
-    )
-    rows.eventplot([wall_s, scan_s], lineoffsets=[0, 1], linelengths=0.7)
-    rows.set_yticks([0, 1], ['wall', 'scan'])
-    ages.plot(wall_s, [age_s(recorded_ns, wall.header) for recorded_ns, wall in walls], 'o')
-    ages.set(xlabel='time in the bag (s)', ylabel='age (s)', ylim=(0, 2))
-    describe(rows, 'A line for each message: twice as many scans as results.', 'Messages')
-    describe(ages, 'Each result comes from a scan that is about 1 s old.', 'Ages')
-    plt.close(figure)
-    show(figure)

@@ -2,21 +2,18 @@
 
 import inspect
 import threading
-import time
 
 from geometry_msgs.msg import Twist
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
-from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci as Patrol
 
-from helpers.checks.bench import STATUS, Bench
+from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
-from helpers.replay import ActionRecording, replay_action
-from helpers.robot import Floor
+from helpers.ros import STATUS
 
 tasks = Tasks()
 check = tasks.check
@@ -517,52 +514,3 @@ def send(bench, places):
 def ended(goal):
     status, result = goal.ended()
     return status, list(result.sequence) if result else []
-
-
-# --- The frame of the lesson's runs ---------------------------------------------------------------
-
-FLOOR = Floor.from_text('######\n#    #\n#>   #\n#    #\n######', name='hall')
-
-
-def spin_each(session, *nodes, threads=1):
-    """Spin each node in an executor of its own. The first one gets the threads."""
-    for number, node in enumerate(nodes):
-        many = threads > 1 and number == 0
-        executor = MultiThreadedExecutor(threads) if many else SingleThreadedExecutor()
-        executor.add_node(node)
-        session.spin(executor)
-
-
-def call(session, node, function, *arguments, timeout_s=10):
-    """Let the thread of a node call something. See the end of the lesson for the reason."""
-    task = node.executor.create_task(function, *arguments)
-    session.wait_until(task.done, timeout_s)
-    return task.result()
-
-
-def note_feedback(operator, times):
-    """Note when an operator hears feedback."""
-    callback = operator.feedback_callback
-
-    def noted(message):
-        times.append(time.monotonic())
-        callback(message)
-
-    operator.feedback_callback = noted
-
-
-def record(patroller):
-    """Return a recording of the action of a patroller, and of its service."""
-    services = {'charge_callback': patroller.service} if hasattr(patroller, 'service') else {}
-    return ActionRecording(patroller.server, patroller.execute_callback, **services)
-
-
-def step_through(run, threads):
-    """Return the replay of a run."""
-    return replay_action(run.recording, threads, run.cancelled_s)
-
-
-def show(run):
-    """Print how a run ended."""
-    print('The cancel was accepted:', run.accepted)
-    print('The job:', run.status, '- the wall was hit:', run.hit)

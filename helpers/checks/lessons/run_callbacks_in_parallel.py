@@ -6,13 +6,13 @@ import time
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
-from rclpy.node import Node
 from std_msgs.msg import Int32, String
 
 from helpers.checks.bench import Bench, must_define, must_have
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks, once
 from helpers.ros import ros_session
+from helpers.trials import callbacks_at_once
 
 tasks = Tasks()
 check = tasks.check
@@ -88,38 +88,6 @@ def name_of(thing):
     if isinstance(thing, type):
         return f'the class {thing.__name__}'
     return type(thing).__name__
-
-
-def callbacks_at_once(make):
-    """Return how many of 12 callbacks run at the same time: all are held at a gate.
-
-    `make` returns an executor and a callback group.
-    """
-    gate, inside = threading.Event(), []
-
-    def hold(message):
-        inside.append(message)
-        gate.wait(timeout=30)
-
-    with ros_session() as session:
-        executor, group = make()
-        node, topic = Node('gated'), (Int32, 'number')
-        node.create_subscription(*topic, hold, 20, callback_group=group, event_callbacks=QUIET)
-        executor.add_node(node)
-        session.spin(executor)
-        publisher = node.create_publisher(*topic, 20)
-        for number in range(12):
-            publisher.publish(Int32(data=number))
-        session.wait_until_quiet(executor)
-        count = len(inside)
-        gate.set()
-    return count
-
-
-def most_at_once(table):
-    """Return the largest number of callbacks in a recording that ran at the same time."""
-    begun, ended = table['started_s'].dropna(), table['finished_s'].dropna()
-    return max(int(((begun <= time_s) & (ended > time_s)).sum()) for time_s in begun)
 
 
 @tasks.add(3)

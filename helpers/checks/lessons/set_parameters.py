@@ -13,6 +13,7 @@ from helpers.checks.bench import Bench
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import EMPTY, Robot
 from helpers.ros import ros_session
+from helpers.trials import ways
 
 tasks = Tasks()
 check = tasks.check
@@ -412,15 +413,3 @@ class ForeignDriver(Node):
         command = Twist()
         command.linear.x = self.get_parameter('max_speed').value
         self.publisher.publish(command)
-
-
-def ways(*starts):
-    """Return how far each of three robots has come after 3 s (sim time), driven by these nodes."""
-    with ros_session():
-        robots = [Robot(EMPTY, namespace=name, sim_time=True) for name in ('one', 'two', 'three')]
-        executor = SingleThreadedExecutor()
-        for node_class, arguments in starts:
-            executor.add_node(node_class(cli_args=arguments.split()))
-        for robot in robots:
-            robot.run(3, executor)
-        return [round(robot.pose.x - robot.floor.start.x, 1) for robot in robots]

@@ -12,16 +12,16 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 
 from helpers.checks.bench import Bench
-from helpers.checks.builds import compile_error, why_it_failed
 from helpers.checks.errors import Failed
 from helpers.checks.programs import manifest
 from helpers.checks.tasks import Tasks, once
+from helpers.trials import build_anew
+from helpers.workspace import compile_error, why_it_failed
 
 tasks = Tasks()
 check = tasks.check
 
 BUILD_S = 90  # for a point that builds two or three packages
-LIBRARY_FILE = 'src/scan_tools/CMakeLists.txt'
 NOT_COMPILED = 'it does not compile'
 NOT_BUILT = 'it does not build'
 
@@ -184,22 +184,6 @@ install(TARGETS scan_tools EXPORT ours ARCHIVE DESTINATION lib LIBRARY DESTINATI
 ament_export_targets(ours HAS_LIBRARY_TARGET)
 ament_package()
 """
-
-
-def build_anew(workspace, *packages, library=None):
-    """Build packages from an empty `install`, and return the result.
-
-    With `library`, this text is the CMakeLists.txt of scan_tools for the time of the build.
-    """
-    file = workspace.file(LIBRARY_FILE)
-    yours = file.read_text()
-    for folder in ('install', 'build/try_library', 'build/look'):
-        shutil.rmtree(workspace.file(folder), ignore_errors=True)
-    try:
-        file.write_text(library or yours)
-        return workspace.build(*packages)
-    finally:
-        file.write_text(yours)
 
 
 def result_of(workspace, *packages, library=None):

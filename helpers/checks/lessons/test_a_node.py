@@ -4,15 +4,10 @@ The sources below are versions of what the student tests, right ones and wrong o
 """
 
 import re
-from functools import partial
 
-from lifecycle_msgs.srv import GetState
-from rclpy.lifecycle import TransitionCallbackReturn
-
-from helpers.checks.bench import Bench
 from helpers.checks.builds import build
-from helpers.checks.planted import planted, run_tests
 from helpers.checks.tasks import Tasks, once
+from helpers.trials import BRAKE, BUSY, Device, planted, run_busy, run_tests, state_after
 
 tasks = Tasks()
 check = tasks.check
@@ -97,25 +92,6 @@ def test_the_function(workspace, tests):
 
 # --- Task 2: a fixture
 
-BRAKE = """from geometry_msgs.msg import Twist
-from rclpy.node import Node
-from sensor_msgs.msg import Range
-
-from brake_pkg.distance import distance
-from brake_pkg.speed import safe_speed
-
-
-class Brake(Node):
-    def __init__(self):
-        super().__init__('brake')
-        self.publisher = self.create_publisher(Twist, 'cmd_vel', 1)
-        self.subscription = self.create_subscription(Range, 'range', self.range_callback, 1)
-
-    def range_callback(self, message):
-        twist = Twist()
-        twist.linear.x = safe_speed(distance(message))
-        self.publisher.publish(twist)
-"""
 ALONE = """import os, pytest, rclpy
 from domain_coordinator import domain_id
 
@@ -158,22 +134,6 @@ def a_domain_of_its_own(workspace):
 
 # --- Tasks 3 and 5: a flaky test
 
-BUSY = (
-    BRAKE
-    + """
-import itertools, time
-Quick, tests = Brake, itertools.count(1)
-
-class Brake(Quick):
-    def __init__(self):
-        super().__init__()
-        self.other_work_s = 0 if next(tests) % 3 else 0.4
-
-    def range_callback(self, message):
-        time.sleep(self.other_work_s)
-        super().range_callback(message)
-"""
-)
 LATE = (
     BRAKE
     + """
@@ -188,13 +148,6 @@ class Brake(Quick):
         late = self.create_timer(0.4, connect)
 """
 )
-
-
-def run_busy(workspace, tests='test/test_brake.py'):
-    """Run the tests of a brake on a busy computer: in every third test it gets less CPU time."""
-    versions = {'busy': BUSY}
-    runs = run_tests(workspace, PACKAGE, tests, 'brake_pkg.brake', versions, most_failures=9)
-    return runs['busy']
 
 
 @tasks.add(3, limit_s=60)
@@ -441,63 +394,6 @@ def a_brake_with_a_lifecycle(workspace):
 
 
 # --- Task 8: a step that fails
-
-
-class Device:
-    """A camera without hardware. The calls in `broken` raise an OSError."""
-
-    def __init__(self, *broken):
-        self.broken, self.calls = broken, []
-
-    def _call(self, name):
-        self.calls.append(name)
-        if name in self.broken:
-            raise OSError(f'{name}: no camera')
-
-    def __getattr__(self, name):
-        if name in ('open', 'start', 'close'):
-            return partial(self._call, name)
-        raise AttributeError(name)
-
-
-def state_after(make_camera, device, *steps):
-    """Trigger steps of a new camera, as long as they succeed.
-
-    Return its state, the result of the last step, and what it has logged as an error. What a step
-    raises, and is no OSError of the device, is raised here: rclpy tells nobody.
-    """
-    raised = []
-    with Bench() as bench:
-        camera = _watched(make_camera, raised)(device)
-        results = []
-        for step in steps:
-            if not results or results[-1] == TransitionCallbackReturn.SUCCESS:
-                results.append(getattr(camera, f'trigger_{step}')())
-        bench.spin(camera)
-        answer = bench.call('/camera/get_state', GetState, limit_s=10)
-        errors = [line for line in bench.log('camera') if line.startswith('[ERROR]')]
-    if raised:
-        raise raised[0]
-    return answer.current_state.label, results[-1].name, errors
-
-
-def _watched(Camera, raised):
-    def watched(name):
-        method = getattr(Camera, name)
-
-        def step(self, state):
-            try:
-                return method(self, state)
-            except OSError:
-                raise
-            except Exception as error:
-                raised.append(error)
-                raise
-
-        return step
-
-    names = 'on_configure', 'on_activate', 'on_error'
-    return type('Camera', (Camera,), {name: watched(name) for name in names})
 
 
 @tasks.add(8)

@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rosidl_adapter.parser import parse_service_file
 from sensor_msgs.msg import Image
@@ -13,7 +12,6 @@ from helpers.checks.builds import builds
 from helpers.checks.programs import manifest, needed, sourced
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import ROOMS, Robot
-from helpers.ros import ros_session
 
 tasks = Tasks()
 check = tasks.check
@@ -228,18 +226,3 @@ def is_picture(image, robot, degrees):
     seen = robot.turn_camera(0.0)
     right = image.data == seen.data and image.width == seen.width
     return right or 'the picture is not what the camera sees'
-
-
-def with_camera(CameraServer, act):
-    """Start a robot, its camera server and a client's node, and return what `act` does with them.
-
-    `act` gets the session, the node and the robot.
-    """
-    with ros_session() as session:
-        robot = Robot(ROOMS)
-        client = Node('client')
-        for node in (CameraServer(robot), client):
-            executor = SingleThreadedExecutor()
-            executor.add_node(node)
-            session.spin(executor)
-        return act(session, client, robot)

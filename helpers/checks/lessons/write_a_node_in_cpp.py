@@ -26,35 +26,6 @@ STOP_S = 5  # until the last command of a program is here
 START_S = 8  # for a program to start and be known to the others
 CALLS_MY_SPIN = 'brake.cpp calls spin, not my_spin: run the cell above this task again'
 
-TRY_NEAREST = """#include <algorithm>
-#include <iostream>
-#include <string>
-#include <scan_tools/nearest.hpp>
-
-// Prints nearest(), and what min_element finds.
-int main(int argc, char ** argv)
-{
-  if (argc < 4) {
-    std::cerr << "usage: try_nearest RANGE_MIN RANGE_MAX RANGE..." << std::endl;
-    return 2;
-  }
-  sensor_msgs::msg::LaserScan scan;
-  scan.range_min = std::stof(argv[1]);
-  scan.range_max = std::stof(argv[2]);
-  for (int i = 3; i < argc; ++i) {
-    scan.ranges.push_back(std::stof(argv[i]));
-  }
-  const auto found = scan_tools::nearest(scan);
-  std::cout << (found ? std::to_string(*found) : "nothing") << std::endl;
-  std::cout << *std::min_element(scan.ranges.begin(), scan.ranges.end()) << std::endl;
-}
-"""
-
-
-def write_try_nearest(workspace):
-    """Write the small program that calls the library."""
-    workspace.write('src/scan_tools/src/try_nearest.cpp', TRY_NEAREST)
-
 
 def install_anew(workspace, *packages):
     """Build packages. Raises Failed with the first error.

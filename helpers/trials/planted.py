@@ -16,7 +16,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from helpers.checks.errors import own_line
+from helpers.notebook import own_line
 
 RUNNER = Path(__file__).with_name('planted_runner.py')
 LONGEST = 160  # characters of a message

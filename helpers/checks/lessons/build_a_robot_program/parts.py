@@ -1,0 +1,345 @@
+"""Of the project: the parts of the node."""
+
+import math
+import re
+
+from nav_msgs.msg import Odometry
+from rclpy.action import ActionClient
+from rclpy.clock import ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import BatteryState
+
+from helpers.checks.bench import Bench, must_define
+from helpers.checks.builds import builds
+from helpers.checks.lessons.build_a_robot_program.shared import tasks
+from helpers.checks.tasks import once
+from helpers.patrol import CIRCLE, SIM, SNAKE, Ear, action, estimated, module
+from helpers.robot import EMPTY, Robot
+from helpers.ros import STATUS, ros_session, spun
+
+
+@tasks.add(5, cpu_s=20)
+def where_am_i(workspace):
+    def knows(commands):
+        def test():
+            where, place, yaw = estimated(module(workspace, 'where').Where, commands)
+            error = math.dist((where.x, where.y), place)
+            if abs(math.remainder(where.yaw - yaw, math.tau)) > 0.1:
+                return 'its yaw is wrong'
+            return error < 0.15 or f'at the end it is {error:.1f} m away'
+
+        return test
+
+    def driven(scale, period_s=0.1):
+        """Drive straight on. Return the true way, and x. The wheels report at another rate, too."""
+        with ros_session():
+            robot = Robot(EMPTY, sim_time=True, noise=False)
+            options = [*SIM, Parameter('wheel_scale', value=scale)]
+            node = Node('tested', parameter_overrides=options, cli_args=THINNED)
+            where = module(workspace, 'where').Where(node)
+            executor = spun(node, Thinner(period_s))
+            robot.run(0.2, executor)
+            for _ in range(20):
+                robot.command(0.5)
+                robot.run(0.1, executor)
+        return robot.pose.x - EMPTY.start.x, where.x
+
+    def scale_is_used():
+        way, x = driven(2.0)
+        text = f'with wheel_scale = 2 it drove {way:.1f} m, and x is {x:.1f} m'
+        return abs(x - way / 2) < 0.05 or text
+
+    def stamps_are_used():
+        way, x = driven(1.0, period_s=0.2)
+        text = f'with odom every 0.2 s it drove {way:.1f} m, and x is {x:.1f} m'
+        return abs(x - way) < 0.15 or text
+
+    stamps = 'The seconds between two stamps, not a fixed time.'
+    return [
+        ('a circle', knows(CIRCLE[:150]), 'x grows by way * cos(yaw), y by way * sin(yaw).'),
+        ('a line like a snake', knows(SNAKE), stamps),
+        ('odom comes less often', stamps_are_used, stamps),
+        ('the parameter wheel_scale', scale_is_used, 'node.declare_parameter(...).value'),
+    ]
+
+
+THINNED = ['--ros-args', '-r', 'odom:=thin_odom']
+
+
+class Thinner(Node):
+    """Passes odometry on, at most once in a period."""
+
+    def __init__(self, period_s):
+        super().__init__('thinner')
+        self.period_s, self.last_s = period_s, -math.inf
+        self.publisher = self.create_publisher(Odometry, 'thin_odom', 10)
+        self.create_subscription(Odometry, 'odom', self.on_odom, 10)
+
+    def on_odom(self, odom):
+        """Pass a message on if the last one is old enough."""
+        now_s = odom.header.stamp.sec + odom.header.stamp.nanosec / 1e9
+        if now_s > self.last_s + self.period_s - 0.01:
+            self.last_s = now_s
+            self.publisher.publish(odom)
+
+
+@tasks.add(8, limit_s=90, cpu_s=60)
+def an_action(workspace):
+    show = 'source install/setup.bash\nros2 interface show patrol_interfaces/action/Patrol'
+    shown = once(lambda: workspace.terminal(show))
+    it_builds = once(lambda: builds(workspace, 'patrol_interfaces'))
+
+    def has(number, name, right):
+        def test():
+            if it_builds() is not True:
+                return 'not judged: it does not build'
+            written = re.sub(r'#.*', '', shown())
+            parts = re.split(r'^---$', written, flags=re.MULTILINE)
+            found = ' '.join(parts[number].split()) if number < len(parts) else ''
+            return found == right or f'the {name} has {found or "nothing"}'
+
+        return test
+
+    return [
+        ('it builds', it_builds, 'Three parts, with a line --- between them.'),
+        ('the goal', has(0, 'goal', 'int32 places'), 'int32 places'),
+        ('the result', has(1, 'result', 'int32[] visited'), 'A list is int32[].'),
+        ('the feedback', has(2, 'feedback', 'int32[] visited'), 'A list is int32[].'),
+    ]
+
+
+class Asked:
+    """A job in a node, a client, and what the client is told. Make it in a session."""
+
+    def __init__(self, workspace, route=(1.0, 2.0, 3.0, 4.0)):
+        given = [Parameter('route', value=list(route))] if route else []
+        self.robot, self.allowed = Robot(EMPTY, sim_time=True), True
+        node, client = Node('tested', parameter_overrides=[*SIM, *given]), Node('client')
+        self.job = module(workspace, 'job').Job(node, lambda: self.allowed)
+        self.client, self.executor = ActionClient(client, action(), 'patrol'), spun(node, client)
+        self.robot.run(0.5, self.executor, until=self.client.server_is_ready)
+
+    def ask(self, places):
+        """Send a goal. Return whether it was accepted."""
+        self.heard, self.ended = [], None
+        sent = self.client.send_goal_async(action().Goal(places=places), self.hear)
+        self.robot.run(0.2, self.executor)
+        if not sent.done():
+            return 'no answer'
+        self.handle = sent.result()
+        if self.handle.accepted:
+            self.ended = self.handle.get_result_async()
+        return 'accepted' if self.handle.accepted else 'refused'
+
+    def hear(self, message):
+        """Keep feedback."""
+        self.heard.append(list(message.feedback.visited))
+
+    def result(self):
+        """Return how the job ended, and the places of its result."""
+        self.robot.run(0.2, self.executor)
+        if self.ended is None or not self.ended.done():
+            return 'no result'
+        answer = self.ended.result()
+        return STATUS[answer.status], list(answer.result.visited)
+
+
+@tasks.add(9)
+def the_job(workspace):
+    def told(story):
+        """Return a test: each step of the story says what came, what is right, and of what."""
+
+        def test():
+            with ros_session():
+                for step, came, right in story(Asked(workspace)):
+                    if came != right:
+                        return f'{step}: {came}, not {right}'
+            return True
+
+        return test
+
+    one, two = (1.0, 2.0), (3.0, 4.0)
+
+    def three_places(asked):
+        yield 'place() without a goal', asked.job.place(), None
+        yield 'a goal of 3 places', asked.ask(3), 'accepted'
+        for number, right in enumerate([one, two, one]):
+            yield f'place() after {number} places', asked.job.place(), right
+            asked.job.arrived()
+            asked.robot.run(0.1, asked.executor)
+        yield 'the result after 3 places', asked.result(), ('SUCCEEDED', [0, 1, 2])
+        # The last one may come after the result.
+        yield 'the feedback after 1 and 2 places', asked.heard[:2], [[0], [0, 1]]
+        yield 'place() after the last one', asked.job.place(), None
+
+    def refusals(asked):
+        yield 'a goal of 0 places', asked.ask(0), 'refused'
+        asked.allowed = False
+        yield 'a goal while may_begin() is False', asked.ask(2), 'refused'
+        asked.allowed = True
+        yield 'a goal of 2 places', asked.ask(2), 'accepted'
+        yield 'a second goal at once', asked.ask(2), 'refused'
+
+    def without_route():
+        with ros_session():
+            answer = Asked(workspace, route=()).ask(1)
+        return answer == 'refused' or f'without the parameter route, a goal of 1 place: {answer}'
+
+    def cancelled(asked):
+        yield 'a goal of 5 places', asked.ask(5), 'accepted'
+        asked.job.arrived()
+        asked.handle.cancel_goal_async()
+        asked.robot.run(0.2, asked.executor)
+        yield 'place() after a cancel', asked.job.place(), None
+        yield 'the result after a cancel', asked.result(), ('CANCELED', [0])
+        yield 'a new goal of 1 place', asked.ask(1), 'accepted'
+        asked.job.arrived()
+        yield 'its result', asked.result(), ('SUCCEEDED', [0])
+
+    def broken_off(asked):
+        asked.job.end()
+        yield 'a goal of 2 places', asked.ask(2), 'accepted'
+        asked.job.end()
+        yield 'the result after end()', asked.result(), ('ABORTED', [])
+        yield 'a new goal', asked.ask(1), 'accepted'
+
+    return [
+        (
+            'three places',
+            told(three_places),
+            'The numbers go on: 0, 1, 2. goal.succeed(), and publish feedback.',
+        ),
+        ('what it refuses', told(refusals), 'GoalResponse.REJECT'),
+        ('without a route', without_route, 'not self.places'),
+        ('a cancel, and a new goal', told(cancelled), 'is_cancel_requested in place()'),
+        ('aborted', told(broken_off), 'abort(), and self.goal = None'),
+    ]
+
+
+@tasks.add(10)
+def the_battery(workspace):
+    def battery_says(percentages, *options):
+        """Send percentages. Return when it was low, and what was logged."""
+        with ros_session():
+            robot = Robot(EMPTY, namespace='other', sim_time=True)
+            node, ear = Node('tested', parameter_overrides=[*SIM, *options]), Ear()
+            talker = ear.create_publisher(BatteryState, 'battery_state', 10)
+            battery, executor = module(workspace, 'battery').Battery(node), spun(node, ear)
+            lows = [battery.low]
+            for percentage in percentages:
+                robot.run(0.1, executor)
+                talker.publish(BatteryState(percentage=percentage))
+                robot.run(0.1, executor)
+                lows.append(battery.low)
+        return [bool(low) for low in lows], ear.heard
+
+    def low(percentages, right, *options):
+        def test():
+            lows, _ = battery_says(percentages, *options)
+            return lows == right or f'low was {lows}'
+
+        return test
+
+    def logs():
+        _, records = battery_says([0.871, 0.87, 0.19])
+        right = [('information', 'The battery is at 87 %'), ('warning', 'The battery is at 19 %')]
+        return records == right or f'it logged {records}'
+
+    least, nan = Parameter('least_battery', value=0.5), math.nan
+    full = Parameter('full_battery', value=100.0)
+    text = "f'{100 * percentage:.0f} %', and compare it with the last text"
+    return [
+        (
+            'low',
+            low([0.9, 0.19, 0.2], [True, False, True, False]),
+            'battery.percentage < self.least',
+        ),
+        ('least_battery', low([0.9, 0.4], [True, False, True], least), 'node.declare_parameter'),
+        (
+            'no number',
+            low([nan, 0.9], [True, True, False]),
+            'not battery.percentage >= self.least',
+        ),
+        (
+            'a battery that is full at 100',
+            low([90.0, 19.0, 20.0], [True, False, True, False], full),
+            'battery.percentage / self.full',
+        ),
+        ('it says so, once, and warns if it is low', logs, text),
+    ]
+
+
+@tasks.add(11)
+def the_watchdog(workspace):
+    def made(node, stop):
+        dog = module(workspace, 'watchdog').Watchdog(node, stop, 'scan')
+        must_define(type(dog), 'now_s', 'seen', 'look')
+        return dog
+
+    def told(times, *options):
+        """Tell it the time at each look. Return when it stopped, and what was logged."""
+        with Bench() as bench:
+            now_s, stops = [0.0], []
+            node = Node('tested', parameter_overrides=[*options])
+            dog = made(node, lambda: stops.append(now_s[0]))
+            for timer in node.timers:
+                timer.cancel()
+            dog.now_s = lambda: now_s[0]
+            for at_s, seen in times:
+                now_s[0] = at_s
+                if seen:
+                    dog.seen()
+                dog.look()
+            bench.wait(lambda: len(bench.log('tested')) >= len(stops))
+            return stops, bench.log('tested')
+
+    # Of each time: when, and whether something comes then.
+    twice = [(1.0, False), (2.0, True), (2.2, False), (2.4, False), (9.0, False)]
+    twice += [(20.0, True), (20.25, True), (20.5, False), (20.6, False), (30.0, False)]
+
+    def stops_at(times, right, *options):
+        def test():
+            stops, _ = told(times, *options)
+            came = ', '.join(f'{at:g}' for at, seen in times if seen)
+            stopped = ', '.join(f'{at:g} s' for at in stops) or 'no time'
+            wanted = ', '.join(f'{at:g} s' for at in right)
+            return stops == right or (
+                f'scans come at {came} s, and it stops at {stopped}, not at {wanted}'
+            )
+
+        return test
+
+    def says_so():
+        _, records = told(twice)
+        right = ['[ERROR] [tested]: No scan comes: I stop'] * 2
+        return records == right or f'it logged {records}'
+
+    def with_a_stopped_clock():
+        with Bench() as bench:
+            node, stops = Node('tested', parameter_overrides=SIM), []
+            dog = made(node, lambda: stops.append(1))
+            bench.spin(node)
+            begin = dog.now_s()
+            if not bench.wait(lambda: dog.now_s() != begin):
+                return 'now_s() stands still: no /clock comes'
+            if bench.wait(lambda: stops, 0.5):
+                return 'it stops before the first seen()'
+            dog.seen()
+            if bench.wait(lambda: stops, 10):
+                return True
+            kinds = {timer.clock.clock_type for timer in node.timers}
+            if kinds != {ClockType.STEADY_TIME}:
+                return 'its timer does not fire: no /clock comes'
+            return 'it does not stop, 10 s after the last scan'
+
+    forget = 'After stop(), set the time of the last seen() to None.'
+    steady = 'create_timer(..., clock=self.clock), with Clock(clock_type=ClockType.STEADY_TIME)'
+    longer = Parameter('timeout_s', value=0.8)
+    late = [(1.0, True), (1.7, False), (1.85, False), (3.0, False)]
+    return [
+        ('once, when nothing comes for 0.3 s', stops_at(twice, [2.4, 20.6]), forget),
+        ('after 0.8 s, if the parameter says so', stops_at(late, [1.85], longer), 'timeout_s'),
+        ('it says so', says_so, 'node.get_logger().error(...)'),
+        ('even if no /clock comes', with_a_stopped_clock, steady),
+    ]

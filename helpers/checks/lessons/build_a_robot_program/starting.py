@@ -1,0 +1,138 @@
+"""Of the project: what is installed, and what starts it."""
+
+from rcl_interfaces.srv import GetParameters
+
+from helpers.checks.bench import Bench
+from helpers.checks.builds import build, builds
+from helpers.checks.lessons.build_a_robot_program.shared import DRIVES, tasks
+from helpers.checks.tasks import once
+from helpers.patrol import LAUNCH, PACKAGE, launched, printed
+from helpers.robot import ROOMS
+from helpers.workspace import DIED, started
+
+
+@tasks.add(14, limit_s=90)
+def install_it(workspace):
+    it_builds = once(lambda: builds(workspace, 'patrol_pkg'))
+
+    def after_build(test):
+        return lambda: test() if it_builds() is True else 'not judged: it does not build'
+
+    def has_programs():
+        lines = workspace.terminal(
+            'source install/setup.bash\nros2 pkg executables patrol_pkg'
+        ).splitlines()
+        programs = sorted(line.split()[-1] for line in lines if line.startswith('patrol_pkg '))
+        return 'patrol' in programs or f'its programs: {", ".join(programs) or "none"}'
+
+    def has_files():
+        # The launch file is the next task: here any file in its folder must be installed.
+        launch_file = workspace.file(f'{PACKAGE}/launch/patrol.launch.xml')
+        planted_file = workspace.file(f'{PACKAGE}/launch/planted.launch.xml')
+        planted_file.write_text('<launch/>\n')
+        try:
+            workspace.build('patrol_pkg')
+        finally:
+            planted_file.unlink()
+        share = workspace.file('install/patrol_pkg/share/patrol_pkg')
+        wanted = ['config/rooms.yaml', 'launch/planted.launch.xml']
+        wanted += ['launch/patrol.launch.xml'] if launch_file.exists() else []
+        missing = [name for name in wanted if not (share / name).is_file()]
+        if 'launch/planted.launch.xml' in missing:
+            missing = [name for name in missing if not name.startswith('launch/')]
+            missing += ['launch/planted.launch.xml, which the check has put into launch']
+        return not missing or f'share/patrol_pkg has no {", no ".join(missing)}'
+
+    def survives_pycache():
+        folders = [workspace.file(f'{PACKAGE}/{name}/__pycache__') for name in ('launch', 'config')]
+        new = [folder for folder in folders if not folder.exists()]
+        for folder in new:
+            folder.mkdir(parents=True)
+        try:
+            return builds(workspace, 'patrol_pkg')
+        finally:
+            for folder in new:
+                folder.rmdir()
+
+    def wants_pytest():
+        code = 'import setuptools; setuptools.setup = lambda **given: print(given)\n'
+        code += "exec(open('setup.py').read())"
+        workspace.write(f'{PACKAGE}/.given.py', code)
+        given = workspace.terminal(f'cd {PACKAGE}; python -B .given.py; rm .given.py')
+        return 'pytest' in given.partition('extras_require')[2] or 'extras_require has no pytest'
+
+    files = "glob('launch/*launch.[pxy][yma]*') and glob('config/*.yaml')"
+    return [
+        ('it builds', it_builds, "entry_points={'console_scripts': [...]}"),
+        ('the program', after_build(has_programs), "'patrol = patrol_pkg.main:main'"),
+        ('its files', after_build(has_files), files),
+        ('beside a __pycache__', after_build(survives_pycache), files),
+        ('pytest', after_build(wants_pytest), "extras_require={'test': ['pytest']}"),
+    ]
+
+
+@tasks.add(15, limit_s=90, cpu_s=20)
+def one_file_starts_it(workspace):
+    def drives_in_step():
+        build(workspace, 'patrol_pkg')
+        share = 'install/patrol_pkg/share/patrol_pkg/config/'
+        for floor in ('short', 'corridor'):
+            text = 'patrol:\n  ros__parameters:\n    route: [1.0, 0.0]\n'
+            workspace.write(f'{share}{floor}.yaml', text)
+        arguments = 'floor:=short robot:=false sim:=true timeout:=60.0'
+        robot, end = launched(workspace, arguments, ROOMS, 1, 8)
+        way = robot.pose.x - ROOMS.start.x
+        if end != 'SUCCEEDED':
+            return end
+        return 0.7 < way < 1.1 or f'its route is 1 m long in short.yaml, and it drove {way:.0f} m'
+
+    def starts_both():
+        for arguments, floor, wait_s in (
+            ('', 'rooms', 0.3),
+            ('floor:=corridor timeout:=0.7', 'corridor', 0.7),
+        ):
+            named = f'with {arguments or "no argument"}'
+            text, sim, timeout_s = launched_with_robot(workspace, arguments)
+            if DRIVES not in text:
+                return f'{named} no robot drives. {printed(workspace, text.splitlines())}'
+            if started(text) != ['patrol', 'robot']:
+                return f'{named} it starts {" and ".join(started(text))}'
+            if DIED in text:
+                return f'{named} a program dies. {printed(workspace, text.splitlines())}'
+            driven = text.partition(DRIVES)[2].partition('.')[0]
+            if driven != floor:
+                return f'{named} the robot drives on the floor {driven}'
+            if sim is not False:
+                return f'{named} the parameter use_sim_time of the node patrol is {sim}'
+            if timeout_s != wait_s:
+                return f'{named} the parameter timeout_s of the node patrol is {timeout_s}'
+        return True
+
+    hint = '<param from="$(dirname)/../config/$(var floor).yaml"/>'
+    own = 'if="$(var robot)", $(var floor)'
+    return [
+        ('the program drives a robot that runs already', drives_in_step, hint),
+        ('it starts its own robot on the floor', starts_both, own),
+    ]
+
+
+def launched_with_robot(workspace, arguments):
+    """Launch the program and its own robot. Return what it prints, and two parameters of patrol.
+
+    These, use_sim_time and timeout_s, are None if a program is missing or has died.
+    """
+    command = f'{LAUNCH}patrol.launch.xml {arguments}'
+    with Bench() as bench, workspace.start(command, 'both') as both:
+
+        def text():
+            return '\n'.join(both.lines)
+
+        bench.wait(lambda: DRIVES in text() or DIED in text() or not both.running, 20)
+        if started(text()) != ['patrol', 'robot'] or DIED in text():
+            return text(), None, None
+        request = GetParameters.Request(names=['use_sim_time', 'timeout_s'])
+        answer = bench.call('/patrol/get_parameters', GetParameters, request, limit_s=10)
+        if answer is None:
+            return text(), None, None
+        sim, timeout = answer.values
+        return text(), sim.bool_value, timeout.double_value

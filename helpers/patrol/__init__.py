@@ -1,0 +1,56 @@
+"""Robots that are driven by the program that a learner writes in the last lesson, `patrol_pkg`.
+
+The lesson shows these drives, and its tasks are judged by them. Something can go wrong on the way:
+a cable is unplugged, the laser is blind, a program is ended.
+
+    program   its folder, its modules as they are now, its action, its route
+    floors    floors for it
+    drives    in simulated time and in this process: a part of it, or its whole node
+    launches  as it is started: beside a robot in simulated time, or in real time
+"""
+
+from helpers.patrol.drives import (
+    CIRCLE,
+    CUT,
+    DEGREES,
+    SNAKE,
+    Cable,
+    Ear,
+    Tour,
+    drive,
+    estimated,
+    round_tour,
+    steered,
+)
+from helpers.patrol.floors import CELLAR, LAST, ON_THE_WAY, write_route_of_cellar
+from helpers.patrol.launches import ENDS, LAUNCH, driven_live, ended_by, launched, printed
+from helpers.patrol.program import PACKAGE, SIM, action, module, route_of
+
+__all__ = [
+    'CELLAR',
+    'CIRCLE',
+    'CUT',
+    'DEGREES',
+    'ENDS',
+    'LAST',
+    'LAUNCH',
+    'ON_THE_WAY',
+    'PACKAGE',
+    'SIM',
+    'SNAKE',
+    'Cable',
+    'Ear',
+    'Tour',
+    'action',
+    'drive',
+    'driven_live',
+    'ended_by',
+    'estimated',
+    'launched',
+    'module',
+    'printed',
+    'round_tour',
+    'route_of',
+    'steered',
+    'write_route_of_cellar',
+]

@@ -1,0 +1,165 @@
+"""Drives in simulated time and in this process: of a part of the program, or of its whole node."""
+
+import math
+import time
+
+import numpy as np
+from rcl_interfaces.msg import Log
+from rclpy.action import ActionClient
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import LaserScan
+
+from helpers.patrol.program import PACKAGE, SIM, action, module
+from helpers.robot import EMPTY, KIND, ROOMS, Robot
+from helpers.ros import STATUS, ros_session, spun
+
+# A watchdog has a steady clock. Where simulated time passes, a scan may take long to come.
+PATIENT = Parameter('timeout_s', value=60.0)
+CIRCLE, SNAKE = [(0.3, 0.2)] * 600, [(0.5, 0.9 * math.sin(k / 9)) for k in range(120)]
+DEGREES = np.arange(-90.0, 91.0)
+CUT = ['--ros-args', '-r', 'scan:=laser']
+LEVELS = {10: 'debug', 20: 'information', 30: 'warning', 40: 'error', 50: 'fatal'}
+
+
+def drive(floor, make_node, seconds, start=None, driver=KIND, blind_after_s=math.inf):
+    """Drive a robot with a node in simulated time, and return the robot."""
+    with ros_session():
+        robot = Robot(floor, start=start, driver=driver, sim_time=True)
+        executor = spun(make_node(parameter_overrides=SIM))
+        robot.run(min(seconds, blind_after_s), executor)
+        if blind_after_s < seconds:
+            robot.blind = True
+            robot.run(seconds - blind_after_s, executor)
+    return robot
+
+
+def estimated(make, commands):
+    """Drive a robot by remote control, beside a part of the program that `make(node)` returns.
+
+    Return the part, the robot's true place as seen from its start, and its true yaw.
+    """
+    with ros_session():
+        robot, node = Robot(EMPTY, sim_time=True, seed=3), Node('tested', parameter_overrides=SIM)
+        part, executor = make(node), spun(node)
+        robot.run(0.2, executor)
+        for v, w in commands:
+            robot.command(v, w)
+            robot.run(0.1, executor)
+    return part, (robot.pose.x - EMPTY.start.x, robot.pose.y - EMPTY.start.y), robot.pose.yaw
+
+
+def steered(workspace, floor, places, seconds):
+    """Drive a robot to places with `steer` and its true pose. Return it, and how many are left."""
+    logic = module(workspace, 'logic')
+    with ros_session():
+        robot, left = Robot(floor, sim_time=True), list(places)
+        while left and robot.t_s < seconds and not robot.bumps:
+            x, y, yaw = robot.pose
+            distance = math.dist((x, y), left[0])
+            if distance < 0.2:
+                left.pop(0)
+                continue
+            wanted = logic.direction(x, y, yaw, left[0])
+            ranges = np.array(robot.record.scans[-1].ranges)
+            robot.command(*logic.steer(ranges, np.radians(DEGREES), wanted, distance, 0.5))
+            robot.run(0.1)
+    return robot, len(left)
+
+
+class Cable(Node):
+    """A cable for the scans that can be unplugged: the node hears `laser`."""
+
+    def __init__(self):
+        super().__init__('cable')
+        self.plugged = True
+        self.laser = self.create_publisher(LaserScan, 'laser', 1)
+        self.create_subscription(LaserScan, 'scan', self.on_scan, 1)
+
+    def on_scan(self, scan):
+        """Pass a scan on."""
+        if self.plugged:
+            self.laser.publish(scan)
+
+
+class Ear(Node):
+    """Keeps what the student's nodes log: level and text."""
+
+    def __init__(self):
+        super().__init__('ear')
+        self.heard = []
+        self.create_subscription(Log, '/rosout', self.on_log, 100)
+
+    def on_log(self, log):
+        """Keep a record of the student's node."""
+        if log.name in ('tested', 'patrol'):
+            self.heard.append((LEVELS[log.level], log.msg))
+
+
+class Tour:
+    """The whole node, a robot in simulated time, a client and a cable. Make it in a session."""
+
+    def __init__(self, workspace, *options, floor=ROOMS, route=(3.5, 0.0, 6.5, 0.0), arguments=()):
+        values = [*SIM, *options] + ([Parameter('route', value=list(route))] if route else [])
+        if 'timeout_s' not in [option.name for option in options]:
+            values.append(PATIENT)
+        self.robot, self.cable, self.ear = Robot(floor, sim_time=True), Cable(), Ear()
+        arguments = [*CUT, *arguments]
+        patrol = module(workspace, 'patrol').Patrol
+        self.node = patrol(parameter_overrides=values, cli_args=arguments)
+        self.client, self.result = ActionClient(self.ear, action(), 'patrol'), None
+        self.executor = spun(self.node, self.cable, self.ear)
+        self.run(1.0)
+
+    def run(self, seconds, until=lambda: False):
+        """Let simulated time go on."""
+        return self.robot.run(seconds, self.executor, until=until)
+
+    def wait(self, condition, limit_s=10.0):
+        """Let time go on until a condition holds, also that of timers with a clock of their own.
+
+        Return whether it does within `limit_s` seconds.
+        """
+        limit = time.monotonic() + limit_s
+        while not condition() and time.monotonic() < limit:
+            time.sleep(0.02)
+            self.run(0.02)
+        return bool(condition())
+
+    def send(self, places):
+        """Send a goal. Return whether it was accepted."""
+        if not self.client.server_is_ready():
+            raise RuntimeError('there is no action server')
+        sent = self.client.send_goal_async(action().Goal(places=places))
+        self.run(0.1)
+        if not sent.done():
+            raise RuntimeError('a goal gets no answer')
+        self.handle = sent.result()
+        if self.handle.accepted:
+            self.result = self.handle.get_result_async()
+        return self.handle.accepted
+
+    def ended(self):
+        """Return whether the job has ended."""
+        return self.result is not None and self.result.done()
+
+    def status(self):
+        """Return how the job has ended."""
+        return STATUS[self.result.result().status] if self.ended() else 'not ended'
+
+    def speeds(self, since_s):
+        """Return the commands since then."""
+        commands = self.robot.record.commands
+        return [(command.v, command.w) for command in commands if command.t_s > since_s]
+
+
+def round_tour(workspace, floor=ROOMS, file='rooms'):
+    """Drive the route of a file in config. Return the tour and the number of its places."""
+    path = str(workspace.file(f'{PACKAGE}/config/{file}.yaml'))
+    with ros_session():
+        tour = Tour(workspace, floor=floor, route=None, arguments=['--params-file', path])
+        places = len(tour.node.job.places) if hasattr(tour.node, 'job') else 0
+        tour.send(places)
+        tour.run(90, until=lambda: tour.ended() or tour.robot.bumps)
+        tour.outcome = tour.status()
+    return tour, places

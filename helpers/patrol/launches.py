@@ -1,0 +1,214 @@
+"""Drives of the program as it is started: beside a robot in simulated time, or in real time."""
+
+import contextlib
+import math
+import os
+import signal
+import time
+from typing import NamedTuple
+
+from rclpy.action import ActionClient
+from rclpy.node import Node
+
+from helpers.patrol.program import PACKAGE, action, route_of
+from helpers.robot import CORRIDOR, KIND, RATE_HZ, TURTLEBOT3, Floor, Robot, watch
+from helpers.ros import STATUS, ros_session, spun
+from helpers.workspace import DIED, error_of_launch, why_it_failed, without_folders
+
+LAUNCH = 'source install/setup.bash\nexec ros2 launch patrol_pkg '
+BEATS = 12  # scans before a goal: in this time the battery says how full it is
+ENDS = 'Ctrl+C', 'patrol crashes', 'the laser is blind', 'the guard crashes'
+QUIET = ['--ros-args', '--disable-rosout-logs']  # which line comes first is an accident
+ON_A_TURTLEBOT = [
+    *(*QUIET, '-r', 'imu/data:=imu', '-r', 'cmd_vel:=cmd_vel_wanted'),
+    *('-p', 'route:=[3.0, 0.0]', '-p', 'speed:=0.2', '-p', 'full_battery:=100.0'),
+]
+LIMIT_S = 20.0
+
+
+def send_goal(session, server, places):
+    """Send a goal to another process. Return its handle, or None if no answer comes.
+
+    A server that has not discovered the client yet cannot answer: rmw_fastrtps waits for it as long
+    as its writer may block, 0.1 s (rmw_response.cpp), and rclpy does not begin such a goal. On a
+    busy computer this happens, so it is sent again.
+    """
+    for _ in range(5):
+        sent = server.send_goal_async(action().Goal(places=places))
+        with contextlib.suppress(TimeoutError):
+            session.wait_until(sent.done, 5.0)
+            return sent.result()
+    return None
+
+
+def launched(
+    workspace,
+    arguments,
+    floor,
+    places,
+    seconds,
+    seed=0,
+    driver=KIND,
+    file='patrol.launch.xml',
+):
+    """Launch the program beside a robot in simulated time, one scan and one command at a time.
+
+    Return the robot, and how the job ended or why it did not begin.
+    """
+    with ros_session() as session:
+        robot, client = Robot(floor, sim_time=True, seed=seed, driver=driver), Node('client')
+        server = ActionClient(client, action(), 'patrol')
+        session.spin(spun(client))
+        with workspace.start(f'{LAUNCH}{file} {arguments}', 'program') as program:
+
+            def beat(limit_s=10.0):
+                """Let the robot go on by a scan. Return whether its command came."""
+                before = len(robot.record.commands)
+                robot.run(0.1)
+                limit = time.monotonic() + limit_s
+                while len(robot.record.commands) == before and time.monotonic() < limit:
+                    time.sleep(0.004)
+                    robot.run(0)
+                return len(robot.record.commands) > before
+
+            if problem := _begun(workspace, program, server, robot):
+                return robot, problem
+            # The first scans are lost, as long as the program does not receive them yet.
+            beats, limit = 0, time.monotonic() + 30
+            while beats < BEATS and time.monotonic() < limit:
+                beats += beat(0.5)
+            if beats < BEATS:
+                return robot, f'a scan had no command. {printed(workspace, program.lines)}'
+            goal = send_goal(session, server, places)
+            if goal is None or not goal.accepted:
+                return robot, 'the goal is refused' if goal else 'the goal gets no answer'
+            ended = goal.get_result_async()
+            while robot.t_s < seconds and not ended.done() and not robot.bumps:
+                if not beat():
+                    return robot, f'a scan had no command. {printed(workspace, program.lines)}'
+    return robot, STATUS[ended.result().status] if ended.done() else 'not ended'
+
+
+def _begun(workspace, program, server, robot):
+    """Wait until the launched node is there. Return why it is not, or nothing."""
+
+    def is_ready():
+        return (
+            server.server_is_ready()
+            and robot.count_subscribers('scan')
+            and robot.count_publishers('cmd_vel')
+        )
+
+    limit, begun_s = time.monotonic() + 30, math.inf
+    while not is_ready() and program.running and time.monotonic() < limit:
+        time.sleep(0.02)
+        text = ' '.join(program.lines)
+        if 'process started' in text:
+            begun_s = min(begun_s, time.monotonic())
+        without = '[patrol-' not in text and time.monotonic() > begun_s + 10
+        if DIED in text or without:
+            break
+    if not server.server_is_ready():
+        return f'no node patrol with an action came. {printed(workspace, program.lines)}'
+    if not is_ready():
+        return f'nobody drives the robot. {printed(workspace, program.lines)}'
+    if '[robot-' in ' '.join(program.lines):
+        return 'with robot:=false it starts a robot'
+    limit = time.monotonic() + 20
+    while not robot.count_subscribers('/clock') and time.monotonic() < limit:
+        time.sleep(0.02)
+    if not robot.count_subscribers('/clock'):
+        return 'with sim:=true the node patrol does not hear /clock'
+    return ''
+
+
+def printed(workspace, lines):
+    """Return what a launched program printed of its first error, or its last line."""
+    text = without_folders('\n'.join(lines), workspace.path)
+    last = ['nothing', *(line for line in text.splitlines() if line.strip())][-1]
+    return f'ros2 launch printed: {error_of_launch(text) or last}'
+
+
+# --- What stops the robot
+
+
+class Ended(NamedTuple):
+    """What a robot did after an end: whether it stands, and how far and how long it went on."""
+
+    robot: Robot
+    stands: bool
+    metres: float
+    seconds: float
+
+
+def ended_by(workspace, end):
+    """Drive a TurtleBot 3 with patrol and guard, end something, and return what the robot did.
+
+    `end` is one of `ENDS`. Without a guard it is watched for two seconds. Raises RuntimeError if
+    the robot does not come to drive.
+    """
+    with ros_session() as session, contextlib.ExitStack() as programs:
+        robot, client = Robot(CORRIDOR, driver=TURTLEBOT3), Node('client')
+        server = ActionClient(client, action(), 'patrol')
+        session.spin(spun(client))
+        guard = programs.enter_context(workspace.run('patrol_pkg', 'guard', *QUIET))
+        patrol = programs.enter_context(workspace.run('patrol_pkg', 'patrol', *ON_A_TURTLEBOT))
+
+        def drives():
+            if server.server_is_ready() and robot.pose.x == CORRIDOR.start.x:
+                send_goal(session, server, 1)  # refused, as long as the battery has not spoken
+            return robot.record.poses[-1].v > 0.15
+
+        limit_s = robot.t_s + LIMIT_S
+        while not drives():
+            if robot.t_s > limit_s or not (guard.running and patrol.running):
+                lines = [*guard.lines, *patrol.lines, 'nothing'][-1]
+                raise RuntimeError(f'The robot does not drive. The programs printed: {lines}')
+            robot.run(0.2)
+        since_s = robot.t_s
+        if end == 'the laser is blind':
+            robot.blind = True
+        elif end == 'the guard crashes':
+            os.kill(guard.pid, signal.SIGKILL)
+        else:
+            os.kill(patrol.pid, signal.SIGINT if end == 'Ctrl+C' else signal.SIGKILL)
+        # It must stand before the other programs end, which stop it, too.
+        limit_s = 2.0 if end == 'the guard crashes' else LIMIT_S
+        stands = robot.run(limit_s, until=lambda: robot.stopped)
+        moves = [step for step in robot.record.poses if step.t_s > since_s and (step.v or step.w)]
+    return Ended(robot, stands, sum(step.v for step in moves) / RATE_HZ, len(moves) / RATE_HZ)
+
+
+def driven_live(workspace, file):
+    """Build, and drive a robot on the student's floor with the launched program, in real time.
+
+    `file` is the floor, in the package; its route has the same name. Return the robot. Raises
+    RuntimeError, with the first error, if the program cannot be built.
+    """
+    path = workspace.file(f'{PACKAGE}/{file}')
+    floor = Floor.from_text(path.read_text(encoding='utf-8'), name=path.stem)
+    result = workspace.build('patrol_pkg')
+    if not result.ok:
+        raise RuntimeError(why_it_failed(result))
+    with ros_session() as session:
+        robot, client = Robot(floor), Node('client')
+        watch(robot)
+        server = ActionClient(client, action(), 'patrol')
+        session.spin(spun(client))
+        arguments = f'patrol.launch.xml floor:={path.stem} robot:=false'
+        with workspace.start(LAUNCH + arguments, 'program') as program:
+            robot.run(LIMIT_S, until=lambda: server.server_is_ready() or not program.running)
+            robot.run(2.0)  # until the battery has spoken
+            if not server.server_is_ready():
+                print(printed(workspace, program.lines))
+                return robot
+            places = len(route_of(path.with_suffix('.yaml')))
+            goal = send_goal(session, server, places)
+            if goal is None or not goal.accepted:
+                print('The goal is refused.' if goal else 'The goal gets no answer.')
+                return robot
+            ended = goal.get_result_async()
+            robot.run(120, until=lambda: ended.done() or robot.bumps)
+            robot.run(1.0)
+    print(STATUS[ended.result().status] if ended.done() else 'not ended', 'bumps:', robot.bumps)
+    return robot
