@@ -41,6 +41,10 @@ BROKEN = [
     (rules.compared, code('# NBVAL_IGNORE_OUTPUT\n# Not compared: times.\nrun()')),
     (rules.compared, code('run()', 'nbval-ignore-output')),
     (rules.pictures_described, shown(image_png='iVBO')),
+    (rules.imports_from_apis, code('import helpers.robot.floor')),
+    (rules.imports_from_apis, code('from helpers.checks.lessons.try_it import check, drive')),
+    (rules.imports_from_apis, code('from helpers.checks.lessons.try_it import (\n    check,\n)')),
+    (rules.imports_from_apis, code('import helpers.checks.lessons.try_it as it')),
     (rules.names_stay, code('my_guess = 0')),
     (rules.names_stay, code('%time 1\nfor my_guess in [0]:\n    run()')),
     (rules.solutions_import_what_they_use, code('%%solution 2\nwait = deque()', 'solution')),
@@ -50,6 +54,10 @@ KEPT = [
     (rules.prints_what_stays, shown(text_html=PICTURE)),
     (rules.prints_what_stays, shown(text_plain='<t>', text_html='t')),
     (rules.compared, code('# Not compared: times.\nrun()', 'nbval-ignore-output')),
+    (
+        rules.imports_from_apis,
+        code('from helpers.checks.lessons.try_it import check\nfrom helpers.robot import Robot'),
+    ),
     (rules.names_stay, code('def run(my_guess):\n    other = [my_guess for my_guess in other]')),
     (
         rules.solutions_import_what_they_use,

@@ -81,10 +81,10 @@ def plan_to_add(name: str, after: str, root: Path) -> Plan:
             'Name the lesson in small letters, a verb and what it is about, with _ between '
             f'the words: {EXAMPLE}'
         )
-    files = [*paths(root / 'notebooks'), *(root / path for path in _beside(name))]
-    for file in files:
-        if name in (file.stem, file.stem[3:]) and file.exists():
-            raise ValueError(f'There is {file.relative_to(root)} already: choose another name.')
+    stems = [path.stem for path in paths(root / 'notebooks')]
+    there = [_path(stem) for stem in stems if name in (stem, stem[3:])] + _existing(name, root)
+    if there:
+        raise ValueError(f'There is {there[0]} already: choose another name.')
     numbered = _numbered(root)
     place = len(numbered)
     if after:
@@ -111,7 +111,7 @@ def plan_to_remove(lesson: str, root: Path) -> Plan:
     if old not in numbered:
         raise ValueError(f'{old} is no lesson: it stays.')
     numbered.remove(old)
-    removed = [path for path in [_path(old), *_beside(old[3:])] if (root / path).exists()]
+    removed = [_path(old), *_existing(old[3:], root)]
     texts = {path: text for path, text in all_texts(root).items() if path not in removed}
     texts |= tables.updated(texts)
     if named := sorted(path for path, text in texts.items() if old in text):
@@ -148,6 +148,20 @@ def _free_first(moved: dict[str, str]) -> list[str]:
 def _beside(name: str) -> dict[str, Path]:
     """Return the paths of what a lesson has besides its notebook, and their templates."""
     return {path.format(name=name): of_template for path, of_template in BESIDE.items()}
+
+
+def _existing(name: str, root: Path) -> list[str]:
+    """Return the paths of what a lesson has besides its notebook."""
+    answers = root / f'tests/answers/{name}.yaml'
+    files = [answers] if answers.exists() else []
+    return [file.relative_to(root).as_posix() for file in [*files, *checks_of(name, root)]]
+
+
+def checks_of(name: str, root: Path) -> list[Path]:
+    """Return the files of a lesson's checks: a module, or those of a package."""
+    folder = root / 'helpers/checks/lessons'
+    module = folder / f'{name}.py'
+    return [module] if module.exists() else sorted((folder / name).glob('*.py'))
 
 
 def to_look_at(texts: tables.Texts, numbers: set[str]) -> list[str]:

@@ -33,7 +33,11 @@ PATH = re.compile(
     r'|\b[A-Z]:\\\S+|(?<!\S)(?!python3/)\S*(?:site|dist)-packages\S*|'
     + '|'.join(rf'{re.escape(folder)}\b' for folder in sorted(THIS_MACHINE))
 )
-BEHIND_A_DOOR = re.compile(r'^\s*(?:from|import) (helpers\.(\w+)\.(?!lessons\.)\w+)', re.MULTILINE)
+BEHIND_AN_API = re.compile(r'^\s*(?:from|import) (helpers\.(\w+)\.(?!lessons\.)\w+)', re.MULTILINE)
+# Of the module with its checks a lesson needs one name: all others belong to a package's API.
+OF_THE_CHECKS = re.compile(
+    r'^\s*(?:from|import) (helpers\.checks\.lessons\b.*(?<! import check)$)', re.MULTILINE
+)
 Rule = Callable[[Lesson], Iterator[str]]
 
 
@@ -167,12 +171,17 @@ def pictures_described(lesson: Lesson) -> Iterator[str]:
 # Cells
 
 
-def imports_from_doors(lesson: Lesson) -> Iterator[str]:
+def imports_from_apis(lesson: Lesson) -> Iterator[str]:
     for cell in code_cells(lesson):
-        if found := BEHIND_A_DOOR.search(cell.source):
+        if found := BEHIND_AN_API.search(cell.source):
             yield (
-                f'The cell {called(cell)} imports {found[1]}: a lesson imports from the door, '
+                f'The cell {called(cell)} imports {found[1]}: a lesson imports from the API, '
                 f'helpers.{found[2]}.'
+            )
+        if found := OF_THE_CHECKS.search(cell.source):
+            yield (
+                f'The cell {called(cell)} has `{found[0].strip()}`: a lesson imports its check '
+                'alone from there, `import check`. What it needs to run is in the API of a package.'
             )
 
 
@@ -391,7 +400,7 @@ RULES: list[Rule] = [
     prints_what_stays,
     compared,
     pictures_described,
-    imports_from_doors,
+    imports_from_apis,
     names_stay,
     solutions_import_what_they_use,
     steps_begin_cells,

@@ -20,7 +20,7 @@ from nbformat import NotebookNode
 
 from tools.lessons.clean import clean, text_of, write
 from tools.lessons.lesson import ROOT, Lesson, chosen, read, tags
-from tools.lessons.new import all_texts
+from tools.lessons.new import all_texts, checks_of
 from tools.lessons.rules import FOLDED
 from tools.lessons.tables import BLOCK, Texts
 
@@ -109,10 +109,11 @@ def notebook_with(notebook: NotebookNode, number: int) -> NotebookNode:
 
 
 def checks_with(source: str, number: int) -> str:
-    """Return the module of checks with a check of the new task after the one before it."""
+    """Return a module of checks, with one of the new task if it has that of the task before."""
     source = grown(r'@tasks\.add\(', source, number)
     lines = source.splitlines(keepends=True)
-    lines.insert(ends_of_checks(source)[number - 1], CHECK.format(number=number))
+    if (end := ends_of_checks(source).get(number - 1)) is not None:
+        lines.insert(end, CHECK.format(number=number))
     return ''.join(lines)
 
 
@@ -150,17 +151,16 @@ def plan(lesson: str, after: str, root: Path) -> tuple[dict[Path, str], int, int
     if after and not (after.isdecimal() and 1 <= int(after) <= last):
         raise ValueError(f'{path.name} has the tasks 1 to {last}: name one of them with AFTER.')
     number = int(after or last) + 1
-    checks = root / f'helpers/checks/lessons/{found.name}.py'
+    checks = {file: file.read_text(encoding='utf-8') for file in checks_of(found.name, root)}
     answers = root / f'tests/answers/{found.name}.yaml'
-    source = checks.read_text(encoding='utf-8')
-    if {*ends_of_checks(source)} != {*range(1, last + 1)}:
+    if {task for text in checks.values() for task in ends_of_checks(text)} != {*range(1, last + 1)}:
         raise ValueError(
-            f'{checks.relative_to(root)} has no @tasks.add(...) above a function for each of the '
-            f'tasks 1 to {last}: write the new task by hand, as CONTRIBUTING.md says.'
+            f'helpers/checks/lessons/{found.name} has no @tasks.add(...) above a function for each '
+            f'of the tasks 1 to {last}: write the new task by hand, as CONTRIBUTING.md says.'
         )
     texts = {
         path: text_of(notebook_with(found.notebook, number)),
-        checks: checks_with(source, number),
+        **{file: checks_with(text, number) for file, text in checks.items()},
         answers: answers_with(answers.read_text(encoding='utf-8'), number),
     }
     return texts, number, last + 1
