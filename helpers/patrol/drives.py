@@ -1,7 +1,10 @@
 """Drives in simulated time and in this process: of a part of the program, or of its whole node."""
 
+from __future__ import annotations
+
 import math
 import time
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from rcl_interfaces.msg import Log
@@ -11,8 +14,9 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import LaserScan
 
 from helpers.patrol.program import PACKAGE, SIM, action, module
-from helpers.robot import EMPTY, KIND, ROOMS, Robot
+from helpers.robot import EMPTY, KIND, ROOMS, Driver, Floor, Pose, Robot
 from helpers.ros import STATUS, ros_session, spun
+from helpers.workspace import Workspace
 
 # A watchdog has a steady clock. Where simulated time passes, a scan may take long to come.
 PATIENT = Parameter('timeout_s', value=60.0)
@@ -22,8 +26,15 @@ CUT = ['--ros-args', '-r', 'scan:=laser']
 LEVELS = {10: 'debug', 20: 'information', 30: 'warning', 40: 'error', 50: 'fatal'}
 
 
-def drive(floor, make_node, seconds, start=None, driver=KIND, blind_after_s=math.inf):
-    """Drive a robot with a node in simulated time, and return the robot."""
+def drive(
+    floor: Floor,
+    make_node: Callable[..., Node],
+    seconds: float,
+    start: Pose | None = None,
+    driver: Driver = KIND,
+    blind_after_s: float = math.inf,
+) -> Robot:
+    """Drive a robot with a node for some seconds of simulated time, and return the robot."""
     with ros_session():
         robot = Robot(floor, start=start, driver=driver, sim_time=True)
         executor = spun(make_node(parameter_overrides=SIM))
@@ -34,8 +45,12 @@ def drive(floor, make_node, seconds, start=None, driver=KIND, blind_after_s=math
     return robot
 
 
-def estimated(make, commands):
+def estimated(
+    make: Callable[[Node], object], commands: Sequence[tuple[float, float]]
+) -> tuple[object, tuple[float, float], float]:
     """Drive a robot by remote control, beside a part of the program that `make(node)` returns.
+
+    A command, 0.1 s long, is m/s and rad/s.
 
     Return the part, the robot's true place as seen from its start, and its true yaw.
     """
@@ -49,7 +64,9 @@ def estimated(make, commands):
     return part, (robot.pose.x - EMPTY.start.x, robot.pose.y - EMPTY.start.y), robot.pose.yaw
 
 
-def steered(workspace, floor, places, seconds):
+def steered(
+    workspace: Workspace, floor: Floor, places: Sequence[tuple[float, float]], seconds: float
+) -> tuple[Robot, int]:
     """Drive a robot to places with `steer` and its true pose. Return it, and how many are left."""
     logic = module(workspace, 'logic')
     with ros_session():
@@ -70,28 +87,28 @@ def steered(workspace, floor, places, seconds):
 class Cable(Node):
     """A cable for the scans that can be unplugged: the node hears `laser`."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('cable')
         self.plugged = True
         self.laser = self.create_publisher(LaserScan, 'laser', 1)
         self.create_subscription(LaserScan, 'scan', self.on_scan, 1)
 
-    def on_scan(self, scan):
+    def on_scan(self, scan: LaserScan) -> None:
         """Pass a scan on."""
         if self.plugged:
             self.laser.publish(scan)
 
 
 class Ear(Node):
-    """Keeps what the student's nodes log: level and text."""
+    """Keeps what the learner's nodes log: level and text."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         super().__init__('ear')
         self.heard = []
         self.create_subscription(Log, '/rosout', self.on_log, 100)
 
-    def on_log(self, log):
-        """Keep a record of the student's node."""
+    def on_log(self, log: Log) -> None:
+        """Keep a record of a node of the learner."""
         if log.name in ('tested', 'patrol'):
             self.heard.append((LEVELS[log.level], log.msg))
 
@@ -99,7 +116,14 @@ class Ear(Node):
 class Tour:
     """The whole node, a robot in simulated time, a client and a cable. Make it in a session."""
 
-    def __init__(self, workspace, *options, floor=ROOMS, route=(3.5, 0.0, 6.5, 0.0), arguments=()):
+    def __init__(
+        self,
+        workspace: Workspace,
+        *options: Parameter,
+        floor: Floor = ROOMS,
+        route: Sequence[float] | None = (3.5, 0.0, 6.5, 0.0),
+        arguments: Sequence[str] = (),
+    ) -> None:
         values = [*SIM, *options] + ([Parameter('route', value=list(route))] if route else [])
         if 'timeout_s' not in [option.name for option in options]:
             values.append(PATIENT)
@@ -111,11 +135,11 @@ class Tour:
         self.executor = spun(self.node, self.cable, self.ear)
         self.run(1.0)
 
-    def run(self, seconds, until=lambda: False):
+    def run(self, seconds: float, until: Callable[[], object] = lambda: False) -> bool:
         """Let simulated time go on."""
         return self.robot.run(seconds, self.executor, until=until)
 
-    def wait(self, condition, limit_s=10.0):
+    def wait(self, condition: Callable[[], object], limit_s: float = 10.0) -> bool:
         """Let time go on until a condition holds, also that of timers with a clock of their own.
 
         Return whether it does within `limit_s` seconds.
@@ -126,8 +150,8 @@ class Tour:
             self.run(0.02)
         return bool(condition())
 
-    def send(self, places):
-        """Send a goal. Return whether it was accepted."""
+    def send(self, places: int) -> bool:
+        """Send a goal. Return whether it was accepted. Raises RuntimeError if no answer comes."""
         if not self.client.server_is_ready():
             raise RuntimeError('there is no action server')
         sent = self.client.send_goal_async(action().Goal(places=places))
@@ -139,21 +163,21 @@ class Tour:
             self.result = self.handle.get_result_async()
         return self.handle.accepted
 
-    def ended(self):
+    def ended(self) -> bool:
         """Return whether the job has ended."""
         return self.result is not None and self.result.done()
 
-    def status(self):
+    def status(self) -> str:
         """Return how the job has ended."""
         return STATUS[self.result.result().status] if self.ended() else 'not ended'
 
-    def speeds(self, since_s):
-        """Return the commands since then."""
+    def speeds(self, since_s: float) -> list[tuple[float, float]]:
+        """Return the commands, m/s and rad/s, since then (s, simulated time)."""
         commands = self.robot.record.commands
         return [(command.v, command.w) for command in commands if command.t_s > since_s]
 
 
-def round_tour(workspace, floor=ROOMS, file='rooms'):
+def round_tour(workspace: Workspace, floor: Floor = ROOMS, file: str = 'rooms') -> tuple[Tour, int]:
     """Drive the route of a file in config. Return the tour and the number of its places."""
     path = str(workspace.file(f'{PACKAGE}/config/{file}.yaml'))
     with ros_session():

@@ -2,6 +2,7 @@
 
 from helpers.patrol.program import PACKAGE
 from helpers.robot import Floor
+from helpers.workspace import Workspace
 
 LAST = Floor.from_text(
     """
@@ -36,7 +37,7 @@ ON_THE_WAY += [(10.75, 4.0), (10.75, 2.75), (10.75, 1.25), (10.75, 2.75), (10.75
 ON_THE_WAY += [(9.5, 4.25), (8.0, 4.75), (4.75, 4.75), (1.75, 5.25)]
 
 
-def write_route_of_cellar(workspace):
+def write_route_of_cellar(workspace: Workspace) -> None:
     """Write the parameter file of the other floor."""
     x0, y0, _ = CELLAR.start
     route = [float(number) for x, y in ON_THE_WAY for number in (x - x0, y - y0)]

@@ -1,19 +1,29 @@
 """Drives of the program as it is started: beside a robot in simulated time, or in real time."""
 
+from __future__ import annotations
+
 import contextlib
 import math
 import os
 import signal
 import time
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from rclpy.action import ActionClient
 from rclpy.node import Node
 
 from helpers.patrol.program import PACKAGE, action, route_of
-from helpers.robot import CORRIDOR, KIND, RATE_HZ, TURTLEBOT3, Floor, Robot, watch
-from helpers.ros import STATUS, ros_session, spun
-from helpers.workspace import DIED, error_of_launch, why_it_failed, without_folders
+from helpers.robot import CORRIDOR, KIND, RATE_HZ, TURTLEBOT3, Driver, Floor, Robot, watch
+from helpers.ros import STATUS, Session, ros_session, spun
+from helpers.workspace import (
+    DIED,
+    Process,
+    Workspace,
+    error_of_launch,
+    why_it_failed,
+    without_folders,
+)
 
 LAUNCH = 'source install/setup.bash\nexec ros2 launch patrol_pkg '
 BEATS = 12  # scans before a goal: in this time the battery says how full it is
@@ -26,7 +36,7 @@ ON_A_TURTLEBOT = [
 LIMIT_S = 20.0
 
 
-def send_goal(session, server, places):
+def send_goal(session: Session, server: ActionClient, places: int):
     """Send a goal to another process. Return its handle, or None if no answer comes.
 
     A server that has not discovered the client yet cannot answer: rmw_fastrtps waits for it as long
@@ -42,16 +52,18 @@ def send_goal(session, server, places):
 
 
 def launched(
-    workspace,
-    arguments,
-    floor,
-    places,
-    seconds,
-    seed=0,
-    driver=KIND,
-    file='patrol.launch.xml',
-):
+    workspace: Workspace,
+    arguments: str,
+    floor: Floor,
+    places: int,
+    seconds: float,
+    seed: int = 0,
+    driver: Driver = KIND,
+    file: str = 'patrol.launch.xml',
+) -> tuple[Robot, str]:
     """Launch the program beside a robot in simulated time, one scan and one command at a time.
+
+    It gets a goal of so many places, and so many seconds of simulated time.
 
     Return the robot, and how the job ended or why it did not begin.
     """
@@ -89,7 +101,7 @@ def launched(
     return robot, STATUS[ended.result().status] if ended.done() else 'not ended'
 
 
-def _begun(workspace, program, server, robot):
+def _begun(workspace: Workspace, program: Process, server: ActionClient, robot: Robot) -> str:
     """Wait until the launched node is there. Return why it is not, or nothing."""
 
     def is_ready():
@@ -122,7 +134,7 @@ def _begun(workspace, program, server, robot):
     return ''
 
 
-def printed(workspace, lines):
+def printed(workspace: Workspace, lines: Sequence[str]) -> str:
     """Return what a launched program printed of its first error, or its last line."""
     text = without_folders('\n'.join(lines), workspace.path)
     last = ['nothing', *(line for line in text.splitlines() if line.strip())][-1]
@@ -133,7 +145,7 @@ def printed(workspace, lines):
 
 
 class Ended(NamedTuple):
-    """What a robot did after an end: whether it stands, and how far and how long it went on."""
+    """What a robot did after an end: whether it stands, and how far (m) and long (s) it went on."""
 
     robot: Robot
     stands: bool
@@ -141,7 +153,7 @@ class Ended(NamedTuple):
     seconds: float
 
 
-def ended_by(workspace, end):
+def ended_by(workspace: Workspace, end: str) -> Ended:
     """Drive a TurtleBot 3 with patrol and guard, end something, and return what the robot did.
 
     `end` is one of `ENDS`. Without a guard it is watched for two seconds. Raises RuntimeError if
@@ -179,7 +191,7 @@ def ended_by(workspace, end):
     return Ended(robot, stands, sum(step.v for step in moves) / RATE_HZ, len(moves) / RATE_HZ)
 
 
-def driven_live(workspace, file):
+def driven_live(workspace: Workspace, file: str) -> Robot:
     """Build, and drive a robot on the student's floor with the launched program, in real time.
 
     `file` is the floor, in the package; its route has the same name. Return the robot. Raises

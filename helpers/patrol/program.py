@@ -1,16 +1,22 @@
 """The program: its folder, its modules as they are now, its action, its route."""
 
+from __future__ import annotations
+
 import importlib
 import sys
+from pathlib import Path
+from types import ModuleType
 
 import yaml
 from rclpy.parameter import Parameter
+
+from helpers.workspace import Workspace
 
 PACKAGE = 'src/patrol_pkg'
 SIM = [Parameter('use_sim_time', value=True)]
 
 
-def module(workspace, name):
+def module(workspace: Workspace, name: str) -> ModuleType:
     """Import a module of the package as it is in src now."""
     sys.dont_write_bytecode = True  # two versions of a file within a second would share one
     folder = str(workspace.file(PACKAGE))
@@ -21,14 +27,14 @@ def module(workspace, name):
     return importlib.import_module(f'patrol_pkg.{name}')
 
 
-def action():
-    """Return the student's own action."""
+def action() -> type:
+    """Return the learner's own action, which the lesson has built."""
     from patrol_interfaces.action import Patrol
 
     return Patrol
 
 
-def route_of(path):
+def route_of(path: Path) -> list[tuple[float, float]]:
     """Return the places of a parameter file: x, y (m, from the start)."""
     parameters = yaml.safe_load(path.read_text(encoding='utf-8'))
     (node,) = parameters.values()
