@@ -4,7 +4,7 @@ import pytest
 
 from helpers.checks.builds import build
 from helpers.checks.errors import Failed
-from helpers.workspace import Workspace, compile_error, first_error
+from helpers.workspace import Workspace, compile_error, error_of_build
 from helpers.workspace.build_output import lines_that_matter
 
 COMPILER = """\
@@ -117,7 +117,7 @@ def test_the_first_error_is_said_with_its_line(output, sentence):
 
 
 def test_the_reason_of_cmake_is_kept_without_its_advice():
-    error = first_error(lines_that_matter(CMAKE))
+    error = error_of_build(lines_that_matter(CMAKE))
     assert 'Could not find a package configuration file provided by "maps"' in error
     assert error.endswith('maps-config.cmake. Line 6 of CMakeLists.txt: find_package(...)')
 

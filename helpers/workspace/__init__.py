@@ -19,10 +19,11 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
 
 from helpers.workspace.build_output import BuildResult, lines_that_matter, without_folders
 from helpers.workspace.first_error import (
+    TRACEBACK,
     compile_error,
     error_in,
+    error_of_build,
     error_of_launch,
-    first_error,
     started,
     why_it_failed,
 )
@@ -42,13 +43,14 @@ __all__ = [
     'wait_until',
     'why_it_failed',
     'started',
-    'first_error',
+    'error_of_build',
     'error_of_launch',
     'error_in',
     'compile_error',
     'BEGIN_EMPTY',
     'DIED',
     'SMALL_RCLCPP',
+    'TRACEBACK',
     'BuildResult',
     'Process',
     'Workspace',

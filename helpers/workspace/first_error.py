@@ -30,16 +30,16 @@ def why_it_failed(result: BuildResult) -> str:
     unknown = re.findall(r"ignoring unknown package '(.+?)'", said)  # which ends no build
     if unknown and not result.failed:
         return f'there is no package {unknown[0]} in src: has it a package.xml?'
-    error = first_error(result.errors)
+    error = error_of_build(result.errors)
     return f'{result.failed}: {error}' if result.failed else error
 
 
 def compile_error(output: str) -> str:
     """Return the first error in what a compiler has printed."""
-    return first_error(lines_that_matter(output))
+    return error_of_build(lines_that_matter(output))
 
 
-def first_error(lines: Sequence[str]) -> str:
+def error_of_build(lines: Sequence[str]) -> str:
     """Return the first error in the lines that matter of a build, with its file and line."""
     if not lines:
         return 'it failed, and printed no reason'

@@ -13,10 +13,10 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from helpers.checks.bench import RELIABLE, Bench
-from helpers.checks.programs import TRACEBACK, error_in, wait_until
 from helpers.checks.tasks import Tasks, once
 from helpers.robot import EMPTY, Robot
 from helpers.ros import ros_session
+from helpers.workspace import TRACEBACK, error_in, wait_until
 
 tasks = Tasks()
 check = tasks.check
