@@ -1,37 +1,22 @@
 """What the tasks of the lesson "Build a robot program" are judged by.
 
-driving    a node that drives, a program that ends, a wall
-steering   the functions of logic.py
-parts      the parts of the node: where it is, its action, job, battery, watchdog
-whole      the whole node, and where it comes
+driving    a node that drives and stops, where it is, and which way is free
+parts      its action, job, battery and watchdog
+whole      the whole node, and its route
 starting   what is installed, and what starts it
 testing    the student's tests, which test right programs and wrong ones
 turtlebot  a TurtleBot 3
+own_floor  a floor of the student's own
 shared     what several of these look at
 """
 
-from helpers.checks.lessons.build_a_robot_program import (
-    driving,
-    parts,
-    starting,
-    steering,
-    testing,
-    turtlebot,
-    whole,
-)
+from importlib import import_module
+
 from helpers.checks.lessons.build_a_robot_program.shared import tasks
 
-# Each of the modules adds its tasks.
-__all__ = [
-    'check',
-    'driving',
-    'parts',
-    'starting',
-    'steering',
-    'tasks',
-    'testing',
-    'turtlebot',
-    'whole',
-]
+__all__ = ['check', 'tasks']
 
+# Each adds its tasks, in the order of the lesson.
+for module in ('driving', 'parts', 'whole', 'starting', 'testing', 'turtlebot', 'own_floor'):
+    import_module(f'{__name__}.{module}')
 check = tasks.check

@@ -1,9 +1,8 @@
-"""Of the project: the parts of the node."""
+"""Of the project: the action, the job, the battery, the watchdog."""
 
 import math
 import re
 
-from nav_msgs.msg import Odometry
 from rclpy.action import ActionClient
 from rclpy.clock import ClockType
 from rclpy.node import Node
@@ -14,74 +13,9 @@ from helpers.checks.bench import Bench, must_define
 from helpers.checks.builds import builds
 from helpers.checks.lessons.build_a_robot_program.shared import tasks
 from helpers.checks.tasks import once
-from helpers.patrol import CIRCLE, SIM, SNAKE, Ear, action, estimated, module
+from helpers.patrol import SIM, Ear, action, module
 from helpers.robot import EMPTY, Robot
 from helpers.ros import STATUS, ros_session, spun
-
-
-@tasks.add(5, cpu_s=20)
-def where_am_i(workspace):
-    def knows(commands):
-        def test():
-            where, place, yaw = estimated(module(workspace, 'where').Where, commands)
-            error = math.dist((where.x, where.y), place)
-            if abs(math.remainder(where.yaw - yaw, math.tau)) > 0.1:
-                return 'its yaw is wrong'
-            return error < 0.15 or f'at the end it is {error:.1f} m away'
-
-        return test
-
-    def driven(scale, period_s=0.1):
-        """Drive straight on. Return the true way, and x. The wheels report at another rate, too."""
-        with ros_session():
-            robot = Robot(EMPTY, sim_time=True, noise=False)
-            options = [*SIM, Parameter('wheel_scale', value=scale)]
-            node = Node('tested', parameter_overrides=options, cli_args=THINNED)
-            where = module(workspace, 'where').Where(node)
-            executor = spun(node, Thinner(period_s))
-            robot.run(0.2, executor)
-            for _ in range(20):
-                robot.command(0.5)
-                robot.run(0.1, executor)
-        return robot.pose.x - EMPTY.start.x, where.x
-
-    def scale_is_used():
-        way, x = driven(2.0)
-        text = f'with wheel_scale = 2 it drove {way:.1f} m, and x is {x:.1f} m'
-        return abs(x - way / 2) < 0.05 or text
-
-    def stamps_are_used():
-        way, x = driven(1.0, period_s=0.2)
-        text = f'with odom every 0.2 s it drove {way:.1f} m, and x is {x:.1f} m'
-        return abs(x - way) < 0.15 or text
-
-    stamps = 'The seconds between two stamps, not a fixed time.'
-    return [
-        ('a circle', knows(CIRCLE[:150]), 'x grows by way * cos(yaw), y by way * sin(yaw).'),
-        ('a line like a snake', knows(SNAKE), stamps),
-        ('odom comes less often', stamps_are_used, stamps),
-        ('the parameter wheel_scale', scale_is_used, 'node.declare_parameter(...).value'),
-    ]
-
-
-THINNED = ['--ros-args', '-r', 'odom:=thin_odom']
-
-
-class Thinner(Node):
-    """Passes odometry on, at most once in a period."""
-
-    def __init__(self, period_s):
-        super().__init__('thinner')
-        self.period_s, self.last_s = period_s, -math.inf
-        self.publisher = self.create_publisher(Odometry, 'thin_odom', 10)
-        self.create_subscription(Odometry, 'odom', self.on_odom, 10)
-
-    def on_odom(self, odom):
-        """Pass a message on if the last one is old enough."""
-        now_s = odom.header.stamp.sec + odom.header.stamp.nanosec / 1e9
-        if now_s > self.last_s + self.period_s - 0.01:
-            self.last_s = now_s
-            self.publisher.publish(odom)
 
 
 @tasks.add(8, limit_s=90, cpu_s=60)

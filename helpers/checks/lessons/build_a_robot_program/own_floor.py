@@ -1,0 +1,64 @@
+"""Of the project: a floor of the student's own."""
+
+from helpers.checks.lessons.build_a_robot_program.shared import comes_to_each_place, tasks
+from helpers.checks.tasks import once
+from helpers.patrol import PACKAGE, Tour, round_tour, route_of
+from helpers.robot import Floor
+from helpers.ros import ros_session
+
+
+@tasks.add(20, limit_s=120, cpu_s=60)
+def a_floor_of_your_own(workspace, file):
+    path = workspace.file(f'{PACKAGE}/{file}')
+
+    @once
+    def floor():
+        return Floor.from_text(path.read_text(encoding='utf-8'), name=path.stem)
+
+    toured = once(lambda: round_tour(workspace, floor(), path.stem))
+
+    def hits_nothing():
+        tour, _ = toured()
+        x, y, _ = tour.robot.pose
+        return not tour.robot.bumps or f'it hits something at {x:.1f}, {y:.1f}'
+
+    def comes_everywhere():
+        tour, _ = toured()
+        if not floor().places:
+            return 'the floor has no place with a letter'
+        return comes_to_each_place(tour.robot)
+
+    def interrupted(by):
+        def test():
+            route = route_of(path.with_suffix('.yaml'))
+            with ros_session():
+                numbers = [float(number) for place in route for number in place]
+                tour = Tour(workspace, floor=floor(), route=numbers)
+                tour.run(1)
+                if any(v or w for v, w in tour.speeds(0.2)):
+                    return 'without a goal it drives'
+                tour.send(len(route))
+                tour.run(1)
+                if by == 'a cancel':
+                    tour.handle.cancel_goal_async()
+                else:
+                    tour.robot.blind = True
+                tour.run(1.5)
+                end = tour.robot.record.poses[-1]
+                if end.v:
+                    return f'after {by} it drives on'
+                return end.w == 0 or f'after {by} it turns'
+
+        return test
+
+    hint = 'More places on the route, or a floor with more space.'
+    return [
+        ('it hits nothing', hits_nothing, hint),
+        ('it comes to each place with a letter', comes_everywhere, 'x and y from the start'),
+        ('it stands without a goal, and after a cancel', interrupted('a cancel'), 'job.place()'),
+        (
+            'it stands if the laser is blind',
+            interrupted('a blind laser'),
+            'steer(*beams(scan), ...)',
+        ),
+    ]
