@@ -320,6 +320,3 @@ def spin_it_yourself(spin_until):
         ('EventsExecutor, 5 messages', lambda: spins_until(EventsExecutor, 5), hint),
         ('it ends if all is done', stops_at_once, 'Call done: done(), not done.'),
     ]
-
-
-# --- What cells of the lesson show

@@ -487,6 +487,3 @@ def write_bag(path, rows, qos=()):
                     offered_qos_profiles=qos,
                 )
             writer.write(connections[topic], recorded_ns, serialize_message(message))
-
-
-# --- The picture of the lesson --------------------------------------------------------------------
