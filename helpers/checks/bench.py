@@ -290,7 +290,7 @@ def must_define(a_class: type, *methods: str) -> None:
 
 
 def let(written: type | Callable, **constants: object) -> None:
-    """Give constants that the student's code reads another value: `let(Driver, PERIOD_S=0.1)`.
+    """Give constants that the student's code reads another value: `override(Driver, PERIOD_S=0.1)`.
 
     They are those of the notebook in which the class or function was written. The process ends with
     the check, and with it what was changed.

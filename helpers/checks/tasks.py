@@ -132,7 +132,7 @@ class Tasks:
             classroom.tell_about(number, about)
 
 
-def once(function: Callable[[], object]) -> Callable[[], object]:
+def cached(function: Callable[[], object]) -> Callable[[], object]:
     """Return the function, but run at most once: later calls get its result, or its exception.
 
     For what several points of a task look at: a build, a drive.

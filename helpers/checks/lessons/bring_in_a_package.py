@@ -13,7 +13,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def clone_it(workspace, commands):
     def clone():
         """Run the commands with an empty src, unless it has a clone that was changed."""
@@ -41,7 +41,7 @@ def clone_it(workspace, commands):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def name_the_dependencies(workspace):
     of_ros = {'rclpy', 'geometry_msgs', 'sensor_msgs', 'ament_index_python', 'brake_tools'}
     keys = {'python3-numpy', 'python3-yaml'}
@@ -74,9 +74,9 @@ def name_the_dependencies(workspace):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def write_the_rules(workspace, rules):
-    resolved = once(lambda: resolve(workspace, rules, 'ubuntu:noble', 'opensuse:15.5', 'fedora:40'))
+    resolved = cached(lambda: resolve(workspace, rules, 'ubuntu:noble', 'opensuse:15.5', 'fedora:40'))
 
     def resolves(system, *wanted):
         lines = resolved()[system]
@@ -92,13 +92,13 @@ def write_the_rules(workspace, rules):
     ]
 
 
-@tasks.add(4, limit_s=90)
+@tasks.add(limit_s=90)
 def build_what_you_need(workspace, commands):
     def leaves_gazebo_out():
         workspace.terminal(f'rm -rf build install log\n{commands}')
         return not workspace.file('build/brake_gazebo').exists() or 'colcon tried to build it'
 
-    left_out = once(leaves_gazebo_out)
+    left_out = cached(leaves_gazebo_out)
 
     def is_built(module):
         # What else was built when a package failed, is chance.
@@ -115,9 +115,9 @@ def build_what_you_need(workspace, commands):
     ]
 
 
-@tasks.add(5, limit_s=90)
+@tasks.add(limit_s=90)
 def install_the_files(workspace):
-    built = once(lambda: builds(workspace, 'brake'))
+    built = cached(lambda: builds(workspace, 'brake'))
 
     def is_installed(file):
         if built() is not True:
@@ -134,7 +134,7 @@ def install_the_files(workspace):
     ]
 
 
-@tasks.add(6, limit_s=90)
+@tasks.add(limit_s=90)
 def slow_down(workspace, links, change):
     file = 'src/brake/brake/config/brake.yaml'
 
@@ -154,7 +154,7 @@ def slow_down(workspace, links, change):
             return 'config/brake.yaml is not installed'
         return installed() == ['speed:', '0.5'] or f'in src it is 0.5, in install {installed()[-1]}'
 
-    linked = once(links_are_made)
+    linked = cached(links_are_made)
 
     def change_counts(before):
         if linked() == 'brake is not built':
@@ -171,7 +171,7 @@ def slow_down(workspace, links, change):
     ]
 
 
-@tasks.add(7, limit_s=90)
+@tasks.add(limit_s=90)
 def make_an_overlay(workspace, commands):
     def make():
         printed = workspace.terminal(f'rm -rf overlay\n{commands}')
@@ -183,7 +183,7 @@ def make_an_overlay(workspace, commands):
             return True
         return f'its packages: {" ".join(packages.split()) or "none"}. {last_of(printed)}'.strip()
 
-    made = once(make)
+    made = cached(make)
 
     def is_hidden():
         count = workspace.terminal('colcon list --names-only 2>&1 | grep -c brake_tools')
@@ -207,9 +207,9 @@ def make_an_overlay(workspace, commands):
     ]
 
 
-@tasks.add(8, limit_s=90)
+@tasks.add(limit_s=90)
 def fix_the_function(workspace):
-    built = once(lambda: build_overlay(workspace))
+    built = cached(lambda: build_overlay(workspace))
 
     def returns(right, speed, *distances):
         if built() is not True:
@@ -241,7 +241,7 @@ for distance in {distances}: print(float(safe_speed(distance, {speed})))'
     ]
 
 
-@tasks.add(9)
+@tasks.add
 def create_a_package(workspace, commands):
     folder = 'overlay/src/speed_table'
 
@@ -251,7 +251,7 @@ def create_a_package(workspace, commands):
             return True
         return f'there is no folder {folder}. {last_of(printed)}'.strip()
 
-    created = once(create)
+    created = cached(create)
 
     def package():
         created()
@@ -282,7 +282,7 @@ def create_a_package(workspace, commands):
     ]
 
 
-@tasks.add(10, limit_s=90)
+@tasks.add(limit_s=90)
 def fill_it(workspace):
     def prints_speeds():
         built = build_overlay(workspace)
@@ -294,7 +294,7 @@ def fill_it(workspace):
             return error_in(lines)
         return lines == ['0.0', '0.4', '0.8'] or f'the last lines are: {" | ".join(lines[-3:])}'
 
-    printed = once(prints_speeds)
+    printed = cached(prints_speeds)
 
     def asks_safe_speed():
         """Run it with a `safe_speed` that returns what it is asked."""

@@ -60,7 +60,7 @@ def found(case, kind, command, line):
             return 'it is judged when the line shows the fault'
         return word in (case.fault.kind, *case.fault.also) or f'{kind}: no'
 
-    word, shown = words(kind).lower(), once(shows_the_fault)
+    word, shown = words(kind).lower(), cached(shows_the_fault)
     return [
         ('the command was run', was_run, 'Run it in a cell that begins with %%terminal.'),
         ('it has printed the line', was_printed, 'Copy the line from its output.'),
@@ -76,7 +76,7 @@ def mended(case):
     if missing:  # nothing to drive for
         return [(title, lambda: missing, '')]
 
-    @once
+    @cached
     def driven():
         return drive_apart(case, OTHER, trouble=case.fault.trouble, params=params(case))
 

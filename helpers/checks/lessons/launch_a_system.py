@@ -18,9 +18,9 @@ IMPORTED = 'geometry_msgs', 'rclpy', 'sensor_msgs', 'std_srvs'
 OWN_SPEEDS = '[one.driver]: I drive at 0.3 m/s', '[two.driver]: I drive at 0.6 m/s'
 
 
-@tasks.add(1, limit_s=60)
+@tasks.add(limit_s=60)
 def one_file(workspace, file):
-    text = once(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
+    text = cached(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
     hint = '<node pkg=... exec="driver">, in it <param name=... value=.../>, and then </node>.'
     return [
         ('the driver drives the robot at 0.4 m/s', lambda: says(text(), *ROBOT_AND_DRIVER), hint),
@@ -28,9 +28,9 @@ def one_file(workspace, file):
     ]
 
 
-@tasks.add(2, limit_s=60)
+@tasks.add(limit_s=60)
 def the_same_in_yaml(workspace, file):
-    text = once(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
+    text = cached(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
     hint = 'Below "param:" write "- name: speed", and below "name" write "value: 0.4".'
     return [
         ('the driver drives the robot at 0.4 m/s', lambda: says(text(), *ROBOT_AND_DRIVER), hint),
@@ -42,7 +42,7 @@ def the_same_in_yaml(workspace, file):
     ]
 
 
-@tasks.add(3, limit_s=60)
+@tasks.add(limit_s=60)
 def a_file_for_all_floors(workspace, file):
     def declares():
         said = workspace.terminal(f'ros2 launch -s {file}')
@@ -53,7 +53,7 @@ def a_file_for_all_floors(workspace, file):
             return said.splitlines()[-1]
         return f'the arguments with a default are {pairs or "none"}'
 
-    declared = once(declares)
+    declared = cached(declares)
 
     def starts_without():
         if declared() is not True:
@@ -86,7 +86,7 @@ def a_file_for_all_floors(workspace, file):
     ]
 
 
-@tasks.add(4, limit_s=60)
+@tasks.add(limit_s=60)
 def one_robot_with_a_name(workspace, file):
     def launch_two():
         """Launch it in another folder, with other parameters, as two robots."""
@@ -100,7 +100,7 @@ def one_robot_with_a_name(workspace, file):
         return run(workspace, '.tried/launch/two.launch.xml', *lines, programs=4)
 
     lines = ['floor corridor', *(f'[{name}.driver]: I drive at 0.25 m/s' for name in ('ada', 'bo'))]
-    text = once(launch_two)
+    text = cached(launch_two)
     hint = '<group>, push_ros_namespace with $(var name), and only then the two nodes; in the '
     hint += 'driver <param from="$(dirname)/../config/driver.yaml"/>.'
     both = ['driver', 'robot'] * 2
@@ -110,10 +110,10 @@ def one_robot_with_a_name(workspace, file):
     ]
 
 
-@tasks.add(5, limit_s=60)
+@tasks.add(limit_s=60)
 def two_robots(workspace, file):
     lines = [f'[{name}.driver]: I drive' for name in ('one', 'two')]
-    text = once(lambda: run(workspace, file, *lines, programs=4))
+    text = cached(lambda: run(workspace, file, *lines, programs=4))
     hint = '<include file="$(dirname)/...">, <arg name="name" value="one"/>, </include>; twice.'
     both = ['driver', 'robot'] * 2
     return [
@@ -122,7 +122,7 @@ def two_robots(workspace, file):
     ]
 
 
-@tasks.add(6, limit_s=60)
+@tasks.add(limit_s=60)
 def a_speed_for_each(workspace, file):
     def own_speeds():
         return says(run(workspace, file, *OWN_SPEEDS, programs=4), *OWN_SPEEDS)
@@ -131,7 +131,7 @@ def a_speed_for_each(workspace, file):
     return [('each robot has its speed', own_speeds, hint)]
 
 
-@tasks.add(7, limit_s=60)
+@tasks.add(limit_s=60)
 def start_it_again(workspace, file):
     def comes_back():
         log, text = guarded(workspace, f'{file} speed:=0.4', kill=True)
@@ -176,11 +176,11 @@ rclpy.spin(node)
 """
 
 
-@tasks.add(8, limit_s=120)
+@tasks.add(limit_s=120)
 def a_camera_that_waits(workspace):
     ros2_run = 'source install/setup.bash\nros2 run'
 
-    @once
+    @cached
     def seen():
         """Return how it waits and turns and, tried meanwhile, how it gives up."""
         workspace.write('.tried/silent.py', SILENT)
@@ -228,7 +228,7 @@ def a_camera_that_waits(workspace):
     ]
 
 
-@tasks.add(9, limit_s=90)
+@tasks.add(limit_s=90)
 def install_the_files(workspace):
     def build():
         workspace.terminal('rm -rf build install')
@@ -236,7 +236,7 @@ def install_the_files(workspace):
         workspace.write('src/fleet_pkg/launch/__pycache__/robot.launch.pyc', '')
         return builds(workspace, 'fleet_pkg')
 
-    built = once(build)
+    built = cached(build)
 
     def is_installed():
         if built() is not True:
@@ -267,7 +267,7 @@ def install_the_files(workspace):
     ]
 
 
-@tasks.add(10)
+@tasks.add
 def name_what_it_starts(workspace):
     def package():
         return manifest(workspace, 'src/fleet_pkg')

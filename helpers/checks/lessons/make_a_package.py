@@ -18,7 +18,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def create_a_package(workspace):
     def has_type():
         kind = manifest(workspace, 'src/hello_pkg').get_build_type()
@@ -34,10 +34,10 @@ def create_a_package(workspace):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def a_slow_listener(workspace, file):
     texts = ['Hello World: 7', 'Good morning']
-    run = once(lambda: run_main(workspace, file, texts))
+    run = cached(lambda: run_main(workspace, file, texts))
 
     def logs():
         lines, went_on = run()
@@ -72,7 +72,7 @@ def a_slow_listener(workspace, file):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def what_it_needs(workspace):
     def type_is_right():
         kind = manifest(workspace, 'src/hello_pkg').get_build_type()
@@ -93,9 +93,9 @@ def what_it_needs(workspace):
     ]
 
 
-@tasks.add(4, limit_s=90)
+@tasks.add(limit_s=90)
 def what_is_installed(workspace):
-    built = once(lambda: builds(workspace, 'hello_pkg'))
+    built = cached(lambda: builds(workspace, 'hello_pkg'))
 
     def executables():
         if built() is not True:
@@ -104,7 +104,7 @@ def what_is_installed(workspace):
         right = ['hello_pkg listener', 'hello_pkg talker']
         return names == right or f'it has {", ".join(names) or "none"}'
 
-    installed = once(executables)
+    installed = cached(executables)
 
     def they_talk():
         if installed() is not True:
@@ -136,7 +136,7 @@ def what_is_installed(workspace):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def a_second_terminal(workspace):
     def talker_has_published():
         talking = open_terminal(workspace, 'talker')
@@ -156,7 +156,7 @@ def a_second_terminal(workspace):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def callbacks_in_parallel(workspace, file):
     def meet(count):
         """Let each callback wait in its sleep until `count` of them are there."""
@@ -168,7 +168,7 @@ def callbacks_in_parallel(workspace, file):
             return f'{count} callbacks did not run at the same time'
         return error_in(lines)
 
-    two = once(lambda: meet(2))
+    two = cached(lambda: meet(2))
 
     def eight():
         return meet(8) if two() is True else 'not even two'
@@ -178,7 +178,7 @@ def callbacks_in_parallel(workspace, file):
     return [('two at a time', two, hint), ('eight at a time', eight, hint)]
 
 
-@tasks.add(7, limit_s=90)
+@tasks.add(limit_s=90)
 def build_source_run(workspace):
     def callbacks_overlap():
         listening = open_terminal(workspace, 'new_listener')
@@ -204,7 +204,7 @@ def build_source_run(workspace):
     return [('the new listener runs: its callbacks overlap', callbacks_overlap, hint)]
 
 
-@tasks.add(8)
+@tasks.add
 def other_arguments(workspace):
     def hears():
         open_terminal(workspace, 'other_talker')
@@ -251,13 +251,13 @@ def other_arguments(workspace):
     ]
 
 
-@tasks.add(9, limit_s=90)
+@tasks.add(limit_s=90)
 def fix_a_package(workspace):
     def build():
         write_forgetful(workspace)
         return builds(workspace, 'forgetful_pkg')
 
-    built = once(build)
+    built = cached(build)
 
     def counts():
         if built() is not True:

@@ -47,9 +47,9 @@ ARM = """<robot name="arm">
 <origin xyz="0 0 0" rpy="0 0 0"/></joint></robot>"""
 
 
-@tasks.add(1)
+@tasks.add
 def three_sensors(workspace, file):
-    description = once(lambda: described(workspace, file))
+    description = cached(lambda: described(workspace, file))
 
     def has_one_root():
         root = description().get_root()
@@ -108,9 +108,9 @@ def parsed(text):
         return URDF.from_xml_string(text.encode())
 
 
-@tasks.add(2)
+@tasks.add
 def a_message_for_each_joint(workspace, static_transforms):
-    arm = once(lambda: parsed(ARM))
+    arm = cached(lambda: parsed(ARM))
 
     def transforms_of(robot):
         return {transform.child_frame_id: transform for transform in static_transforms(robot)}
@@ -155,7 +155,7 @@ def a_message_for_each_joint(workspace, static_transforms):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def once_is_enough(workspace, StaticBroadcaster):
     def hears(robot, *frames):
         from tf2_msgs.msg import TFMessage  # the lesson has built it
@@ -192,7 +192,7 @@ def once_is_enough(workspace, StaticBroadcaster):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def from_a_frame_to_its_parent(to_parent):
     def leads(x, y, yaw):
         points = np.array([1.0, 2.0, 0.5]), np.array([0.0, -1.0, 2.0])
@@ -224,9 +224,9 @@ def from_a_frame_to_its_parent(to_parent):
     ]
 
 
-@tasks.add(5, limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
+@tasks.add(limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
 def fix_three_faults(workspace, settings, StaticBroadcaster):
-    drive = once(lambda: drive_by(workspace, StaticBroadcaster, settings, seconds=6))
+    drive = cached(lambda: drive_by(workspace, StaticBroadcaster, settings, seconds=6))
 
     def uses(name, sensor, *parts):
         if sensor not in drive().parts[name]:
@@ -324,7 +324,7 @@ def compare_types(file):
                 )
 
 
-@tasks.add(6)
+@tasks.add
 def between_two_transforms(between):
     def goes(old, new, part, right):
         found = between(transform_of(*old), transform_of(*new), part)
@@ -379,7 +379,7 @@ def stamped_at(t, x, y, yaw, child='base_footprint', parent='odom'):
     return stamped
 
 
-@tasks.add(7)
+@tasks.add
 def look_it_up(Buffer):
     KEPT = (0.5, 1.0, 0.0, 0.0), (0.75, 2.0, 0.0, 0.4), (1.25, 4.0, 1.0, 0.0)
 
@@ -442,7 +442,7 @@ def look_it_up(Buffer):
     ]
 
 
-@tasks.add(8)
+@tasks.add
 def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
     def scan_at(t, length=1.0):
         scan = LaserScan(angle_increment=0.1, range_min=0.1, range_max=8.0, ranges=[length])
@@ -541,9 +541,9 @@ def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
     ]
 
 
-@tasks.add(9, limit_s=150)
+@tasks.add(limit_s=150)
 def two_filters(workspace, file):
-    @once
+    @cached
     def seen():
         """Return who publishes and receives what, of which type of frame, when all runs."""
         build(workspace, 'small_robot')
@@ -671,7 +671,7 @@ def watch_launch(workspace, file):
     return launched
 
 
-@tasks.add(10)
+@tasks.add
 def say_what_you_know(Covariances):
     def relayed(speed):
         message = Odometry(child_frame_id='base_footprint')

@@ -19,7 +19,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def the_job(EagerPatroller):
     def patrol(places):
         moves = []
@@ -34,7 +34,7 @@ def the_job(EagerPatroller):
         raise_first(errors)
         return status, visited, len(moves), [list(feedback.sequence) for feedback in goal.feedback]
 
-    three, one = once(lambda: patrol(3)), once(lambda: patrol(1))
+    three, one = cached(lambda: patrol(3)), cached(lambda: patrol(1))
 
     def ends(run, places):
         status, visited, moves, _ = run()
@@ -66,9 +66,9 @@ def the_job(EagerPatroller):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def the_client(Operator):
-    three = once(lambda: operate(Operator, 3))
+    three = cached(lambda: operate(Operator, 3))
 
     def hears():
         server, operator = three()
@@ -101,7 +101,7 @@ def the_client(Operator):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def cancel_in_time(CancellingOperator):
     def cancels(places, at):
         """Return after which places a cancel had been sent, and how many the server got."""
@@ -142,7 +142,7 @@ def cancel_in_time(CancellingOperator):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def obey(ObedientPatroller):
     def patrol(places, cancelled_at=None, fails=False):
         """Cancel while the robot drives to a place. Return how the job ended, and its log."""
@@ -210,7 +210,7 @@ def obey(ObedientPatroller):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def answer_at_the_end(ChargingPatroller):
     def charge(patrols, how):
         """Ask to charge in each patrol. Return what is wrong with the answers, for each patrol."""
@@ -255,7 +255,7 @@ def answer_at_the_end(ChargingPatroller):
             return 'an answer while the robot was on patrol'
         return '' if answered else 'no answer'
 
-    twice = once(lambda: charge(2, 'succeeds'))
+    twice = cached(lambda: charge(2, 'succeeds'))
     hint = 'self.job_ended.wait() without a time-out; clear() first, set() in a finally.'
     return [
         ('it answers when a patrol has ended', lambda: twice()[0] or True, hint),
@@ -273,7 +273,7 @@ def answer_at_the_end(ChargingPatroller):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def a_group_of_its_own(options, ChargingPatroller):
     def is_heard(threads):
         there, gate = threading.Event(), threading.Event()
@@ -313,7 +313,7 @@ def a_group_of_its_own(options, ChargingPatroller):
     ]
 
 
-@tasks.add(7)
+@tasks.add
 def one_patrol_at_a_time(PolitePatroller):
     def answers_to_goals(how_the_first_ends):
         """Send goals before, during and after a patrol. Return by name which are accepted."""

@@ -76,10 +76,10 @@ ROWS = {
 }
 
 
-@tasks.add(1, limit_s=60)
+@tasks.add(limit_s=60)
 def test_the_function(workspace, tests):
     versions = {'our': '', 'another': SPEED, **WRONG_SPEEDS}
-    runs = once(lambda: run_tests(workspace, PACKAGE, tests, 'brake_pkg.speed', versions))
+    runs = cached(lambda: run_tests(workspace, PACKAGE, tests, 'brake_pkg.speed', versions))
     right = {'our': 'our function', 'another': 'another function'}
     return [
         ('it passes for two right functions', all_pass(runs, right), 'Is each row what it says?'),
@@ -114,9 +114,9 @@ def test_again_ends():
 """
 
 
-@tasks.add(2, limit_s=60)
+@tasks.add(limit_s=60)
 def a_domain_of_its_own(workspace):
-    @once
+    @cached
     def runs():
         versions = {'alone': BRAKE, 'again': BRAKE}
         return run_ours(workspace, 'alone.py', ALONE, 'brake_pkg.brake', versions)
@@ -150,9 +150,9 @@ class Brake(Quick):
 )
 
 
-@tasks.add(3, limit_s=60)
+@tasks.add(limit_s=60)
 def catch_it(workspace, tests):
-    busy = once(lambda: run_busy(workspace, tests))
+    busy = cached(lambda: run_busy(workspace, tests))
 
     def runs_nine_times():
         run = busy()
@@ -197,9 +197,9 @@ def test_waits(ticks, wanted, limit_s):
 """
 
 
-@tasks.add(4, limit_s=60)
+@tasks.add(limit_s=60)
 def wait_for_an_event(workspace):
-    @once
+    @cached
     def runs():
         versions = dict.fromkeys(('events', 'at_once', 'in_vain'), '')
         return run_ours(workspace, 'our_waits.py', WAITS, 'none', versions)
@@ -216,9 +216,9 @@ def wait_for_an_event(workspace):
     ]
 
 
-@tasks.add(5, limit_s=60)
+@tasks.add(limit_s=60)
 def fix_the_flaky_test(workspace, tests):
-    @once
+    @cached
     def runs():
         versions = {
             'busy': BUSY.replace('0.4', '2'),
@@ -255,7 +255,7 @@ def without_run(text):
 # --- Task 6: colcon
 
 
-@tasks.add(6, limit_s=90)
+@tasks.add(limit_s=90)
 def run_them(workspace):
     def is_run():
         build(workspace, 'brake_pkg', anew=True)
@@ -374,9 +374,9 @@ OUR_TESTS = {
 }
 
 
-@tasks.add(7, limit_s=60)
+@tasks.add(limit_s=60)
 def a_brake_with_a_lifecycle(workspace):
-    @once
+    @cached
     def runs():
         versions = {name: '' for name, _ in OUR_TESTS.values()}
         return run_ours(workspace, 'ours.py', OURS, 'brake_pkg.brake', versions)
@@ -396,7 +396,7 @@ def a_brake_with_a_lifecycle(workspace):
 # --- Task 8: a step that fails
 
 
-@tasks.add(8)
+@tasks.add
 def a_camera_that_fails(Camera):
     def ends(broken, steps, wanted_state, *calls):
         device = Device(*broken)
@@ -437,7 +437,7 @@ def a_camera_that_fails(Camera):
 # --- Task 9: the running node
 
 
-@tasks.add(9)
+@tasks.add
 def make_it_active(workspace):
     def is_active():
         state = workspace.terminal('ros2 lifecycle get /brake')
@@ -543,9 +543,9 @@ HINTS = {
 }
 
 
-@tasks.add(10, limit_s=90)
+@tasks.add(limit_s=90)
 def find_six_bugs(workspace, tests):
-    @once
+    @cached
     def runs():
         versions = {'right': RIGHT_NODE, 'other': OTHER_NODE}
         versions |= {bug: planted(RIGHT_NODE, old, new) for bug, (old, new) in BUGS.items()}

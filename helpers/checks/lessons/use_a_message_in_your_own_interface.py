@@ -20,7 +20,7 @@ GENERATORS, RUNTIME = 'rosidl_default_generators', 'rosidl_default_runtime'
 BOTH = '<depend>NAME</depend> counts for the build and for the run.'
 
 
-@tasks.add(1)
+@tasks.add
 def the_service_file(workspace, file):
     def has(part, right):
         service = parse_service_file('custom_interfaces', str(workspace.file(file)))
@@ -43,7 +43,7 @@ def the_service_file(workspace, file):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def what_it_depends_on(workspace):
     package = 'custom_interfaces'
 
@@ -65,13 +65,13 @@ def what_it_depends_on(workspace):
     ]
 
 
-@tasks.add(3, limit_s=90)
+@tasks.add(limit_s=90)
 def fix_the_build(workspace):
     hint = 'Unknown command: which package has it? KeyError: what was not told about the package?'
     return [('it builds', lambda: builds(workspace, 'custom_interfaces', anew=False), hint)]
 
 
-@tasks.add(4)
+@tasks.add
 def the_server(CameraServer):
     def turns(degrees):
         with Bench() as bench:
@@ -90,7 +90,7 @@ def the_server(CameraServer):
     ]
 
 
-@tasks.add(5, limit_s=45)  # a call that nobody answers waits for 30 s
+@tasks.add(limit_s=45)  # a call that nobody answers waits for 30 s
 def the_client(ask, pixels):
     def asks(degrees):
         with Bench() as bench:
@@ -101,7 +101,7 @@ def the_client(ask, pixels):
                 return f'it returns {type(image).__name__}, not an Image'
             return is_picture(image, robot, degrees)
 
-    first = once(lambda: asks(30.0))
+    first = cached(lambda: asks(30.0))
 
     def asks_again():
         first()  # what it raises is raised again, without another call
@@ -124,7 +124,7 @@ def the_client(ask, pixels):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def call_from_a_terminal(workspace, commands):
     def turns_60():
         with Bench() as bench:
@@ -140,7 +140,7 @@ def call_from_a_terminal(workspace, commands):
     return [('the camera turns by 60 degrees', turns_60, hint)]
 
 
-@tasks.add(7, limit_s=90)
+@tasks.add(limit_s=90)
 def a_message_of_two_packages(workspace):
     package = 'sighting_interfaces'
 

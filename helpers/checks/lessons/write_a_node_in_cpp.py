@@ -37,9 +37,9 @@ def install_anew(workspace, *packages):
     return build(workspace, *packages)
 
 
-@tasks.add(1, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def the_nearest_range(workspace):
-    built = once(lambda: install_anew(workspace, 'scan_tools'))
+    built = cached(lambda: install_anew(workspace, 'scan_tools'))
 
     def nearest_is(right, range_min, range_max, *ranges):
         built()
@@ -154,10 +154,10 @@ def code_of(workspace, file):
     return re.sub(comment, '', workspace.file(file).read_text())
 
 
-@tasks.add(2, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def its_cmakelists(workspace):
     packages = 'scan_tools', 'small_rclcpp', 'std_msgs'
-    built = once(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'watcher'))
+    built = cached(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'watcher'))
 
     def finds_the_packages():
         """Test the text: a package that another one has found is there, too."""
@@ -196,9 +196,9 @@ def brakes(workspace, *pairs, pause_s=0.0):
     return right or f'walls at {distances} m: {found} m/s, not {list(speeds)}'
 
 
-@tasks.add(3, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def a_node_of_your_own(workspace):
-    built = once(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake'))
+    built = cached(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake'))
 
     def drives(*pairs):
         return built() and brakes(workspace, *pairs)
@@ -258,9 +258,9 @@ def a_node_of_your_own(workspace):
     ]
 
 
-@tasks.add(4, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def another_robot(workspace, ARGUMENTS):
-    @once
+    @cached
     def started():
         """Start the brake. Return the topics that it uses, and what it prints."""
         if isinstance(ARGUMENTS, str):
@@ -382,16 +382,16 @@ TRY_SPIN_XML = """<package format="3"><name>try_spin</name><version>0.0.0</versi
 """
 
 
-@tasks.add(5, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def your_executor(workspace):
-    @once
+    @cached
     def built():
         code = code_of(workspace, 'src/brake/src/brake.cpp')
         if not re.search(r'\bmy_spin\s*\(', code):
             raise Failed(CALLS_MY_SPIN)
         return install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake')
 
-    @once
+    @cached
     def answers_each():
         return built() and brakes(workspace, (3, 0.5), (0.55, 0.2), (0.25, 0.0))
 

@@ -30,7 +30,7 @@ from helpers.robot import CORRIDOR, EMPTY, KIND, ROOMS, Floor, Pose, Robot
 from helpers.ros import ros_session, spun
 
 
-@tasks.add(1)
+@tasks.add
 def a_node_that_drives(workspace):
     def moves():
         robot = drive(CORRIDOR, module(workspace, 'patrol').Patrol, 3)
@@ -111,9 +111,9 @@ def how_it_ended(robot, drove, program, by_itself):
     return lines
 
 
-@tasks.add(2, limit_s=120, cpu_s=20)
+@tasks.add(limit_s=120, cpu_s=20)
 def a_program(workspace):
-    @once
+    @cached
     def run_all():
         """Run main() three times, each beside a base that keeps its last command, and end it."""
         workspace.write('.start.py', 'from patrol_pkg.main import main\nmain()\n')
@@ -195,7 +195,7 @@ def scene(seen):
     return ' and '.join(beams) or 'nothing in sight'
 
 
-@tasks.add(3)
+@tasks.add
 def reach_and_speed(workspace):
     def reaches(*cases):
         def test():
@@ -292,7 +292,7 @@ HALL = Floor.from_text(
 )
 
 
-@tasks.add(4)
+@tasks.add
 def stop_before_a_wall(workspace):
     def stops_at(floor, start, near_m):
         def test():
@@ -332,7 +332,7 @@ def stop_before_a_wall(workspace):
     ]
 
 
-@tasks.add(5, cpu_s=20)
+@tasks.add(cpu_s=20)
 def where_am_i(workspace):
     def knows(commands):
         def test():
@@ -397,7 +397,7 @@ class Thinner(Node):
             self.publisher.publish(odom)
 
 
-@tasks.add(6)
+@tasks.add
 def a_free_heading(workspace):
     def directions():
         function = module(workspace, 'logic').direction
@@ -434,7 +434,7 @@ def a_free_heading(workspace):
     ]
 
 
-@tasks.add(7, cpu_s=20)
+@tasks.add(cpu_s=20)
 def steer_to_a_place(workspace):
     def comes_to(floor, *places):
         def test():

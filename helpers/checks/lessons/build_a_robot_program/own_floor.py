@@ -7,15 +7,15 @@ from helpers.robot import Floor
 from helpers.ros import ros_session
 
 
-@tasks.add(20, limit_s=120, cpu_s=60)
+@tasks.add(limit_s=120, cpu_s=60)
 def a_floor_of_your_own(workspace, file):
     path = workspace.file(f'{PACKAGE}/{file}')
 
-    @once
+    @cached
     def floor():
         return Floor.from_text(path.read_text(encoding='utf-8'), name=path.stem)
 
-    toured = once(lambda: round_tour(workspace, floor(), path.stem))
+    toured = cached(lambda: round_tour(workspace, floor(), path.stem))
 
     def hits_nothing():
         tour, _ = toured()

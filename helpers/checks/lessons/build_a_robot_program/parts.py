@@ -18,11 +18,11 @@ from helpers.robot import EMPTY, Robot
 from helpers.ros import STATUS, ros_session, spun
 
 
-@tasks.add(8, limit_s=90, cpu_s=60)
+@tasks.add(limit_s=90, cpu_s=60)
 def an_action(workspace):
     show = 'source install/setup.bash\nros2 interface show patrol_interfaces/action/Patrol'
-    shown = once(lambda: workspace.terminal(show))
-    it_builds = once(lambda: builds(workspace, 'patrol_interfaces'))
+    shown = cached(lambda: workspace.terminal(show))
+    it_builds = cached(lambda: builds(workspace, 'patrol_interfaces'))
 
     def has(number, name, right):
         def test():
@@ -79,7 +79,7 @@ class Asked:
         return STATUS[answer.status], list(answer.result.visited)
 
 
-@tasks.add(9)
+@tasks.add
 def the_job(workspace):
     def told(story):
         """Return a test: each step of the story says what came, what is right, and of what."""
@@ -151,7 +151,7 @@ def the_job(workspace):
     ]
 
 
-@tasks.add(10)
+@tasks.add
 def the_battery(workspace):
     def battery_says(percentages, *options):
         """Send percentages. Return when it was low, and what was logged."""
@@ -204,7 +204,7 @@ def the_battery(workspace):
     ]
 
 
-@tasks.add(11)
+@tasks.add
 def the_watchdog(workspace):
     def made(node, stop):
         dog = module(workspace, 'watchdog').Watchdog(node, stop, 'scan')

@@ -11,9 +11,9 @@ from helpers.robot import ROOMS
 from helpers.workspace import DIED, started
 
 
-@tasks.add(14, limit_s=90)
+@tasks.add(limit_s=90)
 def install_it(workspace):
-    it_builds = once(lambda: builds(workspace, 'patrol_pkg'))
+    it_builds = cached(lambda: builds(workspace, 'patrol_pkg'))
 
     def after_build(test):
         return lambda: test() if it_builds() is True else 'not judged: it does not build'
@@ -71,7 +71,7 @@ def install_it(workspace):
     ]
 
 
-@tasks.add(15, limit_s=90, cpu_s=20)
+@tasks.add(limit_s=90, cpu_s=20)
 def one_file_starts_it(workspace):
     def drives_in_step():
         build(workspace, 'patrol_pkg')

@@ -155,7 +155,7 @@ WRONG_NODES = {
 
 def judged_tests(workspace, tests, name, right, wrong, hint):
     """Return the points of tests: they pass for right versions, and fail for each wrong one."""
-    runs = once(
+    runs = cached(
         lambda: run_tests(
             workspace,
             PACKAGE,
@@ -202,13 +202,13 @@ WHAT_TO_TEST = {
 }
 
 
-@tasks.add(16, limit_s=90)
+@tasks.add(limit_s=90)
 def test_the_logic(workspace, tests):
     return judged_tests(
         workspace, tests, 'logic', LOGIC, WRONG_LOGICS, 'Is each line what tasks 3 and 6 say?'
     )
 
 
-@tasks.add(17, limit_s=90)
+@tasks.add(limit_s=90)
 def test_the_node(workspace, tests):
     return judged_tests(workspace, tests, 'patrol', NODE, WRONG_NODES, 'What does task 12 say?')

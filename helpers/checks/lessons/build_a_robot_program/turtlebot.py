@@ -14,7 +14,7 @@ from helpers.robot import TURTLEBOT3, Floor
 from helpers.workspace import DIED, started
 
 
-@tasks.add(18)
+@tasks.add
 def the_guard(workspace):
     def guarded(story, *options):
         def test():
@@ -102,7 +102,7 @@ SMALL = Floor.from_text(
 )
 
 
-@tasks.add(19, limit_s=120, cpu_s=30)
+@tasks.add(limit_s=120, cpu_s=30)
 def a_turtlebot(workspace):
     def drives_on_a_new_floor():
         build(workspace, 'patrol_pkg')

@@ -17,7 +17,7 @@ from helpers.robot import ROOMS
 from helpers.ros import ros_session
 
 
-@tasks.add(12, cpu_s=20, limit_s=60)
+@tasks.add(cpu_s=20, limit_s=60)
 def the_whole_node(workspace):
     def toured(story, *options):
         def test():
@@ -161,9 +161,9 @@ def the_whole_node(workspace):
     ]
 
 
-@tasks.add(13, cpu_s=60, limit_s=90)
+@tasks.add(cpu_s=60, limit_s=90)
 def the_route(workspace):
-    tour = once(lambda: round_tour(workspace))
+    tour = cached(lambda: round_tour(workspace))
 
     def four_rooms():
         drive, places = tour()
