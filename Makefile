@@ -59,8 +59,8 @@ notebooks: set_up ## run the notebooks, save their outputs, and the tables and p
 lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04; REMOVE=yes takes it out
 	@$(PYTHON) -m tools.lessons.new "$(NAME)" $(if $(AFTER),--after "$(AFTER)") $(if $(filter yes,$(REMOVE)),--remove)
 
-task: set_up ## begin a task in a lesson: LESSON=02, AFTER=3
-	@$(PYTHON) -m tools.lessons.task "$(LESSON)" $(if $(AFTER),--after "$(AFTER)")
+task: set_up ## begin a task in a lesson: LESSON=02, AFTER=3, NAME=count_them
+	@$(PYTHON) -m tools.lessons.task "$(LESSON)" $(if $(AFTER),--after "$(AFTER)") $(if $(NAME),--name "$(NAME)")
 
 lint: set_up ## check style and format with ruff
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
@@ -75,7 +75,7 @@ test-packages: set_up ## build and test the packages that learners end with: LES
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/packages $(lesson) $(PYTEST_ARGS)
 
 test-answers: set_up ## let each check judge the answers in tests/answers: LESSON=02, TASK=3
-	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(if $(TASK),-k "$(shell printf task_%02d $(TASK))") $(PYTEST_ARGS)
+	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(if $(TASK),--task "$(TASK)") $(PYTEST_ARGS)
 
 test-browser: ## test JupyterLab and the site in Chromium
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site

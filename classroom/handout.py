@@ -27,9 +27,9 @@ from nbformat import NotebookNode
 from packaging.requirements import Requirement
 
 from classroom.update import BASE, committed
+from helpers.lesson import PICTURES, ROOT, chosen, tags
 from helpers.notebook import MARK
 from tools.lessons.clean import text_of
-from tools.lessons.lesson import PICTURES, ROOT, chosen, tags
 
 NAME = 'ros2_notebooks'
 ALL = 'yes'  # SOLUTIONS=: of all lessons

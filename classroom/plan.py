@@ -4,7 +4,7 @@ import itertools
 import re
 from typing import NamedTuple
 
-from tools.lessons.lesson import ROOT
+from helpers.lesson import ROOT
 from tools.lessons.tables import BLOCK, LINK, ROW
 
 HEADING = re.compile(r'^### (.+)$', re.MULTILINE)

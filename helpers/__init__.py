@@ -3,6 +3,7 @@
 A room is a folder, and its `__init__.py` is the door: others use what it names, and import nothing
 from behind it. A room imports only from the rooms that stand above it in this list:
 
+    lesson     what a lesson is: steps, tasks, guesses and notes, read from its notebook
     notebook   what a cell needs before ROS comes: interrupts, a bar, lines, letters, colours
     ros        a session in a kernel: its domain, its threads, its log, what waits for what
     machine    this machine: what it has, what is missing, and the tools of a build

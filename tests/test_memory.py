@@ -7,8 +7,8 @@ from itertools import pairwise
 import pytest
 
 from helpers.checks import memory, progress, remember
+from helpers.lesson import lessons
 from tools.lessons.code import recalled
-from tools.lessons.lesson import lessons
 from tools.lessons.new import template
 
 BANK = memory.questions()

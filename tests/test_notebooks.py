@@ -8,9 +8,9 @@ import pytest
 from support.answers import LEAST, answers_of, source_of
 
 from helpers.checks import progress
+from helpers.lesson import lessons, tags
 from tools.lessons import rules, tables
 from tools.lessons.first_pictures.__main__ import IMAGES, pictures
-from tools.lessons.lesson import lessons, tags
 
 LESSONS = lessons()
 ANSWERS = Path(__file__).parent / 'answers'

@@ -28,7 +28,7 @@ from classroom.tests.support.classes import (
     write_lesson,
 )
 from helpers.checks.classroom import BATCH
-from tools.lessons.lesson import lessons
+from helpers.lesson import lessons
 
 CLASS = [sys.executable, '-m', 'classroom.class_page']
 

@@ -17,8 +17,8 @@ from classroom.grade.answers import answers_of, cells_of, handed_out, lesson_of
 from classroom.grade.results import Kept, digest_of, job_of, result_of
 from classroom.grade.submissions import submissions_of, workspace_files
 from helpers.checks.verdict import KEY
-from tools.lessons.lesson import ROOT, tags
-from tools.lessons.lesson import lessons as lessons_of_course
+from helpers.lesson import ROOT, tags
+from helpers.lesson import lessons as lessons_of_course
 
 RIGHT, WRONG = 'speed = 1.75 / 3.5\nshow(speed)', 'speed = 1.75\nshow(speed)'
 STARTER = 'task-00-1-starter'

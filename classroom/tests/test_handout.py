@@ -14,7 +14,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from support.checkouts import git
 
 from classroom import handout, update
-from tools.lessons.lesson import PICTURES, ROOT
+from helpers.lesson import PICTURES, ROOT
 
 SOLVED = '%%solution 1\nsolved = 2'
 FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb', 'classroom/update.py'}

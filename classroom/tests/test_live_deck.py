@@ -9,7 +9,7 @@ from support.lab_server import ROOT
 from support.waits import wait_for
 
 from classroom.tests.support.deck_page import SLIDES_SHOWN
-from tools.lessons.lesson import lessons
+from helpers.lesson import lessons
 
 LESSON = '02_lose_messages.ipynb'
 START, NEXT = lessons()[:2]

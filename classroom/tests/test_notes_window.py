@@ -9,7 +9,7 @@ from support.waits import wait_for
 
 from classroom.deck.slides import slide_types
 from classroom.tests.support.deck_page import DeckPage
-from tools.lessons.lesson import first_heading, minutes_of_note, read, tags
+from helpers.lesson import first_heading, minutes_of_note, read, tags
 
 LESSON = '02_lose_messages.ipynb'
 KNOWN = read((ROOT / 'notebooks' / LESSON).read_text(), LESSON)

@@ -9,8 +9,8 @@ from nbformat.v4 import new_code_cell, new_notebook, new_output
 from classroom.deck.copies import Copies
 from classroom.plan import plan_of, plans
 from classroom.present import main
+from helpers.lesson import ROOT, lessons, minutes_of_note
 from tools import lab
-from tools.lessons.lesson import ROOT, lessons, minutes_of_note
 
 FILES = ('01_publish.ipynb', '02_lose.ipynb')
 

@@ -23,8 +23,8 @@ Another status than 200 comes with {"error": "one sentence"}, which the student 
 name of its `lesson`, a `kind`, and what belongs to it:
 
     guess, outcome   "question", "value": what was guessed, and what was measured
-    task             "task": 2, "solved": true
-    about            "about": "plain_twist", "task": 2: which one it was that is solved
+    task             "task": "be_the_queue", "solved": true
+    about            "about": "plain_twist", "task": "mend_ada": which one it was that is solved
     cell             "cell": the id of the cell that runs
     hand             "up": true
 """
@@ -170,12 +170,12 @@ def tell_outcome(question: str, value: object) -> None:
     _tell('outcome', question=question, value=value)
 
 
-def tell_task(task: int, solved: bool) -> None:
+def tell_task(task: str, solved: bool) -> None:
     """Tell the class that a task was tried."""
     _tell('task', task=task, solved=solved)
 
 
-def tell_about(task: int, about: str) -> None:
+def tell_about(task: str, about: str) -> None:
     """Tell the class about what a task was that is solved, if each student has another one."""
     _tell('about', about=about, task=task)
 

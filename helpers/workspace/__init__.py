@@ -10,8 +10,8 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
     processes     a process that prints lines, and ends
     tf2_msgs      the package of the message of /tf, which the wheels lack
     build_output  what a build says, and which of its lines matter
-    small_rclcpp  a package in C++: the part of rclcpp that lesson 15 needs, over rcl
-    colleague.sh  makes the repository of somebody else that lesson 10 brings in
+    small_rclcpp  a package in C++: the part of rclcpp that write_a_node_in_cpp needs, over rcl
+    colleague.sh  makes the repository of somebody else that bring_in_a_package gets
     sourcing      what `source install/setup.bash` gives, for a kernel that already runs
 """
 

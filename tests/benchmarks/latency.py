@@ -13,7 +13,7 @@ from statistics import median
 
 import nbformat.v4
 
-from tools.lessons.lesson import FOLDER
+from helpers.lesson import FOLDER
 from tools.lessons.run import execute
 
 RATES_HZ = (20, 200, 1000)

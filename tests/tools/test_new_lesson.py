@@ -11,8 +11,8 @@ import pytest
 import yaml
 from support.checkouts import copy_checkout, git
 
+from helpers.lesson import ROOT, lessons
 from tools.lessons import new, run, task
-from tools.lessons.lesson import ROOT, lessons
 
 KNOWN = lessons()[12]
 MIDDLE = 'find_your_keys'  # no test may name its file: it could not be taken out

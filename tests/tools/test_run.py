@@ -6,10 +6,10 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
 
+from helpers.lesson import called
 from tools.lessons import run
 from tools.lessons.clean import WIDGET, clean, text_of
 from tools.lessons.comparison import masked
-from tools.lessons.lesson import called
 from tools.lessons.new import template
 
 

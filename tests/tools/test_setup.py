@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from support.processes import put
 
+from helpers.lesson import ROOT
 from helpers.workspace.workspace import OWNED
-from tools.lessons.lesson import ROOT
 
 LOCKS = Path('tools/locks')
 BASE_PYTHON = Path(sys._base_executable)

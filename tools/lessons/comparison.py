@@ -17,7 +17,7 @@ from nbval.plugin import (
     metadata_tags,
 )
 
-from tools.lessons.lesson import ROOT, called
+from helpers.lesson import ROOT, called
 
 __all__ = ['IPyNbFile', 'NamedCell', 'RunningKernel', 'comment_markers', 'metadata_tags']
 

@@ -31,9 +31,9 @@ from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernel
 from nbformat import NotebookNode
 
 from helpers.checks.progress import FILE_VARIABLE
+from helpers.lesson import ROOT, START, Lesson, called, chosen
 from tools.lessons import tables
 from tools.lessons.clean import clean, text_of, write
-from tools.lessons.lesson import ROOT, START, Lesson, called, chosen
 from tools.lessons.rules import tasks_are_checked
 
 CELL_TIMEOUT_S = 100

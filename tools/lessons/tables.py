@@ -5,38 +5,71 @@ README.md and teaching.md and the notebook 00 hold tables between two marks:
     <!-- made by `make notebooks`: map of nodes -->
     <!-- end -->
 
-Each lesson ends with a link to the next lesson. The rows of a timetable are written by hand: what
-happens, and the minutes if it is no lesson. The times, and the minutes and titles of lessons, are
-made. The functions take and return texts by their path in the checkout, so that nothing is written
-before all of it is right.
+The numbers of today are written as well: in titles, in headings of tasks, and in each link to a
+lesson or a task. Each lesson ends with a link to the next lesson.
+
+The rows of a timetable are written by hand: what happens, and the minutes if it is no lesson. The
+times, and the minutes and titles of lessons, are made. The functions take and return texts by their
+path in the checkout, so that nothing is written before all of it is right.
 """
 
+import os
 import re
 from collections.abc import Callable
 from itertools import zip_longest
 from pathlib import Path
 
 from helpers.checks import progress
+from helpers.lesson import (
+    GLOSSARY,
+    PARTS,
+    ROOT,
+    START,
+    Lesson,
+    paths,
+    read,
+    with_mentions,
+    without_links,
+    write_next,
+    write_numbers,
+)
 from tools.lessons.clean import clean, text_of
-from tools.lessons.lesson import GLOSSARY, PARTS, ROOT, START, Lesson, paths, read
 
 Texts = dict[str, str]  # by the path in the checkout, such as notebooks/02_lose_messages.ipynb
-DOCUMENTS = ('README.md', 'teaching.md')
+HISTORY = 'CHANGELOG.md'  # has the numbers of its time
+NOT_OURS = {
+    '.git',
+    '.venv',
+    '.jupyter',
+    '.handed_out',
+    'node_modules',
+    'presentation',
+    'scratch',
+    'site',
+}
 COMMAND = f'make notebooks LESSON={START}'
 BLOCK = re.compile(r'(<!-- made by `make notebooks`: (.+?) -->\n\n)((?:\|.*\n)*)\n?<!-- end -->')
 ROW = re.compile(r'^\|[^|]*\| *(\d*) *\| (.+) \|$(?<!End \|)', re.MULTILINE)
 LINK = re.compile(r'\[([^]]*)\]\((\S+)\)(?:, steps? (\d+)(?: to (\d+))?)?$')
-NEXT = re.compile(r'\n*^Next: \[.*\]\(\S+\.ipynb\)$', re.MULTILINE)
 
 
 def texts_of(root: Path = ROOT) -> Texts:
-    """Return the texts of all notebooks, and of the documents that hold tables."""
-    files = [*paths(root / 'notebooks'), *(root / name for name in DOCUMENTS)]
+    """Return the texts of all notebooks, and of all documents."""
+    files = [*paths(root / 'notebooks'), *documents(root)]
     return {
         str(path.relative_to(root)): path.read_text(encoding='utf-8')
         for path in files
         if path.exists()
     }
+
+
+def documents(root: Path = ROOT) -> list[Path]:
+    """Return the documents of the course, in which lessons are mentioned."""
+    found = []
+    for folder, inside, files in os.walk(root):
+        inside[:] = [name for name in inside if name not in NOT_OURS]
+        found += [Path(folder, name) for name in files if name.endswith('.md') and name != HISTORY]
+    return sorted(found)
 
 
 def lessons_of(texts: Texts) -> list[Lesson]:
@@ -49,46 +82,32 @@ def updated(texts: Texts) -> Texts:
     Raises ValueError with one sentence if a notebook does not say what a table needs.
     """
     lessons = lessons_of(texts)
-    should = {name: _with_tables(texts[name], lessons) for name in DOCUMENTS if name in texts}
+    for lesson in lessons:
+        write_numbers(lesson)
+    should = {}
+    for path, text in texts.items():
+        if not path.endswith('.ipynb'):
+            should[path] = with_mentions(_with_tables(text, lessons), lessons)
     for lesson, following in zip(lessons, [*lessons[1:], None], strict=True):
-        for cell in lesson.notebook.cells:
-            if cell.cell_type == 'markdown':
-                cell.source = _with_tables(cell.source, lessons)
+        for cell in lesson.cells:
+            if cell.cell_type != 'code':
+                cell.source = with_mentions(_with_tables(cell.source, lessons), lessons, lesson)
         if lesson.number != GLOSSARY:
-            _link(lesson, following if following and following.number != GLOSSARY else None)
+            write_next(lesson, following if following and following.number != GLOSSARY else None)
         should[f'notebooks/{lesson.file}'] = text_of(clean(lesson.notebook))
     return {path: text for path, text in should.items() if text != texts[path]}
 
 
 def needs_run(lessons: list[Lesson]) -> bool:
     """Return whether the saved table of tasks in notebook 00 is not that of these lessons."""
-    table = progress.table(with_tasks(lessons))
+    table = progress.table([lesson for lesson in lessons if lesson.tasks])
     start = [lesson for lesson in lessons if lesson.number == START]
     return any(
         'progress.show()' in cell.source
         and table not in ''.join(output.get('text', '') for output in cell.outputs)
         for lesson in start
-        for cell in lesson.notebook.cells
-        if cell.cell_type == 'code'
+        for cell in lesson.code_cells()
     )
-
-
-def with_tasks(lessons: list[Lesson]) -> list[progress.Lesson]:
-    """Return the notebooks that have tasks, as `helpers.checks.progress` knows them."""
-    return [
-        progress.Lesson(lesson.number, lesson.name, lesson.title, len(lesson.tasks))
-        for lesson in lessons
-        if lesson.tasks
-    ]
-
-
-def _link(lesson: Lesson, following: Lesson | None) -> None:
-    """Let a notebook lead to the next one: where its link stands, or at its end."""
-    cells = [cell for cell in lesson.notebook.cells if cell.cell_type == 'markdown']
-    cell = next((cell for cell in cells if NEXT.search(cell.source)), cells[-1] if cells else None)
-    if cell:
-        rest = NEXT.sub('', cell.source)
-        cell.source = f'{rest}\n\nNext: {following.next_link}' if following else rest
 
 
 def _with_tables(text: str, lessons: list[Lesson]) -> str:
@@ -140,7 +159,9 @@ def _map(part: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
 
 
 def _leave_out(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
-    rows = [[lesson.number, lesson.leave_out] for lesson in lessons if lesson.leave_out]
+    rows = [
+        [lesson.number, without_links(lesson.leave_out)] for lesson in lessons if lesson.leave_out
+    ]
     return [['lesson', ''], *rows]
 
 

@@ -9,7 +9,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def hear_the_numbers(Listener):
     def keeps(*numbers):
         with Bench() as bench:

@@ -19,7 +19,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_
 from support.students import LESSON
 from support.waits import LIMIT_S, wait_for
 
-from tools.lessons.lesson import ROOT
+from helpers.lesson import ROOT
 
 NAME = 'lose_messages'
 QUESTION = 'How many are heard?'

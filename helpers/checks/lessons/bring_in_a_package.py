@@ -12,7 +12,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def clone_it(workspace, commands):
     def clone():
         """Run the commands with an empty src, unless it has a clone that was changed."""
@@ -40,7 +40,7 @@ def clone_it(workspace, commands):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def name_the_dependencies(workspace):
     of_ros = {'rclpy', 'geometry_msgs', 'sensor_msgs', 'ament_index_python', 'brake_tools'}
     keys = {'python3-numpy', 'python3-yaml'}
@@ -73,7 +73,7 @@ def name_the_dependencies(workspace):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def write_the_rules(workspace, rules):
     resolved = once(lambda: resolve(workspace, rules, 'ubuntu:noble', 'opensuse:15.5', 'fedora:40'))
 
@@ -91,7 +91,7 @@ def write_the_rules(workspace, rules):
     ]
 
 
-@tasks.add(4, limit_s=90)
+@tasks.add(limit_s=90)
 def build_what_you_need(workspace, commands):
     def leaves_gazebo_out():
         workspace.terminal(f'rm -rf build install log\n{commands}')
@@ -114,7 +114,7 @@ def build_what_you_need(workspace, commands):
     ]
 
 
-@tasks.add(5, limit_s=90)
+@tasks.add(limit_s=90)
 def install_the_files(workspace):
     built = once(lambda: builds(workspace, 'brake'))
 
@@ -133,7 +133,7 @@ def install_the_files(workspace):
     ]
 
 
-@tasks.add(6, limit_s=90)
+@tasks.add(limit_s=90)
 def slow_down(workspace, links, change):
     file = 'src/brake/brake/config/brake.yaml'
 
@@ -170,7 +170,7 @@ def slow_down(workspace, links, change):
     ]
 
 
-@tasks.add(7, limit_s=90)
+@tasks.add(limit_s=90)
 def make_an_overlay(workspace, commands):
     def make():
         printed = workspace.terminal(f'rm -rf overlay\n{commands}')
@@ -206,7 +206,7 @@ def make_an_overlay(workspace, commands):
     ]
 
 
-@tasks.add(8, limit_s=90)
+@tasks.add(limit_s=90)
 def fix_the_function(workspace):
     built = once(lambda: build_overlay(workspace))
 
@@ -240,7 +240,7 @@ for distance in {distances}: print(float(safe_speed(distance, {speed})))'
     ]
 
 
-@tasks.add(9)
+@tasks.add
 def create_a_package(workspace, commands):
     folder = 'overlay/src/speed_table'
 
@@ -281,7 +281,7 @@ def create_a_package(workspace, commands):
     ]
 
 
-@tasks.add(10, limit_s=90)
+@tasks.add(limit_s=90)
 def fill_it(workspace):
     def prints_speeds():
         built = build_overlay(workspace)
@@ -336,7 +336,7 @@ def rosdep(workspace, words, rules):
 
 
 def resolve(workspace, rules, *systems):
-    """Return what rosdep says of the two keys of task 3 on each system, as lines."""
+    """Return what rosdep says of the two keys of `write_the_rules` on each system, as lines."""
     resolve_keys = 'rosdep resolve python3-numpy python3-yaml'
     commands = '; echo -----; '.join(f'{resolve_keys} --os={system}' for system in systems)
     parts = _rosdep(workspace, rules, commands).split('-----\n')

@@ -94,7 +94,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def a_node_that_drives(workspace):
     def moves():
         robot = drive(CORRIDOR, module(workspace, 'patrol').Patrol, 3)
@@ -183,7 +183,7 @@ def how_it_ended(robot, drove, program, by_itself):
     return lines
 
 
-@tasks.add(2, limit_s=120, cpu_s=20)
+@tasks.add(limit_s=120, cpu_s=20)
 def a_program(workspace):
     @once
     def run_all():
@@ -267,7 +267,7 @@ def scene(seen):
     return ' and '.join(beams) or 'nothing in sight'
 
 
-@tasks.add(3)
+@tasks.add
 def reach_and_speed(workspace):
     def reaches(*cases):
         def test():
@@ -364,7 +364,7 @@ HALL = Floor.from_text(
 )
 
 
-@tasks.add(4)
+@tasks.add
 def stop_before_a_wall(workspace):
     def stops_at(floor, start, near_m):
         def test():
@@ -404,7 +404,7 @@ def stop_before_a_wall(workspace):
     ]
 
 
-@tasks.add(5, cpu_s=20)
+@tasks.add(cpu_s=20)
 def where_am_i(workspace):
     def knows(commands):
         def test():
@@ -469,7 +469,7 @@ class Thinner(Node):
             self.publisher.publish(odom)
 
 
-@tasks.add(6)
+@tasks.add
 def a_free_heading(workspace):
     def directions():
         function = module(workspace, 'logic').direction
@@ -506,7 +506,7 @@ def a_free_heading(workspace):
     ]
 
 
-@tasks.add(7, cpu_s=20)
+@tasks.add(cpu_s=20)
 def steer_to_a_place(workspace):
     def comes_to(floor, *places):
         def test():
@@ -557,7 +557,7 @@ def steer_to_a_place(workspace):
     ]
 
 
-@tasks.add(8, limit_s=90, cpu_s=60)
+@tasks.add(limit_s=90, cpu_s=60)
 def an_action(workspace):
     show = 'source install/setup.bash\nros2 interface show patrol_interfaces/action/Patrol'
     shown = once(lambda: workspace.terminal(show))
@@ -618,7 +618,7 @@ class Asked:
         return STATUS[answer.status], list(answer.result.visited)
 
 
-@tasks.add(9)
+@tasks.add
 def the_job(workspace):
     def told(story):
         """Return a test: each step of the story says what came, what is right, and of what."""
@@ -690,7 +690,7 @@ def the_job(workspace):
     ]
 
 
-@tasks.add(10)
+@tasks.add
 def the_battery(workspace):
     def battery_says(percentages, *options):
         """Send percentages. Return when it was low, and what was logged."""
@@ -743,7 +743,7 @@ def the_battery(workspace):
     ]
 
 
-@tasks.add(11)
+@tasks.add
 def the_watchdog(workspace):
     def made(node, stop):
         dog = module(workspace, 'watchdog').Watchdog(node, stop, 'scan')
@@ -818,7 +818,7 @@ def the_watchdog(workspace):
     ]
 
 
-@tasks.add(12, cpu_s=20, limit_s=60)
+@tasks.add(cpu_s=20, limit_s=60)
 def the_whole_node(workspace):
     def toured(story, *options):
         def test():
@@ -972,7 +972,7 @@ def comes_to_each_place(robot):
     return not missed or f'it does not come to {", ".join(missed)}'
 
 
-@tasks.add(13, cpu_s=60, limit_s=90)
+@tasks.add(cpu_s=60, limit_s=90)
 def the_route(workspace):
     tour = once(lambda: round_tour(workspace))
 
@@ -998,7 +998,7 @@ def the_route(workspace):
     ]
 
 
-@tasks.add(14, limit_s=90)
+@tasks.add(limit_s=90)
 def install_it(workspace):
     it_builds = once(lambda: builds(workspace, 'patrol_pkg'))
 
@@ -1058,7 +1058,7 @@ def install_it(workspace):
     ]
 
 
-@tasks.add(15, limit_s=90, cpu_s=20)
+@tasks.add(limit_s=90, cpu_s=20)
 def one_file_starts_it(workspace):
     def drives_in_step():
         build(workspace, 'patrol_pkg')
@@ -1330,14 +1330,14 @@ WHAT_TO_TEST = {
 }
 
 
-@tasks.add(16, limit_s=90)
+@tasks.add(limit_s=90)
 def test_the_logic(workspace, tests):
     return judged_tests(
         workspace, tests, 'logic', LOGIC, WRONG_LOGICS, 'Is each line what tasks 3 and 6 say?'
     )
 
 
-@tasks.add(17, limit_s=90)
+@tasks.add(limit_s=90)
 def test_the_node(workspace, tests):
     return judged_tests(workspace, tests, 'patrol', NODE, WRONG_NODES, 'What does task 12 say?')
 
@@ -1345,7 +1345,7 @@ def test_the_node(workspace, tests):
 # --- A TurtleBot 3
 
 
-@tasks.add(18)
+@tasks.add
 def the_guard(workspace):
     def guarded(story, *options):
         def test():
@@ -1433,7 +1433,7 @@ SMALL = Floor.from_text(
 )
 
 
-@tasks.add(19, limit_s=120, cpu_s=30)
+@tasks.add(limit_s=120, cpu_s=30)
 def a_turtlebot(workspace):
     def drives_on_a_new_floor():
         build(workspace, 'patrol_pkg')
@@ -1486,7 +1486,7 @@ def a_turtlebot(workspace):
     ]
 
 
-@tasks.add(20, limit_s=120, cpu_s=60)
+@tasks.add(limit_s=120, cpu_s=60)
 def a_floor_of_your_own(workspace, file):
     path = workspace.file(f'{PACKAGE}/{file}')
 

@@ -29,7 +29,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1, limit_s=15)
+@tasks.add(limit_s=15)
 def ask_from_a_cell(ask):
     def asks(sees):
         with Bench() as bench:
@@ -50,14 +50,14 @@ def ask_from_a_cell(ask):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def ask_from_a_terminal(camera):
     hint = '!ros2 service call /look, and after it what ros2 service type /look prints.'
     was_asked = camera.looks == 1 or f'the camera was asked {camera.looks} times'
     return [('the camera was asked once, from a terminal', lambda: was_asked, hint)]
 
 
-@tasks.add(3)
+@tasks.add
 def stop_for_a_wall(Brake):
     def is_called(sees, distance, right, takes_s=0.1):
         """Let the callback run in a thread that nobody needs, whatever its groups are."""
@@ -112,7 +112,7 @@ def stop_for_a_wall(Brake):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def free_thread_and_group(make_brake, make_executor):
     def stops_twice():
         """Show two scans: the second answer comes, too, if nothing is held for ever."""
@@ -134,14 +134,14 @@ def free_thread_and_group(make_brake, make_executor):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def await_the_answer(AwaitBrake):
     awaits = 'response = await self.client.call_async(Trigger.Request())'
     groups = 'The group of the callback is held while it awaits. So the client needs another one.'
     return with_one_thread(AwaitBrake, groups, awaits, awaits, awaits)
 
 
-@tasks.add(6)
+@tasks.add
 def be_told(DoneBrake):
     def in_one_group():
         group = MutuallyExclusiveCallbackGroup()
@@ -183,7 +183,7 @@ def with_one_thread(make_brake, *hints):
     ]
 
 
-@tasks.add(7)
+@tasks.add
 def the_rule(rule, stops):
     def explains(threads):
         measured = min(threads, 2)  # a third thread frees nothing that a second one does not
@@ -204,7 +204,7 @@ def the_rule(rule, stops):
     ]
 
 
-@tasks.add(8)
+@tasks.add
 def if_you_do_not_know_stop(SafeBrake):
     def stops_without_an_answer(camera_is_there):
         gate = threading.Event()
@@ -329,7 +329,7 @@ def if_you_do_not_know_stop(SafeBrake):
     ]
 
 
-@tasks.add(9)
+@tasks.add
 def three_callbacks_four_threads(Explorer):
     @once
     def during_scan_0():

@@ -28,7 +28,7 @@ check = tasks.check
 QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
 
 
-@tasks.add(1)
+@tasks.add
 def a_gate(GatedSubscriber):
     def holds(messages, depth, group, events):
         must_define(GatedSubscriber, '__init__')
@@ -74,7 +74,7 @@ def numbers(count):
     return [Int32(data=number) for number in range(count)]
 
 
-@tasks.add(2)
+@tasks.add
 def the_law(heard_after_burst):
     def law_holds(threads, group, in_flight, depth, more):
         answer = heard_after_burst(in_flight, depth, more)
@@ -115,7 +115,7 @@ def hear_burst(threads, group, in_flight, depth, more):
     return len(heard)
 
 
-@tasks.add(3)
+@tasks.add
 def deep_enough_for_a_burst(depth_for_burst):
     def deep_enough(messages, threads):
         depth = depth_for_burst(messages, threads)
@@ -140,7 +140,7 @@ def deep_enough_for_a_burst(depth_for_burst):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def publish_numbers(NumberPublisher):
     def numbers_come(messages, period_s):
         must_define(NumberPublisher, '__init__')
@@ -167,7 +167,7 @@ def publish_numbers(NumberPublisher):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def work_at_once(WorkingSubscriber, DEPTH):
     def works_at_once(threads, messages):
         must_define(WorkingSubscriber, '__init__')
@@ -201,7 +201,7 @@ def work_at_once(WorkingSubscriber, DEPTH):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def threads_for_a_camera(threads_needed):
     def keeps_up(rate_hz, callback_s, reserve):
         threads = threads_needed(rate_hz, callback_s, reserve)
@@ -230,7 +230,7 @@ def losses(rate_hz, callback_s, threads):
     return explain(model, 10, threads).lost
 
 
-@tasks.add(7)
+@tasks.add
 def waiting_or_computing(cpu_part):
     def part_of(work, most, beside=None):
         """Let the function measure `work`, and perhaps another thread compute `beside` it."""
@@ -283,7 +283,7 @@ def waiting_or_computing(cpu_part):
     ]
 
 
-@tasks.add(8)
+@tasks.add
 def spin_it_yourself(spin_until):
     def spins_until(make_executor, messages):
         heard, asked = [], []

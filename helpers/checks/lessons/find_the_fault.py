@@ -17,7 +17,7 @@ check = tasks.check
 
 CORE = {'ada': 'deaf_brake', 'bo': 'unread_limit', 'cleo': 'slow_look', 'dan': 'second_voice'}
 OTHERS = 'eve', 'finn', 'gus', 'hana', 'ivo', 'joy', 'kim', 'leo', 'mia', 'noa', 'oli', 'pia'
-LAST = 10  # the task that mends one of the others
+OTHER_ROBOT = 'the_next'  # the tasks about one of the others
 UP_S = 60.0
 NODES = '/brake', '/manager', '/robot', '/route'
 STOP_M = 0.9  # in the file of the drive that judges
@@ -40,7 +40,7 @@ def next_robot(workspace, seed):
     First those come that have not been mended yet, without those of the core. Then all of them,
     again and again. Until it is mended, a robot stays as it was left.
     """
-    known = progress.about(LAST)
+    known = progress.about(f'mend_{OTHER_ROBOT}')
     name = OTHERS[len(known) % len(OTHERS)]
     forget(workspace, {*OTHERS} - {name})  # a later one of this name may have the same fault
     return take(workspace, FAULTS[order_of(seed, known)[0]], name)
@@ -248,9 +248,9 @@ def fault_of(case, *answer):
     return case.fault.name
 
 
-for number in (1, 3, 5, 7, LAST - 1):
-    tasks.add(number, about=fault_of)(found)
-    tasks.add(number + 1, limit_s=120, cpu_s=60, about=fault_of)(mended)
+for one in (*CORE, OTHER_ROBOT):
+    tasks.add(found, name=f'find_{one}', about=fault_of)
+    tasks.add(mended, name=f'mend_{one}', limit_s=120, cpu_s=60, about=fault_of)
 
 
 def words(text):

@@ -20,11 +20,11 @@ from helpers.ros import seconds_of, stamp_of, yaw_of
 tasks = Tasks()
 check = tasks.check
 
-DATUM = (10.7769, 106.7009, 0.0)  # that of task 4
+DATUM = (10.7769, 106.7009, 0.0)  # that of `where_a_fix_is`
 TOPICS = {Odometry: 'odom', Imu: 'imu/data', NavSatFix: 'gps/fix'}
 
 
-@tasks.add(1)
+@tasks.add
 def from_a_yaw_to_a_quaternion(quaternion_of):
     def turns(yaw):
         turn = quaternion_of(yaw)
@@ -45,7 +45,7 @@ def from_a_yaw_to_a_quaternion(quaternion_of):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def fill_in_an_imu(imu_message):
     def sent(*values):
         """Return the message as a node hears it."""
@@ -104,7 +104,7 @@ def fill_in_an_imu(imu_message):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def what_an_imu_has_measured(from_imu):
     def takes(expected, **message):
         readings = from_imu(imu(**message))
@@ -148,7 +148,7 @@ def imu(yaw=0.5, vyaw=-0.2, ax=0.7, without=''):
     return message
 
 
-@tasks.add(4)
+@tasks.add
 def where_a_fix_is(from_fix):
     def is_at(east, north, variances=(0.25, 0.25)):
         readings = from_fix(fix(east, north, variances=variances))
@@ -197,7 +197,7 @@ def fix(east, north, status=NavSatStatus.STATUS_FIX, variances=(0.25, 0.25)):
     return message
 
 
-@tasks.add(5)
+@tasks.add
 def the_filter_node(FilterNode):
     def estimates_after(*messages):
         with Bench() as bench:
@@ -291,7 +291,7 @@ def again(message, count=8):
     return messages
 
 
-@tasks.add(6)
+@tasks.add
 def find_the_process_noise(best_noise):
     drive, other_drive = (
         once(lambda: simulate(1, seconds=20)),
@@ -321,7 +321,7 @@ def find_the_process_noise(best_noise):
     ]
 
 
-@tasks.add(7)
+@tasks.add
 def a_gate(is_taken):
     def judges(right, innovation, covariance, gate=3.0):
         found = is_taken(np.array(innovation), np.array(covariance), gate)

@@ -26,7 +26,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def say_none_if_you_do_not_know(distance_ahead):
     def says(right, *beams, others=9.0, behind=False, limits=(0.12, 8.0)):
         """Ask for a scan with these ranges straight ahead, and with `others` elsewhere."""
@@ -125,7 +125,7 @@ def is_near(found, right):
     return isinstance(found, int | float) and abs(found - right) < 1e-3
 
 
-@tasks.add(2)
+@tasks.add
 def brake_before_the_wall(Brake):
     def brakes(distances, right, speed):
         scans = [(metres, 0) for metres in distances]
@@ -187,7 +187,7 @@ def number_of(scan):
     return round(scan.ranges[90])
 
 
-@tasks.add(3)
+@tasks.add
 def how_old_is_a_scan(AgeBrake):
     def notes(*ages_s):
         brakes, noted_before_look = [], []
@@ -241,7 +241,7 @@ def shortly(age_s):
     return f'{age_s:.0f}' if abs(age_s) < 1e6 else 'more than a million'
 
 
-@tasks.add(4)
+@tasks.add
 def how_late_is_too_late(allowed_s):
     def computes(speed, limit, right):
         found = allowed_s(speed, limit)
@@ -258,7 +258,7 @@ def how_late_is_too_late(allowed_s):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def stop_if_you_do_not_know(CarefulBrake):
     def is_careful(most_s, scans, right):
         must_define(CarefulBrake, '__init__')
@@ -299,7 +299,7 @@ def stop_if_you_do_not_know(CarefulBrake):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def the_red_button(StopBrake):
     def after(*topics):
         """Send scans and stops, and return the speeds that it commands."""
@@ -334,7 +334,7 @@ def the_red_button(StopBrake):
     ]
 
 
-@tasks.add(7)
+@tasks.add
 def a_place_for_one(Newest):
     def takes(right, *rounds):
         """Put some, take one, and so on, in a thread that may wait for ever."""
@@ -376,7 +376,7 @@ def a_place_for_one(Newest):
     ]
 
 
-@tasks.add(8)
+@tasks.add
 def a_worker(NewestBrake):
     stopped_while_looking = once(lambda: stop_while_looking(make))
     ended = threading.Thread(target=int)
@@ -465,7 +465,7 @@ def stop_while_looking(make_brake):
     return stopped, looked_at
 
 
-@tasks.add(9)
+@tasks.add
 def a_watchdog(LaserWatchdog):
     long_s, middle_s, short_s = 1.3, 0.9, 0.3
 
@@ -608,7 +608,7 @@ def hear_stops(bench):
     return stops
 
 
-@tasks.add(10)
+@tasks.add
 def listen_for_two_events(listen):
     @once
     def events():
@@ -655,7 +655,7 @@ def listen_for_two_events(listen):
     ]
 
 
-@tasks.add(11)
+@tasks.add
 def choose_the_qos(laser_qos, map_qos):
     @once
     def hear_laser():

@@ -25,7 +25,7 @@ IMPORTED = 'geometry_msgs', 'rclpy', 'sensor_msgs', 'std_srvs'
 OWN_SPEEDS = '[one.driver]: I drive at 0.3 m/s', '[two.driver]: I drive at 0.6 m/s'
 
 
-@tasks.add(1, limit_s=60)
+@tasks.add(limit_s=60)
 def one_file(workspace, file):
     text = once(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
     hint = '<node pkg=... exec="driver">, in it <param name=... value=.../>, and then </node>.'
@@ -35,7 +35,7 @@ def one_file(workspace, file):
     ]
 
 
-@tasks.add(2, limit_s=60)
+@tasks.add(limit_s=60)
 def the_same_in_yaml(workspace, file):
     text = once(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
     hint = 'Below "param:" write "- name: speed", and below "name" write "value: 0.4".'
@@ -49,7 +49,7 @@ def the_same_in_yaml(workspace, file):
     ]
 
 
-@tasks.add(3, limit_s=60)
+@tasks.add(limit_s=60)
 def a_file_for_all_floors(workspace, file):
     def declares():
         said = workspace.terminal(f'ros2 launch -s {file}')
@@ -93,7 +93,7 @@ def a_file_for_all_floors(workspace, file):
     ]
 
 
-@tasks.add(4, limit_s=60)
+@tasks.add(limit_s=60)
 def one_robot_with_a_name(workspace, file):
     def launch_two():
         """Launch it in another folder, with other parameters, as two robots."""
@@ -117,7 +117,7 @@ def one_robot_with_a_name(workspace, file):
     ]
 
 
-@tasks.add(5, limit_s=60)
+@tasks.add(limit_s=60)
 def two_robots(workspace, file):
     lines = [f'[{name}.driver]: I drive' for name in ('one', 'two')]
     text = once(lambda: run(workspace, file, *lines, programs=4))
@@ -129,7 +129,7 @@ def two_robots(workspace, file):
     ]
 
 
-@tasks.add(6, limit_s=60)
+@tasks.add(limit_s=60)
 def a_speed_for_each(workspace, file):
     def own_speeds():
         return says(run(workspace, file, *OWN_SPEEDS, programs=4), *OWN_SPEEDS)
@@ -138,7 +138,7 @@ def a_speed_for_each(workspace, file):
     return [('each robot has its speed', own_speeds, hint)]
 
 
-@tasks.add(7, limit_s=60)
+@tasks.add(limit_s=60)
 def start_it_again(workspace, file):
     def comes_back():
         log, text = guarded(workspace, f'{file} speed:=0.4', kill=True)
@@ -183,7 +183,7 @@ rclpy.spin(node)
 """
 
 
-@tasks.add(8, limit_s=120)
+@tasks.add(limit_s=120)
 def a_camera_that_waits(workspace):
     ros2_run = 'source install/setup.bash\nros2 run'
 
@@ -235,7 +235,7 @@ def a_camera_that_waits(workspace):
     ]
 
 
-@tasks.add(9, limit_s=90)
+@tasks.add(limit_s=90)
 def install_the_files(workspace):
     def build():
         workspace.terminal('rm -rf build install')
@@ -274,7 +274,7 @@ def install_the_files(workspace):
     ]
 
 
-@tasks.add(10)
+@tasks.add
 def name_what_it_starts(workspace):
     def package():
         return manifest(workspace, 'src/fleet_pkg')

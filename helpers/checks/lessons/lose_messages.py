@@ -23,7 +23,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def publish_numbers(MinimalPublisher, PERIOD_S):
     def publishes(messages):
         with Bench() as bench:
@@ -58,7 +58,7 @@ def publish_numbers(MinimalPublisher, PERIOD_S):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def a_slow_subscriber(SlowSubscriber):
     def hear_once(text, callback_s=0.0):
         """Return what the node logs of one message, and how long its callback takes."""
@@ -119,7 +119,7 @@ def a_slow_subscriber(SlowSubscriber):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def two_executors(spin_apart):
     def none_waits_for_another(count):
         ticked = [threading.Event() for _ in range(count)]
@@ -146,7 +146,7 @@ def two_executors(spin_apart):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def be_the_queue(MyQueue):
     plan = [(5, 2), (4, 3)]  # five come, two are taken; four come, three are taken
 
@@ -192,7 +192,7 @@ def real_queue(depth, plan):
     return heard
 
 
-@tasks.add(5)
+@tasks.add
 def deep_enough(smallest_depth):
     def is_smallest(*run):
         depth = smallest_depth(*run)
@@ -217,7 +217,7 @@ def losses(period_s, callback_s, depth, messages):
     return explain(run, depth, threads=1).lost
 
 
-@tasks.add(6)
+@tasks.add
 def count_the_losses(LossCounter):
     def finds(numbers, missing):
         let(LossCounter, CALLBACK_S=0.02)
@@ -272,7 +272,7 @@ WAITS_AT_MOST_S = 12.0
 ENDS_S = 5.0  # after Ctrl+C
 
 
-@tasks.add(7)
+@tasks.add
 def a_program_of_its_own(workspace, file):
     def start(bench, *arguments):
         return subprocess.Popen(

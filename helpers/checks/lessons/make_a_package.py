@@ -25,7 +25,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def create_a_package(workspace):
     def has_type():
         kind = manifest(workspace, 'src/hello_pkg').get_build_type()
@@ -41,7 +41,7 @@ def create_a_package(workspace):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def a_slow_listener(workspace, file):
     texts = ['Hello World: 7', 'Good morning']
     run = once(lambda: run_main(workspace, file, texts))
@@ -79,7 +79,7 @@ def a_slow_listener(workspace, file):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def what_it_needs(workspace):
     def type_is_right():
         kind = manifest(workspace, 'src/hello_pkg').get_build_type()
@@ -100,7 +100,7 @@ def what_it_needs(workspace):
     ]
 
 
-@tasks.add(4, limit_s=90)
+@tasks.add(limit_s=90)
 def what_is_installed(workspace):
     built = once(lambda: builds(workspace, 'hello_pkg'))
 
@@ -143,7 +143,7 @@ def what_is_installed(workspace):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def a_second_terminal(workspace):
     def talker_has_published():
         talking = open_terminal(workspace, 'talker')
@@ -163,7 +163,7 @@ def a_second_terminal(workspace):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def callbacks_in_parallel(workspace, file):
     def meet(count):
         """Let each callback wait in its sleep until `count` of them are there."""
@@ -185,7 +185,7 @@ def callbacks_in_parallel(workspace, file):
     return [('two at a time', two, hint), ('eight at a time', eight, hint)]
 
 
-@tasks.add(7, limit_s=90)
+@tasks.add(limit_s=90)
 def build_source_run(workspace):
     def callbacks_overlap():
         listening = open_terminal(workspace, 'new_listener')
@@ -211,7 +211,7 @@ def build_source_run(workspace):
     return [('the new listener runs: its callbacks overlap', callbacks_overlap, hint)]
 
 
-@tasks.add(8)
+@tasks.add
 def other_arguments(workspace):
     def hears():
         open_terminal(workspace, 'other_talker')
@@ -258,7 +258,7 @@ def other_arguments(workspace):
     ]
 
 
-@tasks.add(9, limit_s=90)
+@tasks.add(limit_s=90)
 def fix_a_package(workspace):
     def build():
         write_forgetful(workspace)
@@ -283,7 +283,7 @@ def fix_a_package(workspace):
     ]
 
 
-# --- The listener of tasks 2 and 6, without a build
+# --- The listener, without a build
 
 MEET = """
 import threading, time

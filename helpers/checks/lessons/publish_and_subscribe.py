@@ -22,7 +22,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def hear_the_text(MinimalSubscriber):
     def keeps(*texts):
         with Bench() as bench:
@@ -47,7 +47,7 @@ def hear_the_text(MinimalSubscriber):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def one_executor_for_all(spin_together):
     def all_tick(count):
         ticked = set()
@@ -69,7 +69,7 @@ def one_executor_for_all(spin_together):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def a_driver(Driver):
     def drives(speed, turn):
         with Bench() as bench:
@@ -104,7 +104,7 @@ def fields(twist):
     return ', '.join(set_fields) or 'only zeros'
 
 
-@tasks.add(4)
+@tasks.add
 def measure_the_distance(Odometer):
     def measures(distance, *places):
         messages = [Odometry() for _ in places]
@@ -123,7 +123,7 @@ def measure_the_distance(Odometer):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def drive_a_square(Square):
     def drive(side):
         """Drive in simulated time: the timers fire as fast as they can, and in the same order."""
@@ -174,7 +174,7 @@ def drive_a_square(Square):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def mirror_the_robot(Mirror):
     def mirrors(*speeds):
         messages = [Odometry() for _ in speeds]
@@ -201,7 +201,7 @@ def mirror_the_robot(Mirror):
     ]
 
 
-@tasks.add(7)
+@tasks.add
 def hear_the_laser(asked):
     def hears(reliability):
         heard = []
@@ -228,7 +228,7 @@ def hear_the_laser(asked):
     ]
 
 
-@tasks.add(8, limit_s=60)
+@tasks.add(limit_s=60)
 def a_program_of_its_own(workspace, file):
     def is_program(team):
         with Bench() as bench:
@@ -265,7 +265,7 @@ def a_program_of_its_own(workspace, file):
     ]
 
 
-@tasks.add(9, limit_s=60)
+@tasks.add(limit_s=60)
 def leave_a_robot_that_stands(workspace, file):
     def leaves_it_standing(sent):
         """Let the program drive, send it a signal, and look at what it has commanded."""

@@ -28,6 +28,8 @@ from helpers.workspace import without_folders
 tasks = Tasks()
 check = tasks.check
 
+SETTINGS = 'src/small_robot/config/localization.yaml'  # of the filters
+
 DESCRIPTION = 'src/small_robot/urdf/small_robot.urdf'
 MOUNTING = {'base_scan': math.radians(-30), 'imu_link': math.radians(20)}  # as it is described
 # A part of the name that rmw gives to a node whose subscription is discovered before the node.
@@ -48,7 +50,7 @@ ARM = """<robot name="arm">
 <origin xyz="0 0 0" rpy="0 0 0"/></joint></robot>"""
 
 
-@tasks.add(1)
+@tasks.add
 def three_sensors(workspace, file):
     description = once(lambda: described(workspace, file))
 
@@ -109,7 +111,7 @@ def parsed(text):
         return URDF.from_xml_string(text.encode())
 
 
-@tasks.add(2)
+@tasks.add
 def a_message_for_each_joint(workspace, static_transforms):
     arm = once(lambda: parsed(ARM))
 
@@ -156,7 +158,7 @@ def a_message_for_each_joint(workspace, static_transforms):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def once_is_enough(workspace, StaticBroadcaster):
     def hears(robot, *frames):
         from tf2_msgs.msg import TFMessage  # the lesson has built it
@@ -193,7 +195,7 @@ def once_is_enough(workspace, StaticBroadcaster):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def from_a_frame_to_its_parent(to_parent):
     def leads(x, y, yaw):
         points = np.array([1.0, 2.0, 0.5]), np.array([0.0, -1.0, 2.0])
@@ -225,9 +227,9 @@ def from_a_frame_to_its_parent(to_parent):
     ]
 
 
-@tasks.add(5, limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
-def fix_three_faults(workspace, settings, StaticBroadcaster):
-    drive = once(lambda: drive_by(workspace, StaticBroadcaster, settings, seconds=6))
+@tasks.add(limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
+def fix_three_faults(workspace, StaticBroadcaster):
+    drive = once(lambda: drive_by(workspace, StaticBroadcaster, SETTINGS, seconds=6))
 
     def uses(name, sensor, *parts):
         if sensor not in drive().parts[name]:
@@ -245,7 +247,7 @@ def fix_three_faults(workspace, settings, StaticBroadcaster):
         flat = [name for name, is_flat in drive().two_d.items() if is_flat is not True]
         if flat:
             return f'two_d_mode is not true for {", ".join(flat)}'
-        given = yaml.safe_load(workspace.file(settings).read_text(encoding='utf-8'))
+        given = yaml.safe_load(workspace.file(SETTINGS).read_text(encoding='utf-8'))
         section = given.get('navsat_transform') or given.get('/navsat_transform') or {}
         waits = (section.get('ros__parameters') or {}).get('wait_for_datum')
         return waits is True or 'navsat_transform has no wait_for_datum: true'
@@ -290,13 +292,13 @@ def fix_three_faults(workspace, settings, StaticBroadcaster):
     ]
 
 
-def drive_by(workspace, StaticBroadcaster, *settings, **options):
-    """Let the robot drive past two filters with these settings. Raises Failed if they do not start.
+def drive_by(workspace, StaticBroadcaster, *SETTINGS, **options):
+    """Let the robot drive past two filters with these SETTINGS. Raises Failed if they do not start.
 
     In one process rclpy refuses a subscription whose type is not that of the topic, and prints a
     page; on a robot the subscription hears nothing. So the types are compared before.
     """
-    robot, files = described(workspace), [workspace.file(name) for name in settings]
+    robot, files = described(workspace), [workspace.file(name) for name in SETTINGS]
     for file in files:
         compare_types(file)
     return localize(files, lambda: StaticBroadcaster(robot), mounting=MOUNTING, **options)
@@ -325,7 +327,7 @@ def compare_types(file):
                 )
 
 
-@tasks.add(6)
+@tasks.add
 def between_two_transforms(between):
     def goes(old, new, part, right):
         found = between(transform_of(*old), transform_of(*new), part)
@@ -380,7 +382,7 @@ def stamped_at(t, x, y, yaw, child='base_footprint', parent='odom'):
     return stamped
 
 
-@tasks.add(7)
+@tasks.add
 def look_it_up(Buffer):
     KEPT = (0.5, 1.0, 0.0, 0.0), (0.75, 2.0, 0.0, 0.4), (1.25, 4.0, 1.0, 0.0)
 
@@ -443,7 +445,7 @@ def look_it_up(Buffer):
     ]
 
 
-@tasks.add(8)
+@tasks.add
 def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
     def scan_at(t, length=1.0):
         scan = LaserScan(angle_increment=0.1, range_min=0.1, range_max=8.0, ranges=[length])
@@ -542,7 +544,7 @@ def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
     ]
 
 
-@tasks.add(9, limit_s=150)
+@tasks.add(limit_s=150)
 def two_filters(workspace, file):
     @once
     def seen():
@@ -672,7 +674,7 @@ def watch_launch(workspace, file):
     return launched
 
 
-@tasks.add(10)
+@tasks.add
 def say_what_you_know(Covariances):
     def relayed(speed):
         message = Odometry(child_frame_id='base_footprint')

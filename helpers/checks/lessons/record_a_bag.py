@@ -35,7 +35,7 @@ TOPICS = {'/scan': LaserScan, '/wall': Range, '/cmd_vel': Twist, '/bumper': Bool
 STORE = get_typestore(Stores.ROS2_JAZZY)
 
 
-@tasks.add(1, limit_s=60)
+@tasks.add(limit_s=60)
 def write_the_command_that_records(RECORD, workspace):
     def recorded_topics():
         tried = workspace.path / 'tried'
@@ -77,7 +77,7 @@ def what_it_printed(process):
     return [*(errors or lines[-1:]), 'nothing'][0]
 
 
-@tasks.add(2)
+@tasks.add
 def read_one_topic(read):
     def reads(topic, kind, right):
         rows = [
@@ -103,7 +103,7 @@ def read_one_topic(read):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def age_of_a_result(age_s):
     def computes(stamp_s, recorded_s, right):
         found = age_s(round(recorded_s * 1e9), stamped(Range, stamp_s).header)
@@ -118,7 +118,7 @@ def age_of_a_result(age_s):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def what_it_believed(at_bump):
     def finds(first_bump):
         rows = [(10 * n, '/scan', ahead(5.0 - n)) for n in range(5)]
@@ -145,7 +145,7 @@ def what_it_believed(at_bump):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def save_what_is_whole(salvage, half):
     def saves_small(missing):
         rows = [(n, f'/{"ab"[n % 2]}', Bool(data=n > 3)) for n in range(6)]
@@ -192,7 +192,7 @@ def whole_messages(file):
     return found
 
 
-@tasks.add(6)
+@tasks.add
 def fix_the_brake(FreshBrake):
     def commands_well(scans, now_s, right):
         """Let a brake in simulated time hear scans (stamp, distance)."""
@@ -236,7 +236,7 @@ def fix_the_brake(FreshBrake):
     ]
 
 
-@tasks.add(7, limit_s=60)
+@tasks.add(limit_s=60)
 def write_the_command_that_plays(PLAY, workspace):
     def plays():
         if not (workspace.path / 'crash').exists():
@@ -266,7 +266,7 @@ def play(bench, workspace, command):
     return what_it_printed(player)
 
 
-@tasks.add(8)
+@tasks.add
 def write_the_judge(Judge):
     def notes(messages, right):
         """Publish distances ('scan', m) and speeds ('cmd_vel', m/s)."""
@@ -306,7 +306,7 @@ BAD = {
 }
 
 
-@tasks.add(9)
+@tasks.add
 def write_the_assertions(check_commands):
     def accepts(commands):
         try:
@@ -333,7 +333,7 @@ def write_the_assertions(check_commands):
     ]
 
 
-@tasks.add(10)
+@tasks.add
 def match_by_stamps(Synchroniser):
     def matches(size, slop_s, arrivals, right):
         """Add messages by (name, stamp), and compare the stamps of the pairs."""
@@ -363,7 +363,7 @@ def match_by_stamps(Synchroniser):
     ]
 
 
-@tasks.add(11, limit_s=60)
+@tasks.add(limit_s=60)
 def hear_the_laser(LASER_QOS, workspace, scans):
     def hears():
         path = workspace.path / 'laser'
@@ -384,7 +384,7 @@ def hear_the_laser(LASER_QOS, workspace, scans):
     return [('it receives scans', hears, hint), ('its depth is 100', is_deep, 'depth=100')]
 
 
-@tasks.add(12)
+@tasks.add
 def ask_the_bag_for_the_type(speeds):
     def reads(*messages):
         rows = [(number, '/cmd_vel', message) for number, message in enumerate(messages)]

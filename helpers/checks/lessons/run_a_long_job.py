@@ -22,7 +22,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def the_job(EagerPatroller):
     def patrol(places):
         moves = []
@@ -69,7 +69,7 @@ def the_job(EagerPatroller):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def the_client(Operator):
     three = once(lambda: operate(Operator, 3))
 
@@ -104,7 +104,7 @@ def the_client(Operator):
     ]
 
 
-@tasks.add(3)
+@tasks.add
 def cancel_in_time(CancellingOperator):
     def cancels(places, at):
         """Return after which places a cancel had been sent, and how many the server got."""
@@ -145,7 +145,7 @@ def cancel_in_time(CancellingOperator):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def obey(ObedientPatroller):
     def patrol(places, cancelled_at=None, fails=False):
         """Cancel while the robot drives to a place. Return how the job ended, and its log."""
@@ -213,7 +213,7 @@ def obey(ObedientPatroller):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def answer_at_the_end(ChargingPatroller):
     def charge(patrols, how):
         """Ask to charge in each patrol. Return what is wrong with the answers, for each patrol."""
@@ -276,7 +276,7 @@ def answer_at_the_end(ChargingPatroller):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def a_group_of_its_own(options, ChargingPatroller):
     def is_heard(threads):
         there, gate = threading.Event(), threading.Event()
@@ -316,7 +316,7 @@ def a_group_of_its_own(options, ChargingPatroller):
     ]
 
 
-@tasks.add(7)
+@tasks.add
 def one_patrol_at_a_time(PolitePatroller):
     def answers_to_goals(how_the_first_ends):
         """Send goals before, during and after a patrol. Return by name which are accepted."""

@@ -20,7 +20,7 @@ check = tasks.check
 QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
 
 
-@tasks.add(1)
+@tasks.add
 def a_subscriber_with_a_group(SlowSubscriber, DEPTH, CALLBACK_S):
     def hears(group):
         must_define(SlowSubscriber, '__init__')
@@ -52,7 +52,7 @@ def a_subscriber_with_a_group(SlowSubscriber, DEPTH, CALLBACK_S):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def four_combinations(combination, THREADS):
     def is_combination(letter, *kinds, at_once):
         with ros_session():
@@ -122,7 +122,7 @@ def most_at_once(table):
     return max(int(((begun <= time_s) & (ended > time_s)).sum()) for time_s in begun)
 
 
-@tasks.add(3)
+@tasks.add
 def camera_and_battery(TwoTopics, make_my_executor):
     def called(*topics):
         """Send messages while the first picture is worked on. Return the topics of the calls."""
@@ -171,7 +171,7 @@ def camera_and_battery(TwoTopics, make_my_executor):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def wait_for_the_small_one(UnequalSubscriber):
     def finish_in_order(threads):
         with Bench() as bench:
@@ -201,7 +201,7 @@ def wait_for_the_small_one(UnequalSubscriber):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def take_a_lock(LockingSubscriber):
     forty = once(lambda: hear_numbers(LockingSubscriber, 40, 'count'))
 
@@ -225,7 +225,7 @@ def take_a_lock(LockingSubscriber):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def an_odometer(Odometer):
     forty = once(lambda: hear_numbers(Odometer, 40, 'total', 'longest'))
 

@@ -18,7 +18,7 @@ tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def obey_at_once(Driver):
     return [
         (
@@ -39,7 +39,7 @@ def obey_at_once(Driver):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def limit_the_parameter(LimitedDriver):
     def has_limits():
         with ros_session():
@@ -89,7 +89,7 @@ def limit_the_parameter(LimitedDriver):
 FAST, SLOW, LOAD = ('max_speed', 0.5), ('max_speed', 0.3), ('loaded', True)
 
 
-@tasks.add(3)
+@tasks.add
 def slower_with_a_load(LoadedDriver):
     def takes(right, *changes):
         found = accepted(LoadedDriver, *changes)
@@ -159,7 +159,7 @@ def slower_with_a_load(LoadedDriver):
     ]
 
 
-@tasks.add(4)
+@tasks.add
 def say_what_has_changed(ReportingDriver):
     def logs(changes, lines):
         with Bench() as bench:
@@ -187,7 +187,7 @@ def say_what_has_changed(ReportingDriver):
     ]
 
 
-@tasks.add(5)
+@tasks.add
 def fix_a_node(Patrol):
     def starts(arguments, max_speed, rooms):
         with ros_session():
@@ -204,7 +204,7 @@ def fix_a_node(Patrol):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def a_file_for_three_robots(workspace, file):
     def has_speed(name, right):
         *namespace, node_name = name.strip('/').split('/')
@@ -230,7 +230,7 @@ def a_file_for_three_robots(workspace, file):
     ]
 
 
-@tasks.add(7, limit_s=60)
+@tasks.add(limit_s=60)
 def keep_what_was_good(by_command, good, LimitedDriver):
     @once
     def set_values():
@@ -271,7 +271,7 @@ def keep_what_was_good(by_command, good, LimitedDriver):
     ]
 
 
-@tasks.add(8)
+@tasks.add
 def start_three_drivers(LimitedDriver, ONE, TWO, THREE):
     def drives(right, *starts):
         found = ways(*starts)
@@ -308,7 +308,7 @@ def start_three_drivers(LimitedDriver, ONE, TWO, THREE):
     ]
 
 
-@tasks.add(9)
+@tasks.add
 def a_depth_by_parameter(NumberListener, SHALLOW):
     def hears(arguments, right):
         numbers = [Int32(data=number) for number in range(20)]
@@ -336,7 +336,7 @@ def a_depth_by_parameter(NumberListener, SHALLOW):
     ]
 
 
-@tasks.add(10)
+@tasks.add
 def once_a_second(LoggingDriver):
     def counts(level, seconds, debug, info):
         """Count what is logged while a robot drives, at a level of the logger."""

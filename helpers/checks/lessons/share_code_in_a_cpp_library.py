@@ -91,7 +91,7 @@ class Program:
 FEW = 'nothing', 0, 3, 'nan 1 0'
 
 
-@tasks.add(1)
+@tasks.add
 def the_nearest_range(workspace):
     program = Program(workspace, 'nearest.hpp', 'scan_tools::nearest(r.data(), a, b)')
     loop = 'A for loop from first, while less than last; an if.'
@@ -120,7 +120,7 @@ def the_nearest_range(workspace):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def the_gap(workspace):
     call = 'scan_tools::widest_gap(r.data(), n, a)'
     program = Program(workspace, 'gap.hpp', call, '../src/scan_tools/src/gap.cpp')
@@ -215,7 +215,7 @@ def printed_by(workspace, package, executable):
     return output.splitlines()[-1] if output else 'nothing'
 
 
-@tasks.add(3, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def make_the_library(workspace, library):
     @once
     def built():
@@ -247,7 +247,7 @@ def make_the_library(workspace, library):
     ]
 
 
-@tasks.add(4, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def link_the_library(workspace, library):
     built = once(lambda: result_of(workspace, 'scan_tools', 'look', library=library + GIVEN))
 
@@ -289,7 +289,7 @@ def link_the_library(workspace, library):
     ]
 
 
-@tasks.add(5, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def give_it_to_others(workspace):
     built = once(lambda: result_of(workspace, 'scan_tools', 'look'))
 
@@ -320,7 +320,7 @@ threading.Thread(target=stop_it, daemon=True).start()
 print(m.search(4.0))"""
 
 
-@tasks.add(6, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def bind(workspace):
     @once
     def compiled():
@@ -360,7 +360,7 @@ def bind(workspace):
     ]
 
 
-@tasks.add(7)
+@tasks.add
 def name_what_it_needs(workspace):
     package = once(lambda: manifest(workspace, 'src/scan_tools_py'))
 
@@ -390,7 +390,7 @@ def imports_the_module(workspace):
     return output == '2' or (output.splitlines() or ['it printed nothing'])[-1]
 
 
-@tasks.add(8, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def make_the_module(workspace, library):
     shared = re.sub('find_package', 'set(BUILD_SHARED_LIBS ON)\n\\g<0>', library, count=1)
     built = once(
@@ -407,7 +407,7 @@ def make_the_module(workspace, library):
     ]
 
 
-@tasks.add(9, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def fix_it(workspace):
     built = once(lambda: result_of(workspace, 'scan_tools', 'look', 'scan_tools_py'))
 
@@ -423,7 +423,7 @@ def fix_it(workspace):
 # --- The node -------------------------------------------------------------------------------------
 
 
-@tasks.add(10)
+@tasks.add
 def through_the_slalom(GapDriver, WIDTH, scan_tools_py):
     def command_for(gap):
         """Return the command for a scan with a gap, and whether the node has asked C++ for it."""

@@ -26,7 +26,7 @@ HOUSE = Floor.from_text(
 BEHIND_THE_WALL_M = 2.61
 
 
-@tasks.add(1)
+@tasks.add
 def through_the_door(speed):
     def goes_through():
         if isinstance(speed, bool) or not isinstance(speed, int | float):
@@ -46,7 +46,7 @@ def through_the_door(speed):
     return [('the robot goes through the door, and hits nothing', goes_through, hint)]
 
 
-@tasks.add(2)
+@tasks.add
 def a_first_node(HandDriver):
     def publishes(forward, turn):
         with Bench() as bench:

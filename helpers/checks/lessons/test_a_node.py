@@ -81,7 +81,7 @@ ROWS = {
 }
 
 
-@tasks.add(1, limit_s=60)
+@tasks.add(limit_s=60)
 def test_the_function(workspace, tests):
     versions = {'our': '', 'another': SPEED, **WRONG_SPEEDS}
     runs = once(lambda: run_tests(workspace, PACKAGE, tests, 'brake_pkg.speed', versions))
@@ -138,7 +138,7 @@ def test_again_ends():
 """
 
 
-@tasks.add(2, limit_s=60)
+@tasks.add(limit_s=60)
 def a_domain_of_its_own(workspace):
     @once
     def runs():
@@ -197,7 +197,7 @@ def run_busy(workspace, tests='test/test_brake.py'):
     return runs['busy']
 
 
-@tasks.add(3, limit_s=60)
+@tasks.add(limit_s=60)
 def catch_it(workspace, tests):
     busy = once(lambda: run_busy(workspace, tests))
 
@@ -244,7 +244,7 @@ def test_waits(ticks, wanted, limit_s):
 """
 
 
-@tasks.add(4, limit_s=60)
+@tasks.add(limit_s=60)
 def wait_for_an_event(workspace):
     @once
     def runs():
@@ -263,7 +263,7 @@ def wait_for_an_event(workspace):
     ]
 
 
-@tasks.add(5, limit_s=60)
+@tasks.add(limit_s=60)
 def fix_the_flaky_test(workspace, tests):
     @once
     def runs():
@@ -302,7 +302,7 @@ def without_run(text):
 # --- Task 6: colcon
 
 
-@tasks.add(6, limit_s=90)
+@tasks.add(limit_s=90)
 def run_them(workspace):
     def is_run():
         build(workspace, 'brake_pkg', anew=True)
@@ -421,7 +421,7 @@ OUR_TESTS = {
 }
 
 
-@tasks.add(7, limit_s=60)
+@tasks.add(limit_s=60)
 def a_brake_with_a_lifecycle(workspace):
     @once
     def runs():
@@ -500,7 +500,7 @@ def _watched(Camera, raised):
     return type('Camera', (Camera,), {name: watched(name) for name in names})
 
 
-@tasks.add(8)
+@tasks.add
 def a_camera_that_fails(Camera):
     def ends(broken, steps, wanted_state, *calls):
         device = Device(*broken)
@@ -541,7 +541,7 @@ def a_camera_that_fails(Camera):
 # --- Task 9: the running node
 
 
-@tasks.add(9)
+@tasks.add
 def make_it_active(workspace):
     def is_active():
         state = workspace.terminal('ros2 lifecycle get /brake')
@@ -647,7 +647,7 @@ HINTS = {
 }
 
 
-@tasks.add(10, limit_s=90)
+@tasks.add(limit_s=90)
 def find_six_bugs(workspace, tests):
     @once
     def runs():

@@ -22,7 +22,7 @@ GENERATORS, RUNTIME = 'rosidl_default_generators', 'rosidl_default_runtime'
 BOTH = '<depend>NAME</depend> counts for the build and for the run.'
 
 
-@tasks.add(1)
+@tasks.add
 def the_service_file(workspace, file):
     def has(part, right):
         service = parse_service_file('custom_interfaces', str(workspace.file(file)))
@@ -45,7 +45,7 @@ def the_service_file(workspace, file):
     ]
 
 
-@tasks.add(2)
+@tasks.add
 def what_it_depends_on(workspace):
     package = 'custom_interfaces'
 
@@ -67,13 +67,13 @@ def what_it_depends_on(workspace):
     ]
 
 
-@tasks.add(3, limit_s=90)
+@tasks.add(limit_s=90)
 def fix_the_build(workspace):
     hint = 'Unknown command: which package has it? KeyError: what was not told about the package?'
     return [('it builds', lambda: builds(workspace, 'custom_interfaces', anew=False), hint)]
 
 
-@tasks.add(4)
+@tasks.add
 def the_server(CameraServer):
     def turns(degrees):
         with Bench() as bench:
@@ -92,7 +92,7 @@ def the_server(CameraServer):
     ]
 
 
-@tasks.add(5, limit_s=45)  # a call that nobody answers waits for 30 s
+@tasks.add(limit_s=45)  # a call that nobody answers waits for 30 s
 def the_client(ask, pixels):
     def asks(degrees):
         with Bench() as bench:
@@ -126,7 +126,7 @@ def the_client(ask, pixels):
     ]
 
 
-@tasks.add(6)
+@tasks.add
 def call_from_a_terminal(workspace, commands):
     def turns_60():
         with Bench() as bench:
@@ -142,7 +142,7 @@ def call_from_a_terminal(workspace, commands):
     return [('the camera turns by 60 degrees', turns_60, hint)]
 
 
-@tasks.add(7, limit_s=90)
+@tasks.add(limit_s=90)
 def a_message_of_two_packages(workspace):
     package = 'sighting_interfaces'
 
@@ -189,14 +189,14 @@ def is_named(workspace, package, moment, *wanted):
 
 
 def service_type():
-    """Return the learner's service. It is there when task 3 has built it."""
+    """Return the learner's service. It is there when `fix_the_build` has built it."""
     from custom_interfaces.srv import TurnCamera
 
     return TurnCamera
 
 
 def serve(bench, robot):
-    """Serve the camera of a robot, as task 4 wants it."""
+    """Serve the camera of a robot, as `the_server` wants it."""
 
     def turn(request, response):
         response.camera_image = robot.turn_camera(request.deg_turn)

@@ -66,7 +66,7 @@ def install_anew(workspace, *packages):
     return build(workspace, *packages)
 
 
-@tasks.add(1, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def the_nearest_range(workspace):
     built = once(lambda: install_anew(workspace, 'scan_tools'))
 
@@ -183,7 +183,7 @@ def code_of(workspace, file):
     return re.sub(comment, '', workspace.file(file).read_text())
 
 
-@tasks.add(2, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def its_cmakelists(workspace):
     packages = 'scan_tools', 'small_rclcpp', 'std_msgs'
     built = once(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'watcher'))
@@ -225,7 +225,7 @@ def brakes(workspace, *pairs, pause_s=0.0):
     return right or f'walls at {distances} m: {found} m/s, not {list(speeds)}'
 
 
-@tasks.add(3, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def a_node_of_your_own(workspace):
     built = once(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake'))
 
@@ -287,7 +287,7 @@ def a_node_of_your_own(workspace):
     ]
 
 
-@tasks.add(4, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def another_robot(workspace, ARGUMENTS):
     @once
     def started():
@@ -411,7 +411,7 @@ TRY_SPIN_XML = """<package format="3"><name>try_spin</name><version>0.0.0</versi
 """
 
 
-@tasks.add(5, limit_s=BUILD_S)
+@tasks.add(limit_s=BUILD_S)
 def your_executor(workspace):
     @once
     def built():

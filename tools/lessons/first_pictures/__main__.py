@@ -8,12 +8,12 @@ A picture plays once, in 4.5 s. Without motion it is its own end.
 
 from functools import partial
 
+from helpers.lesson import FOLDER, PICTURES, lessons
 from tools.lessons.first_pictures.drives import drive_picture
 from tools.lessons.first_pictures.queues import gate_picture, queue_picture, threads_picture
 from tools.lessons.first_pictures.sensors import camera_picture, lidar_picture, wheels_picture
 from tools.lessons.first_pictures.terminals import terminal_picture
 from tools.lessons.first_pictures.two_brakes import two_brakes_picture
-from tools.lessons.lesson import FOLDER, PICTURES, lessons
 
 IMAGES = FOLDER / PICTURES
 

@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image
 
 from helpers.fusion import fuse, simulate
+from helpers.lesson import Lesson
 from helpers.robot import ROOMS, Robot, replay_drive
 from helpers.ros import ros_session
 from tools.lessons.first_pictures.look import (
@@ -21,7 +22,6 @@ from tools.lessons.first_pictures.look import (
     svg,
     svg_of,
 )
-from tools.lessons.lesson import Lesson
 
 ASKEW = math.radians(-30)  # as MOUNTING of the lesson says
 RAYS = 45  # so many groups of points come one after the other
