@@ -194,8 +194,8 @@ def starts_and_waits():
     time.sleep(1000)
 
 tasks = Tasks()
-tasks.add(1, limit_s=100)(lambda answer: [('it ends', answer, '')])
-tasks.check(1, starts_and_waits)
+tasks.add(lambda answer: [('it ends', answer, '')], name='it', limit_s=100)
+tasks.check('it', starts_and_waits)
 """
 
 

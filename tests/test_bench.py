@@ -147,7 +147,7 @@ def test_a_constant_that_the_code_reads_gets_another_value(monkeypatch):
 def verdict_on(make_node, capsys, act=lambda bench: bench.say('number', *numbers(1))):
     tasks = Tasks()
 
-    @tasks.add(1)
+    @tasks.add
     def task(answer):
         def judged():
             with Bench() as bench:
@@ -157,7 +157,7 @@ def verdict_on(make_node, capsys, act=lambda bench: bench.say('number', *numbers
 
         return [('it works', judged, '')]
 
-    tasks.check(1, make_node)
+    tasks.check('task', make_node)
     return ' '.join(capsys.readouterr().out.split())
 
 
@@ -220,7 +220,7 @@ def test_a_mistake_in_a_callback_is_named_with_its_line(callback, found, capsys)
 def test_after_a_callback_that_never_ends_no_other_point_is_tried(capsys):
     tasks = Tasks()
 
-    @tasks.add(1)
+    @tasks.add
     def task(answer):
         def judged():
             with Bench() as bench:
@@ -230,7 +230,7 @@ def test_after_a_callback_that_never_ends_no_other_point_is_tried(capsys):
 
         return [('it works', judged, ''), ('again', judged, '')]
 
-    tasks.check(1, node_with(loops))
+    tasks.check('task', node_with(loops))
     assert 'not tried, because the one above did not end' in capsys.readouterr().out
 
 

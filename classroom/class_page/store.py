@@ -342,7 +342,7 @@ def _counted(answers) -> list[tuple]:
 
 def _with_name(event: object) -> object:
     """Return an event of version 0.3, which called a task by its number, with the task's name."""
-    if isinstance(event, dict) and isinstance(number := event.get('task'), int):
+    if isinstance(event, dict) and type(number := event.get('task')) is int:
         return event | {'task': earlier_name(str(event.get('lesson')), number)}
     return event
 

@@ -152,7 +152,7 @@ def judge_all(
                 work.row.said.append(result.trouble)
             for task, outcome in result.tasks.items():
                 if outcome.why not in ('', 'not answered', result.trouble) and not outcome.of:
-                    work.row.said.append(f'task {task}: {outcome.why}')
+                    work.row.said.append(f'task {lesson.tasks[task].number}: {outcome.why}')
             points = sum(result.tasks[task].solved for task in lesson.counted)
             work.row.points += points
             lines.append(f'lesson {number}: {points} of {len(lesson.counted)}{again}')
@@ -210,7 +210,7 @@ def write(
         number, key = lesson.lesson.number, lesson.lesson.name
         students = [(w.row.student.name, w.answers[key]) for w in works if key in w.answers]
         for task, names in alike.groups(lesson, students):
-            equal.append(f'lesson {number}, task {task}: {", ".join(names)}')
+            equal.append(f'lesson {number}, task {lesson.tasks[task].number}: {", ".join(names)}')
     put('equal_answers.txt', ''.join(f'{line}\n' for line in equal) or 'none\n')
     for line in equal:
         print(f'The same answer: {line}')

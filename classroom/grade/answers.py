@@ -124,14 +124,14 @@ def answers_of(cells: list[Node], handed: Handed) -> Answers:
         for place, exercise in enumerate(task.exercises):
             same = by_id.get(exercise.id, [])
             if len(same) > 1:
-                doubled.append(task.name)
+                doubled.append(str(task.number))
             written = [cell for cell in same if _plain(cell.source) != _plain(exercise.source)]
             if same:
                 source = (written or same)[-1].source
             elif place < len(in_order):
                 source = in_order[place].source
             else:
-                missing.append(task.name)
+                missing.append(str(task.number))
                 continue
             if len(source) > LARGEST_SOURCE:
                 answers.said.append(f'task {task.number} has a cell of {len(source)} letters')
@@ -139,12 +139,12 @@ def answers_of(cells: list[Node], handed: Handed) -> Answers:
             answers.sources[exercise.id] = source
             taught = '\n'.join(cell.source for cell in (*task.exercises, *task.solutions))
             if set(MACHINERY.findall(source)) - set(MACHINERY.findall(taught)):
-                looked_at.append(task.name)
+                looked_at.append(str(task.number))
         known = {cell.id for cell in handed.cells}
         added = [cell for cell in inside if cell.id not in known]
         has_ids = any(cell.id in known for cell in cells)
         if has_ids and not answers.changed(task) and any(cell.source.strip() for cell in added):
-            beside.append(task.name)
+            beside.append(str(task.number))
     for numbers, what in (
         (missing, 'has no cell'),
         (doubled, 'has its cell twice: the last one that was changed counts'),

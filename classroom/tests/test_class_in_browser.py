@@ -22,7 +22,7 @@ TASK = """
 from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
-tasks.add(1)(lambda: [('it is so', lambda: True, '')])
+tasks.add(lambda: [('it is so', lambda: True, '')], name='try_it')
 tasks.check(1)
 raise_hand()
 """

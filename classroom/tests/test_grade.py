@@ -13,11 +13,11 @@ import pytest
 
 from classroom.grade import alike, results, runner, tables
 from classroom.grade.__main__ import main
-from classroom.grade.answers import answers_of, cells_of, handed_out, lesson_of
+from classroom.grade.answers import answers_of, handed_out, lesson_of
 from classroom.grade.results import Kept, digest_of, job_of, result_of
 from classroom.grade.submissions import submissions_of, workspace_files
 from helpers.checks.verdict import KEY
-from helpers.lesson import ROOT, tags
+from helpers.lesson import ROOT, cells_of, tags
 from helpers.lesson import lessons as lessons_of_course
 
 RIGHT, WRONG = 'speed = 1.75 / 3.5\nshow(speed)', 'speed = 1.75\nshow(speed)'
@@ -212,7 +212,9 @@ def test_answers_go_into_the_cells_of_the_lesson(lessons, change):
         change(cell)
     _, answers = read(content, lessons)
     assert answers.sources[first] == 'mine = 1\n'
-    assert [n for n, task in lessons['02'].tasks.items() if answers.changed(task)] == [1]
+    assert [n for n, task in lessons['02'].tasks.items() if answers.changed(task)] == [
+        'publish_numbers'
+    ]
     assert not answers.said
 
 
@@ -265,7 +267,7 @@ def test_a_notebook_in_an_archive_or_with_another_ending_is_read(submit, capsys)
 def test_why_there_is_no_verdict_is_said_in_words(lessons, output, why):
     _, answers = read(notebook(**{STARTER: 'x = 1'}), lessons)
     said = runner.Said({STARTER: [output]}, begun=True, ended=True)
-    assert result_of(lessons['00'], answers, {}, said, '').tasks[1].why == why
+    assert result_of(lessons['00'], answers, {}, said, '').tasks['through_the_door'].why == why
 
 
 def test_only_exercise_cells_are_taken(lessons):
@@ -312,7 +314,12 @@ def said_of(*verdicts):
     return runner.Said({'check-00-1': outputs}, ended=True)
 
 
-GOOD = {'task': 1, 'of': 'answer', 'solved': True, 'points': [{'what': 'x', 'ok': True}]}
+GOOD = {
+    'task': 'through_the_door',
+    'of': 'answer',
+    'solved': True,
+    'points': [{'what': 'x', 'ok': True}],
+}
 
 
 @pytest.mark.parametrize(
@@ -320,7 +327,7 @@ GOOD = {'task': 1, 'of': 'answer', 'solved': True, 'points': [{'what': 'x', 'ok'
     [
         ([GOOD], True),
         ([GOOD, GOOD], False),  # one of them is forged
-        ([GOOD | {'task': 2}], False),
+        ([GOOD | {'task': 'a_first_node'}], False),
         ([GOOD | {'of': 'solution'}], False),
         ([GOOD | {'points': []}], False),
         ([GOOD | {'points': [{'ok': False}]}], False),
@@ -332,7 +339,7 @@ GOOD = {'task': 1, 'of': 'answer', 'solved': True, 'points': [{'what': 'x', 'ok'
 def test_a_verdict_counts_if_it_is_one(lessons, verdicts, solved):
     _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
     result = result_of(lessons['00'], answers, {}, said_of(*verdicts), 'digest')
-    assert result.tasks[1].solved == solved
+    assert result.tasks['through_the_door'].solved == solved
     assert result.points == solved
 
 
@@ -341,10 +348,10 @@ def test_without_a_verdict_the_error_is_said(lessons):
     error = {'output_type': 'error', 'ename': 'NameError', 'evalue': 'speed', 'traceback': []}
     said = runner.Said({STARTER: [error | {'ename': 'KeyboardInterrupt', 'evalue': ''}]})
     result = result_of(lessons['00'], answers, {}, said, 'digest')
-    assert result.tasks[1].why == 'its cell ended with KeyboardInterrupt'
+    assert result.tasks['through_the_door'].why == 'its cell ended with KeyboardInterrupt'
     said = runner.Said({'check-00-1': [error]})
     result = result_of(lessons['00'], answers, {}, said, 'digest')
-    assert result.tasks[1].why == 'its check ended with NameError: speed'
+    assert result.tasks['through_the_door'].why == 'its check ended with NameError: speed'
 
 
 def test_hostile_lines_are_left_out():
@@ -426,7 +433,7 @@ def test_two_hundred_students(submit, capsys):
     assert sum(line.startswith('Student') for line in lines) == 200
     assert 'Student 007: lesson.ipynb cannot be read: it is broken: it is no JSON' in lines
     rows = rows_of(submit())
-    assert sum(row['00 task 1'] == '1' for row in rows) == 99
+    assert sum(row['start_here through_the_door'] == '1' for row in rows) == 99
     assert [row['points'] for row in rows if row['name'] == 'Student 007'] == ['']
 
 
@@ -492,18 +499,18 @@ def test_moodle_takes_its_worksheet_back(submit, capsys):
 
 @pytest.mark.parametrize('options', [[], ['--no-stars']])
 def test_tasks_with_a_star_count_or_not(submit, capsys, lessons, options):
-    headings = lessons['01'].lesson.tasks
-    starred = [n for n, heading in enumerate(headings, 1) if '★' in heading]
-    of = len(headings) - (len(starred) if options else 0)
+    tasks = lessons['01'].lesson.tasks
+    starred = [task for task in tasks if task.star]
+    of = len(tasks) - (len(starred) if options else 0)
     points = 1 if options else 2
-    core = next(n for n in range(2, len(headings)) if n not in starred)
-    solved = (lessons['01'].tasks[n].exercises[0].id for n in (core, starred[0]))
+    core = next(task for task in tasks[1:] if not task.star)
+    solved = (task.exercises[0].id for task in (core, starred[0]))
     data = json.dumps(notebook('01', **dict.fromkeys(solved, RIGHT))).encode()
     folder = submit(**{'Student_500_assignsubmission_file/lesson.ipynb': data})
     assert main([str(folder), *options], Stand()) == 0
     assert f'Student: lesson 01: {points} of {of}\n' in capsys.readouterr().out
     [row] = rows_of(folder)
-    counts = row['points'], row['of'], row[f'01 task {starred[0]}']
+    counts = row['points'], row['of'], row[f'publish_and_subscribe {starred[0].name}']
     assert counts == (str(points), str(of), '1')
     [row] = rows_of(folder, 'moodle.csv')
     assert float(row['Grade']) == points
@@ -530,7 +537,7 @@ def test_an_exam_of_two_tasks(submit, capsys):
     assert ids[ids.index('find-next') - 1] == 'find-next-look-0'
     assert 'SEED = 7' in next(cell['source'] for cell in cells if cell['id'] == 'next')
     assert main([str(folder), '--tasks', '99'], Stand()) == 1
-    assert 'No task of lesson 19 would count' in capsys.readouterr().err
+    assert "19_find_the_fault.ipynb has no task '99'" in capsys.readouterr().err
 
 
 def test_two_assignments_in_one_folder_are_refused(submit, capsys):
@@ -611,7 +618,7 @@ def test_equal_answers_are_named(lessons):
     students = []
     for name, source in written.items():
         students.append((name, read(notebook('02', **{cell.id: source}), lessons)[1]))
-    assert alike.groups(lessons['02'], students) == [(task.number, ['Ada', 'Bob'])]
+    assert alike.groups(lessons['02'], students) == [(task.name, ['Ada', 'Bob'])]
 
 
 def test_what_is_kept_is_that_of_the_same_answers_and_lesson(lessons, tmp_path):
@@ -654,7 +661,7 @@ def test_what_is_kept_is_that_of_the_same_helpers(lessons, tmp_path, monkeypatch
 
 def test_the_number_of_a_lesson_that_draws_its_task(lessons):
     lesson = lessons['02']
-    first = lesson.tasks[1].exercises[0].id
+    first = lesson.tasks['publish_numbers'].exercises[0].id
     _, answers = read(notebook('02', **{first: 'mine = 1'}), lessons)
     answers.seed = '7'
     cells = [cell.copy() for cell in lesson.cells]

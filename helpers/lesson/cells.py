@@ -70,6 +70,7 @@ def _why_no_json(data: bytes | str) -> str:
 
 
 def tags(cell: Node) -> set[str]:
+    """Return the tags of a cell."""
     return set(cell.metadata.get('tags', []))
 
 
@@ -94,4 +95,5 @@ def is_question(cell: Node) -> bool:
 
 
 def first_heading(text: str) -> str:
+    """Return the first line of a text without the signs of a heading."""
     return text.splitlines()[0].lstrip('# ')

@@ -13,6 +13,7 @@ PICTURES = 'images'  # of the lessons, beside them
 
 
 def paths(folder: Path = FOLDER) -> list[Path]:
+    """Return the notebooks of a folder, in teaching order."""
     return sorted(folder.glob('[0-9][0-9]_*.ipynb'))
 
 

@@ -15,7 +15,7 @@ NOT_RUN = (
     'This kernel has not run the first cells of the lesson: choose Run > Run All Above Selected '
     'Cell, then run this cell again.'
 )
-CHECK = re.compile(r'check\(\d+,')
+CHECK = re.compile(r'check\(')
 NO_ANSWER = '{} is not there yet: run the cell of the task above, then this one again.'
 OF_A_CLASS = '{0} is for a class: write `from helpers.checks import {0}` above it.'
 CLASS = 'join_class', 'leave_class', 'lower_hand', 'raise_hand'
