@@ -9,11 +9,6 @@ JupyterLab keeps the id of a cell, and so do the lessons: a cell is found again 
 lesson by its name without its number. A cell, or another file, that only one side has changed is
 taken from that side. Where both have changed it, both are there.
 
-In version 0.2 the code of a check stood in the lesson, in folded cells, and `helpers` had other
-rooms. A cell of that version that a student has changed may no longer run: it is kept as text. In a
-folder of version 0.2 `make update` runs the program of version 0.2, which leaves such a cell as
-code: the next `make update` makes it text.
-
 Why no kept tool: of 200 histories drawn as in classroom/tests/test_update.py, nbdime 4.0.4 left
 conflict markers inside cells in 39 (strategy inline), or lost words in 5 (union). nbgitpuller keeps
 one side of a conflict only (`git merge -Xours`), and needs git.
@@ -44,10 +39,6 @@ LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # wherever they are
 # What nbformat and this program raise for a file that is no notebook, or has no ids.
 UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, nbformat.ValidationError)
 YOURS = '*Your version of the cell above, from before the update:*'
-NO_LONGER_RUNS = 'Your version, from before the update. It no longer runs: copy what you need.'
-# What was in version 0.2 only: the first line of each check, and the imports of each lesson.
-CHECK_OF_0_2 = '✔ Check of task'
-IMPORT_OF_0_2 = re.compile(r'^from helpers\.(classroom|session) import ', re.MULTILINE)
 
 
 def merge(base: NotebookNode, mine: NotebookNode, newer: NotebookNode) -> NotebookNode:
@@ -124,63 +115,6 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
     return said
 
 
-def keep_old_cells_as_text(mine: Path, newer: Path) -> list[str]:
-    """Turn cells of version 0.2 that no longer run into text; return a sentence for each lesson."""
-    said = []
-    for file in files_of(newer):
-        if file.suffix != '.ipynb' or _bytes(mine / file) in (None, _bytes(newer / file)):
-            continue
-        try:
-            own, lesson = (nbformat.read(folder / file, as_version=4) for folder in (mine, newer))
-            old = ids_of_0_2(own, lesson)
-        except UNREADABLE:
-            continue
-        if old:
-            _make_text(own, old)
-            data = (nbformat.writes(own) + '\n').encode()
-            _write(mine / file, data, (mine / file).stat().st_mode)
-            said.append(f'{file}: cells of yours that no longer run, now kept as text: {len(old)}.')
-    return said
-
-
-def ids_of_0_2(mine: NotebookNode, newer: NotebookNode) -> set[str]:
-    """Return the ids of cells of version 0.2 that a student has changed and that no longer run.
-
-    What supports a check (the tag `harness`) would even take the place of a function of the same
-    name that the lesson imports now.
-    """
-    ids, sources = ({cell[key] for cell in newer.cells} for key in ('id', 'source'))
-    found, above = set(), ''
-    for cell in mine.cells:
-        tags = cell.metadata.get('tags', [])
-        is_old = (
-            'harness' in tags
-            or ('check' in tags and CHECK_OF_0_2 in cell.source)
-            or (above == YOURS and IMPORT_OF_0_2.search(cell.source))
-        )
-        is_known = cell.id in ids or cell.source in sources
-        if cell.cell_type == 'code' and is_old and not is_known:
-            found.add(cell.id)
-        above = cell.source
-    return found
-
-
-def _make_text(notebook: NotebookNode, ids: set[str]) -> None:
-    """Turn cells of code into text that unfolds."""
-    cells = []
-    for cell in notebook.cells:
-        if cell.id in ids:
-            if cells and cells[-1].source == YOURS:
-                cells.pop()
-            longest = max(map(len, re.findall('`+', cell.source)), default=0)
-            fence = '`' * max(3, longest + 1)
-            code = f'{fence}python\n{cell.source}\n{fence}'
-            summary = f'<summary><em>{NO_LONGER_RUNS}</em></summary>'
-            cell = new_markdown_cell(f'<details>{summary}\n\n{code}\n\n</details>')
-        cells.append(cell)
-    notebook.cells = cells
-
-
 def files_of(folder: Path) -> list[Path]:
     """Return the paths of the files of a course, relative to its folder."""
     files = (
@@ -229,7 +163,6 @@ def update_from_folder(newer: Path, mine: Path) -> list[str]:
     After an interruption the next update goes on: to merge once more changes nothing.
     """
     said = merge_folders(mine / BASE, mine, newer)
-    said += keep_old_cells_as_text(mine, newer)
     if (mine / BASE).is_dir():
         before, after = with_solutions(mine / BASE), with_solutions(newer)
         for numbers, what in (
@@ -299,8 +232,7 @@ def update_from_git(mine: Path) -> list[str]:
             committed(mine, name, Path(folder, name[-4:])) for name in ('HEAD', '@{upstream}')
         )
         said = merge_folders(base, mine, newer)
-        said += keep_old_cells_as_text(mine, newer)
-    _git(mine, 'The lessons are new, but git could not note it', 'reset', '@{upstream}')
+        _git(mine, 'The lessons are new, but git could not note it', 'reset', '@{upstream}')
     return said
 
 
