@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from support.processes import put
 
-from helpers.workspace.workspace import OWNED
+from helpers.machine import OWNED
 from tools.lessons.lesson import ROOT
 
 LOCKS = Path('tools/locks')
