@@ -7,7 +7,8 @@
 Three versions are compared: what was handed out, what the student has made of it, what is newer.
 JupyterLab keeps the id of a cell, and so do the lessons: a cell is found again by its id, and a
 lesson by its name without its number. A cell, or another file, that only one side has changed is
-taken from that side. Where both have changed it, both are there.
+taken from that side. Where both have changed it, both are there. If a newer lesson calls its
+workspace by another name, the files that a student has in `scratch` come along.
 
 Why no kept tool: of 200 histories drawn as in classroom/tests/test_update.py, nbdime 4.0.4 left
 conflict markers inside cells in 39 (strategy inline), or lost words in 5 (union). nbgitpuller keeps
@@ -30,7 +31,9 @@ import nbformat
 from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell, new_notebook
 
+from helpers.machine import Renamed, give_new_names, set_apart
 from helpers.notebook import MARK
+from tools.lessons.lesson import workspace_of
 
 ROOT = Path(__file__).resolve().parents[1]
 BASE = '.handed_out'  # beside the lessons: what was handed out
@@ -38,6 +41,24 @@ APART = (BASE, '.git', 'wheels')
 LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # wherever they are
 # What nbformat and this program raise for a file that is no notebook, or has no ids.
 UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, nbformat.ValidationError)
+# How the lessons of version 0.3.0 call their workspaces. Its own program brings newer lessons, and
+# leaves the workspaces as they are: the next update finds them by these names.
+OF_0_3 = {
+    'publish_and_subscribe': 'lesson_01',
+    'lose_messages': 'lesson_02',
+    'set_parameters': 'lesson_08',
+    'make_a_package': 'lesson_09',
+    'bring_in_a_package': 'lesson_10',
+    'use_a_message_in_your_own_interface': 'lesson_11',
+    'launch_a_system': 'lesson_12',
+    'test_a_node': 'lesson_13',
+    'share_code_in_a_cpp_library': 'lesson_14',
+    'write_a_node_in_cpp': 'lesson_15',
+    'put_the_sensors_on_the_robot': 'lesson_17',
+    'record_a_bag': 'lesson_18',
+    'find_the_fault': 'lesson_19',
+    'build_a_robot_program': 'lesson_20',
+}
 YOURS = '*Your version of the cell above, from before the update:*'
 
 
@@ -115,6 +136,33 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
     return said
 
 
+def renamed_workspaces(base: Path, newer: Path) -> list[Renamed]:
+    """Return the workspaces that the newer lessons call by another name than those of `base`."""
+    found = {}
+    for file in files_of(newer):
+        lesson, old = _lesson(newer / file), _lesson(_found(base / file))
+        if not lesson or not old or not (new_name := workspace_of(lesson)):
+            continue
+        old_name = workspace_of(old)
+        if old_name == new_name:
+            old_name = OF_0_3.get(file.stem[3:], '')
+        if old_name not in ('', new_name):
+            code = '\n'.join(cell.source for cell in (*old.cells, *lesson.cells))
+            packages = frozenset(re.findall(r'\bsrc/(\w+)', code))
+            found.setdefault(old_name, Renamed(old_name, new_name, packages))
+    return [*found.values()]
+
+
+def _lesson(path: Path) -> NotebookNode | None:
+    """Return a notebook, None if there is none that can be read."""
+    if path.suffix != '.ipynb' or not path.is_file():
+        return None
+    try:
+        return nbformat.read(path, as_version=4)
+    except UNREADABLE:
+        return None
+
+
 def files_of(folder: Path) -> list[Path]:
     """Return the paths of the files of a course, relative to its folder."""
     files = (
@@ -157,12 +205,14 @@ def _write(path: Path, data: bytes, mode: int) -> None:
     new.replace(path)
 
 
-def update_from_folder(newer: Path, mine: Path) -> list[str]:
+def update_from_folder(newer: Path, mine: Path, course: Path) -> list[str]:
     """Merge a folder into `mine`, and keep it there as what was handed out last.
 
-    After an interruption the next update goes on: to merge once more changes nothing.
+    `course` is the checkout whose lessons are open: its workspaces follow. After an interruption
+    the next update goes on: to merge once more changes nothing.
     """
-    said = merge_folders(mine / BASE, mine, newer)
+    said = set_apart(renamed_workspaces(mine / BASE, newer), course)
+    said += merge_folders(mine / BASE, mine, newer)
     if (mine / BASE).is_dir():
         before, after = with_solutions(mine / BASE), with_solutions(newer)
         for numbers, what in (
@@ -172,7 +222,8 @@ def update_from_folder(newer: Path, mine: Path) -> list[str]:
             if numbers:
                 said.append(f'Lessons {", ".join(sorted(numbers))} {what}.')
     merge_folders(mine / BASE, mine / BASE, newer)
-    return said
+    # Not before: if this were done twice, two workspaces that change names would change them back.
+    return said + give_new_names(course)
 
 
 def with_solutions(folder: Path) -> set[str]:
@@ -192,7 +243,7 @@ def update_from_archive(archive: Path, mine: Path) -> list[str]:
         if newer is None:
             raise ValueError(f'{archive} is no archive of `make handout`.')
         lock = _bytes(mine / 'tools/locks/requirements.lock')
-        said = update_from_folder(newer, mine)
+        said = update_from_folder(newer, mine, course=mine)
         brought = (newer / 'wheels').is_dir()
         if brought or _bytes(mine / 'tools/locks/requirements.lock') != lock:
             shutil.rmtree(mine / 'wheels', ignore_errors=True)  # they are those of the old lock
@@ -231,9 +282,10 @@ def update_from_git(mine: Path) -> list[str]:
         base, newer = (
             committed(mine, name, Path(folder, name[-4:])) for name in ('HEAD', '@{upstream}')
         )
-        said = merge_folders(base, mine, newer)
+        said = set_apart(renamed_workspaces(base, newer), mine)
+        said += merge_folders(base, mine, newer)
         _git(mine, 'The lessons are new, but git could not note it', 'reset', '@{upstream}')
-    return said
+    return said + give_new_names(mine)
 
 
 def _git(folder: Path, trouble: str, *command: str) -> None:
@@ -262,7 +314,7 @@ def main(arguments: list[str] | None = None) -> int:
         if source is None:
             said = update_from_git(mine)
         elif source.is_dir():
-            said = update_from_folder(source, mine)
+            said = update_from_folder(source, mine, course=ROOT)
         elif source.is_file():
             said = update_from_archive(source.resolve(), mine)
         else:

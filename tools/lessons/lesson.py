@@ -25,6 +25,7 @@ PICTURES = 'images'  # of the lessons, beside them
 START, GLOSSARY = '00', '99'  # the notebooks that are no lessons
 PARTS = ('nodes', 'packages', 'robot')
 NOTE = 'For the instructor'
+WORKSPACE = re.compile(r"\bWorkspace\('([\w-]+)'\)")
 LONGEST_NAME = 40  # letters of a cell's first line that are enough to find it
 
 
@@ -144,6 +145,17 @@ def called(cell: NotebookNode) -> str:
     """
     words = next((line.strip() for line in cell.source.splitlines() if line.strip()), '')
     return f'"{words[:LONGEST_NAME]}" ({cell.id})'
+
+
+def workspace_of(notebook: NotebookNode) -> str:
+    """Return the name that a lesson gives to its workspace, an empty text if it has none.
+
+    An overlay, `Workspace('copy', underlay=workspace)`, is part of another one.
+    """
+    for cell in notebook.cells:
+        if cell.cell_type == 'code' and (named := WORKSPACE.search(cell.source)):
+            return named[1]
+    return ''
 
 
 def minutes_of_note(source: str) -> int:
