@@ -118,8 +118,6 @@ licences: groups := test browser site hub licences
 .PHONY: help lab present class test test-ros2 test-tools test-packages test-answers test-browser test-classroom test-hub image lab-container hub handout grade update notebooks \
 	lesson task site soak bench release lint lock licences clean set_up
 
-PYTHON := .venv/bin/python
-
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None
 # is replaced: where one has crashed, pytest-xdist may wait for its successor for ever.
 WORKERS := 4
@@ -132,23 +130,4 @@ slow := --dist worksteal --max-worker-restart 0 -o faulthandler_timeout=600
 
 this_python = $(shell $(PYTHON) -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 
-ROOT := .
-# A port that you name is the one you get, or an error.
-server = --root "$(ROOT)" $(if $(PORT),--port "$(PORT)") $(if $(filter no,$(BROWSER)),--no-browser)
-
-# What you have set for other work stays out: another ROS 2 that is sourced, Python's and Jupyter's
-# variables, the settings in your home folder. What must not reach a build stands in
-# helpers/machine/build_tools.py. JupyterLab's state of this course is in .jupyter.
-unexport $(filter PYTHON% ROS_% RMW_% RCUTILS_% FASTDDS_% FASTRTPS_% JUPYTER% IPYTHON% \
-	_ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH VIRTUAL_ENV MPLBACKEND,$(.VARIABLES))
-ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
-# The libraries of that other ROS 2. The wheels set their own path.
-unexport LD_LIBRARY_PATH
-endif
-export JUPYTER_CONFIG_DIR := $(CURDIR)/.jupyter
-export JUPYTER_DATA_DIR := $(CURDIR)/.jupyter/data
-export JUPYTER_RUNTIME_DIR := $(CURDIR)/.jupyter/runtime
-export IPYTHONDIR := $(CURDIR)/.jupyter/ipython
-export ROS_LOG_DIR := $(CURDIR)/.jupyter/ros_log
-# Its list of fonts. In a home that cannot be written each kernel would make it anew, and warn.
-export MPLCONFIGDIR := $(CURDIR)/.jupyter/matplotlib
+include tools/environment.mk

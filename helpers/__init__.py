@@ -6,7 +6,7 @@ from behind it. A room imports only from the rooms that stand above it in this l
     lesson     what a lesson is: steps, tasks, guesses and notes, read from its notebook
     notebook   what a cell needs before ROS comes: interrupts, a bar, lines, letters, colours
     ros        a session in a kernel: its domain, its threads, its log, what waits for what
-    machine    this machine: what it has, what is missing, and the tools of a build
+    machine    this machine: what it has, what is missing, tools of a build, folders of workspaces
     recording  records of what callbacks did, and the model of a queue that explains them
     replay     step through a run: what waits, what runs, what is lost, and why
     plots      pictures of recorded and of predicted runs, of graphs and of drives

@@ -26,9 +26,10 @@ from support.packages import (
 from support.processes import running
 from support.waits import wait_for
 
+from helpers.machine import folders
 from helpers.ros import ros_session
 from helpers.ros.domain import reserve_domain_id
-from helpers.workspace import Workspace, folders, processes
+from helpers.workspace import Workspace, processes
 from helpers.workspace.build_output import lines_that_matter
 from helpers.workspace.processes import Process
 from helpers.workspace.wheels import fix_wheels
@@ -622,10 +623,10 @@ def test_two_kernels_do_not_share_a_folder():
         kernel.kill()
         kernel.wait()
         build.suspend()
-        assert folders.claim(path.name) != path
+        assert folders.claim_workspace(path.name) != path
         build.resume()
         build.wait(timeout=60)
-        assert folders.claim(path.name) == path
+        assert folders.claim_workspace(path.name) == path
 
 
 def test_a_checkout_with_spaces_and_accents(other, monkeypatch, tmp_path):

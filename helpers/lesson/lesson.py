@@ -23,6 +23,7 @@ HEADING = re.compile(r'^### ✎ Task (?P<number>\d+)(?P<star> ★)?(?P<rest>: (?
 STEP = re.compile(r'## (\d+)\. |## (\w+)')
 TIME = re.compile(r'^(\*\*Time\*\*.*)(?:\n\n(Steps and tasks with ★.*)\.)?$', re.MULTILINE)
 MEMORY = '## From memory\n'
+PACKAGE = re.compile(r'\bsrc/(\w+)')
 WORKSPACE = re.compile(r"^\w+ = Workspace\('([^']+)'\)", re.MULTILINE)
 
 
@@ -269,6 +270,11 @@ class Lesson:
         """The name of its workspace, empty if it has none."""
         found = [WORKSPACE.search(cell.source) for cell in self.cells if cell.cell_type == 'code']
         return next((match[1] for match in found if match), '')
+
+    @property
+    def packages(self) -> set[str]:
+        """The packages of its workspace that its cells name: those of `src/fleet_pkg`."""
+        return {name for cell in self.code_cells() for name in PACKAGE.findall(cell.source)}
 
     @cached_property
     def tasks(self) -> list[Task]:

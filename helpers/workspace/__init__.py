@@ -5,7 +5,6 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
 `source install/setup.bash`, and an end for every process.
 
     workspace     what lessons import: `Workspace`, and `%%write`
-    folders       the folder of a workspace, which no two kernels share
     wheels        CMake files of the ROS 2 wheels, made to fit this machine
     processes     a process that prints lines, and ends
     tf2_msgs      the package of the message of /tf, which the wheels lack

@@ -6,11 +6,9 @@ README.md and teaching.md and the notebook 00 hold tables between two marks:
     <!-- end -->
 
 The numbers of today are written as well: in titles, in headings of tasks, and in each link to a
-lesson or a task. Each lesson ends with a link to the next lesson.
-
-The rows of a timetable are written by hand: what happens, and the minutes if it is no lesson. The
-times, and the minutes and titles of lessons, are made. The functions take and return texts by their
-path in the checkout, so that nothing is written before all of it is right.
+lesson or a task. Each lesson ends with a link to the next lesson. What a timetable has is in
+timetables.yaml; times, and the minutes and titles of lessons, follow. The functions take and return
+texts by their path in the checkout, so that nothing is written before all of it is right.
 """
 
 import os
@@ -33,8 +31,11 @@ from helpers.lesson import (
     write_next,
     write_numbers,
 )
+from tools.lessons import timetables
 from tools.lessons.clean import clean, text_of
+from tools.lessons.timetables import Timetable, minutes_and_lesson
 
+Rows = list[list[str]]  # of a table, the first is its head
 Texts = dict[str, str]  # by the path in the checkout, such as notebooks/02_lose_messages.ipynb
 HISTORY = 'CHANGELOG.md'  # has the numbers of its time
 NOT_OURS = {
@@ -48,14 +49,12 @@ NOT_OURS = {
     'site',
 }
 COMMAND = f'make notebooks LESSON={START}'
-BLOCK = re.compile(r'(<!-- made by `make notebooks`: (.+?) -->\n\n)((?:\|.*\n)*)\n?<!-- end -->')
-ROW = re.compile(r'^\|[^|]*\| *(\d*) *\| (.+) \|$(?<!End \|)', re.MULTILINE)
-LINK = re.compile(r'\[([^]]*)\]\((\S+)\)(?:, steps? (\d+)(?: to (\d+))?)?$')
+BLOCK = re.compile(r'(<!-- made by `make notebooks`: (.+?) -->\n\n)(?:\|.*\n)*\n?<!-- end -->')
 
 
 def texts_of(root: Path = ROOT) -> Texts:
-    """Return the texts of all notebooks, and of all documents."""
-    files = [*paths(root / 'notebooks'), *documents(root)]
+    """Return the texts of all notebooks, of all documents, and of the timetables."""
+    files = [*paths(root / 'notebooks'), *documents(root), root / timetables.FILE]
     return {
         str(path.relative_to(root)): path.read_text(encoding='utf-8')
         for path in files
@@ -84,14 +83,16 @@ def updated(texts: Texts) -> Texts:
     lessons = lessons_of(texts)
     for lesson in lessons:
         write_numbers(lesson)
+    known = timetables.read(texts[timetables.FILE]) if timetables.FILE in texts else []
     should = {}
     for path, text in texts.items():
-        if not path.endswith('.ipynb'):
-            should[path] = with_mentions(_with_tables(text, lessons), lessons)
+        if path.endswith('.md'):
+            should[path] = with_mentions(_with_tables(text, lessons, known), lessons)
     for lesson, following in zip(lessons, [*lessons[1:], None], strict=True):
         for cell in lesson.cells:
             if cell.cell_type != 'code':
-                cell.source = with_mentions(_with_tables(cell.source, lessons), lessons, lesson)
+                text = _with_tables(cell.source, lessons, known)
+                cell.source = with_mentions(text, lessons, lesson)
         if lesson.number != GLOSSARY:
             write_next(lesson, following if following and following.number != GLOSSARY else None)
         should[f'notebooks/{lesson.file}'] = text_of(clean(lesson.notebook))
@@ -110,26 +111,26 @@ def needs_run(lessons: list[Lesson]) -> bool:
     )
 
 
-def _with_tables(text: str, lessons: list[Lesson]) -> str:
+def _with_tables(text: str, lessons: list[Lesson], known: list[Timetable]) -> str:
     def new(block: re.Match) -> str:
-        return f'{block[1]}{_table(block[2], block[3], lessons)}\n<!-- end -->'
+        return f'{block[1]}{_table(block[2], lessons, known)}\n<!-- end -->'
 
     return BLOCK.sub(new, text)
 
 
-def _table(title: str, old: str, lessons: list[Lesson]) -> str:
-    """Return the lines of the table with a title such as `map of nodes`, which was `old`."""
+def _table(title: str, lessons: list[Lesson], known: list[Timetable]) -> str:
+    """Return the lines of the table with a title such as `map of nodes`."""
     kind, _, name = title.partition(' of ')
     if kind not in TABLES:
         raise ValueError(f'No table is called {title!r}. Name one of {", ".join(TABLES)}.')
-    head, *rows = TABLES[kind](name, old, lessons)
+    head, *rows = TABLES[kind](name, lessons, known)
     lines = [
         f'|{"|".join(f" {cell} " if cell else " " for cell in row)}|\n' for row in [head, *rows]
     ]
     return ''.join([lines[0], '|---' * len(head) + '|\n', *lines[1:]])
 
 
-def _readme(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
+def _readme(_name: str, lessons: list[Lesson], _known: list[Timetable]) -> Rows:
     columns = [
         [
             f'[{lesson.number} {lesson.title}](notebooks/{lesson.file})'
@@ -145,7 +146,7 @@ def _is_in(lesson: Lesson, part: str) -> bool:
     return lesson.number not in (START, GLOSSARY) and lesson.part == part
 
 
-def _map(part: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
+def _map(part: str, lessons: list[Lesson], _known: list[Timetable]) -> Rows:
     if part not in PARTS:
         raise ValueError(f'The map has no part {part!r}. Name one of {", ".join(PARTS)}.')
     return [
@@ -158,35 +159,40 @@ def _map(part: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
     ]
 
 
-def _leave_out(_name: str, _old: str, lessons: list[Lesson]) -> list[list[str]]:
+def _leave_out(_name: str, lessons: list[Lesson], _known: list[Timetable]) -> Rows:
     rows = [
         [lesson.number, without_links(lesson.leave_out)] for lesson in lessons if lesson.leave_out
     ]
     return [['lesson', ''], *rows]
 
 
-def _timetable(_name: str, old: str, lessons: list[Lesson]) -> list[list[str]]:
-    by_path = {f'notebooks/{lesson.file}': lesson for lesson in lessons}
+def _timetable(title: str, lessons: list[Lesson], known: list[Timetable]) -> Rows:
+    found = [timetable for timetable in known if timetable.title == title]
+    if not found:
+        names = ', '.join(timetable.title for timetable in known)
+        raise ValueError(f'{timetables.FILE} has no timetable {title!r}. Name one of {names}.')
     at, table = 0, [['from', 'minutes', '']]
-    for minutes, event in ROW.findall(old):
-        if link := LINK.match(event):
-            _, path, first, last = link.groups()
-            if path not in by_path:
-                raise ValueError(f'A timetable names {path}, which is not there.')
-            steps = (int(first), int(last or first)) if first else None
-            minutes = by_path[path].minutes_of(steps)
-            title = f'{by_path[path].number} {by_path[path].title}'
-            event = f'[{title}]{event[event.index("](") + 1 :]}'
+    for row in found[0].rows:
+        minutes, lesson = minutes_and_lesson(row, lessons)
+        event = _link_to(lesson, row.steps) if lesson else row.text
         table.append([_time(at), str(minutes), event])
-        at += int(minutes or 0)
+        at += minutes
     return [*table, [_time(at), '', 'End']]
+
+
+def _link_to(lesson: Lesson, steps: tuple[int, int] | None) -> str:
+    link = f'[{lesson.number} {lesson.title}](notebooks/{lesson.file})'
+    if steps is None:
+        return link
+    first, last = steps
+    return f'{link}, step {first}' if first == last else f'{link}, steps {first} to {last}'
 
 
 def _time(minutes: int) -> str:
     return f'{minutes // 60}:{minutes % 60:02d}'
 
 
-TABLES: dict[str, Callable[[str, str, list[Lesson]], list[list[str]]]] = {
+TABLES: dict[str, Callable[[str, list[Lesson], list[Timetable]], Rows]] = {
     'lessons': _readme,
     'map': _map,
     'what to leave out': _leave_out,
