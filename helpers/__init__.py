@@ -15,6 +15,7 @@ it. A package imports only from those that stand above it in this list:
     fusion      one pose from several imperfect sensors
     faults      somebody else's robots, each with a fault that one finds and mends
     checks      guesses and tasks: what is right, what the student's code did, and a hint
+    kernel      what each kernel of this environment gets when it starts
 
 tests/test_doors.py reads the list, and checks the imports.
 """
