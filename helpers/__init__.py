@@ -12,10 +12,11 @@ it. A package imports only from those that stand above it in this list:
     robot_view  how one sees the robot, and drives it by hand
     plots       pictures of recorded and of predicted runs, of graphs and of drives
     workspace   a colcon workspace for a notebook, and processes that end
-    fusion      one pose from several imperfect sensors
+    fusion      one pose from several imperfect sensors; its nodes also run as programs
     faults      somebody else's robots, each with a fault that one finds and mends
     checks      guesses and tasks: what is right, what the student's code did, and a hint
     kernel      what each kernel of this environment gets when it starts
 
-tests/test_doors.py reads the list, and checks the imports.
+tests/test_doors.py reads the list, and checks the imports. tests/test_light_imports.py says what
+the packages that run as programs must not load.
 """
