@@ -22,8 +22,7 @@ from support.runs import (
 )
 from support.waits import wait_for
 
-from helpers.notebook.values import RUN_COLUMNS, check_table
-from helpers.recording import Recording
+from helpers.recording import RUN_COLUMNS, Recording, check_table
 from helpers.recording.queue_model import ALLOWED_REST, explain, predict
 from helpers.ros import ros_session
 

@@ -364,7 +364,7 @@ def test_an_interrupt_outside_of_a_cell_prints_nothing_more():
 
 def test_a_check_before_its_task_says_what_to_run():
     with Kernel() as kernel:
-        kernel.run(f'%load_ext helpers.notebook.kernel\nimport helpers.ros.session{LESSON}')
+        kernel.run(f'%load_ext helpers.kernel\nimport helpers.ros.session{LESSON}')
         assert 'two is not there yet: run the cell of the task above' in kernel.run(CHECK)
         assert 'not there yet' not in kernel.run('print(two)')
 

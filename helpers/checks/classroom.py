@@ -309,7 +309,7 @@ def _tell(kind: str, **what: object) -> None:
         return
     with suppress(Exception):  # a value that no class can show; no lesson may fail because of it
         if 'value' in what:
-            what['value'] = small(what['value'])
+            what['value'] = to_json(what['value'])
         _outbox.put({'id': secrets.token_hex(8), 'kind': kind, 'lesson': lesson, **what})
 
 
@@ -410,7 +410,7 @@ def _ask(known: Class, what: str, body: object) -> dict:
         raise OSError(str(problem)) from None
 
 
-def small(value: object, inside: bool = False) -> object:
+def to_json(value: object, inside: bool = False) -> object:
     """Return a value as JSON holds it. Raises TypeError for one that a page could not show."""
     value = value.tolist() if hasattr(value, 'tolist') else value
     if isinstance(value, Set):
@@ -422,7 +422,7 @@ def small(value: object, inside: bool = False) -> object:
     ):
         return value
     if not inside and isinstance(value, list | tuple | range) and len(value) <= ITEMS:
-        return [small(item, inside=True) for item in value]
+        return [to_json(item, inside=True) for item in value]
     raise TypeError
 
 

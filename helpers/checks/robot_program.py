@@ -33,8 +33,8 @@ from helpers.robot import (
     TURTLEBOT3,
     Floor,
     Robot,
-    watch,
 )
+from helpers.robot_view import watch
 from helpers.ros import ros_session
 from helpers.workspace import without_folders
 

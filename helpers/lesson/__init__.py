@@ -54,6 +54,7 @@ from helpers.lesson.files import (
     read,
 )
 from helpers.lesson.lesson import (
+    CHECK_BEGINS,
     FOLDED,
     GLOSSARY,
     NOTE,
@@ -89,6 +90,7 @@ from helpers.lesson.mentions import (
 )
 
 __all__ = [
+    'CHECK_BEGINS',
     'FOLDED',
     'FOLDER',
     'GLOSSARY',

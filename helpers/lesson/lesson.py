@@ -16,6 +16,7 @@ PARTS = ('nodes', 'packages', 'robot')
 NOTE = 'For the instructor'
 TASK = ('exercise', 'check', 'solution')  # the tags of the cells of a task, in their order
 MAGIC = '%%solution '
+CHECK_BEGINS = 'check('
 FOLDED = {'solution': MAGIC, 'notes': NOTE}  # what folded cells begin with, by their tag
 WRITTEN = {'exercise', 'predict'}  # the tags of the cells in which a student writes
 TAGS = {'predict', 'nbval-ignore-output', 'deck-break', *TASK, *FOLDED}
@@ -71,7 +72,7 @@ def check_call(source: str) -> tuple[str, list[str]] | None:
 
     None if a cell calls no check with a name, also if it is no Python.
     """
-    if 'check(' not in source:
+    if CHECK_BEGINS not in source:
         return None
     try:
         tree = ast.parse(source)
@@ -86,7 +87,7 @@ def check_call(source: str) -> tuple[str, list[str]] | None:
 
 def is_check(cell: Node) -> bool:
     """Return whether a cell is a check, also in a notebook without tags, or of version 0.3."""
-    return cell.cell_type == 'code' and cell.source.startswith('check(')
+    return cell.cell_type == 'code' and cell.source.startswith(CHECK_BEGINS)
 
 
 def is_solution(cell: Node) -> bool:

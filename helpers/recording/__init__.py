@@ -2,13 +2,17 @@
 
 from helpers.recording.queue_model import explain, predict, take_bounds
 from helpers.recording.recording import Call, CallbackRecording, CallbackRun, Recording
+from helpers.recording.table import RUN_COLUMNS, check_table, thread_order
 
 __all__ = [
+    'RUN_COLUMNS',
     'Call',
     'CallbackRecording',
     'CallbackRun',
     'Recording',
+    'check_table',
     'explain',
     'predict',
     'take_bounds',
+    'thread_order',
 ]

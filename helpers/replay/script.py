@@ -1,6 +1,6 @@
 """The scripts and styles of this folder, as a page gets them, or Python runs them.
 
-A file of another room, such as the drive of the robot, is given as its path.
+A file of another package, such as the drive of the robot, is given as its path.
 """
 
 import json

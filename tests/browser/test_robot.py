@@ -6,7 +6,8 @@ from support.lab_page import complaints
 
 from tools.lessons.clean import NOTEBOOK_METADATA
 
-IMPORTS = """from helpers.robot import ROOMS, Robot, drive_by_hand, watch
+IMPORTS = """from helpers.robot import ROOMS, Robot
+from helpers.robot_view import drive_by_hand, watch
 from helpers.ros import ros_session"""
 BY_HAND = """with ros_session():
     robot = Robot(ROOMS)

@@ -10,7 +10,8 @@ from PIL import Image
 
 from helpers.fusion import fuse, simulate
 from helpers.lesson import Lesson
-from helpers.robot import ROOMS, Robot, replay_drive
+from helpers.robot import ROOMS, Robot
+from helpers.robot_view import replay_drive
 from helpers.ros import ros_session
 from tools.lessons.first_pictures.look import (
     PLAYS_S,
