@@ -324,6 +324,22 @@ def test_a_helper_of_a_helper_counts(lesson, capsys):
     assert 'picture: helpers/recording has changed' in again(lesson, capsys)[0]
 
 
+@pytest.mark.parametrize(
+    'line',
+    [
+        'import helpers.plots',
+        'from helpers.plots.runs import latency',
+        'from helpers import plots  # a picture',
+        'from helpers import (\n    replay,\n    plots as drawn,\n)',
+        '%%solution 1\nfrom helpers import plots',
+    ],
+)
+def test_each_form_of_an_import_counts(line, tmp_path):
+    (tmp_path / 'helpers' / 'plots').mkdir(parents=True)
+    notebook = new_notebook(cells=[new_code_cell(line)])
+    assert 'helpers/plots' in outputs.made_from(notebook, tmp_path)
+
+
 def test_what_gives_texts_only_changes_no_picture(lesson, capsys):
     command = lesson.parents[1] / 'ros2' / 'ros2_command'
     command.mkdir(parents=True)

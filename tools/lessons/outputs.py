@@ -42,6 +42,7 @@ RUN_AND_DRAW = {
     *('ros-fastrtps', 'ros-rcl', 'ros-rclpy', 'ros-rmw-fastrtps-cpp'),
 }
 IMPORT = re.compile(r'^\s*(?:from|import) helpers\.(\w+)', re.MULTILINE)
+IMPORTS = re.compile(r'^\s*from helpers import (\([^)]*\)|[^\n#]*)', re.MULTILINE)
 JUDGES = re.compile(r'\bhelpers\.checks\.lessons\.(\w+)')
 VERSION = re.compile(r'^([\w.-]+)==(\S+)', re.MULTILINE)
 Digests = dict[str, str]
@@ -156,8 +157,9 @@ def keep(new: NotebookNode, old: NotebookNode, now: Digests) -> Iterator[str]:
         elif not is_equal:
             yield f'new outputs of {called(cell)}: text'
         elif _without_counts(cell) != _without_counts(before):
+            kind = 'picture' if any('data' in output for output in cell.outputs) else 'log'
             why = _why(parts, cells[same] if place >= same else None, old, now)
-            yield f'new outputs of {called(cell)}: picture: {why}'
+            yield f'new outputs of {called(cell)}: {kind}: {why}'
 
 
 def _why(parts: list[str], first: NotebookNode | None, old: NotebookNode, now: Digests) -> str:
@@ -190,13 +192,13 @@ def _helpers(cells: list[NotebookNode], root: Path) -> Digests:
     found: set[str] = set()
     # What the judges import counts, because lessons take from them more than `check`. What the rest
     # of helpers/checks imports makes no output.
-    wanted = {*IMPORT.findall('\n'.join([code, *(judge.read_text('utf-8') for judge in judges)]))}
+    wanted = _imported('\n'.join([code, *(judge.read_text('utf-8') for judge in judges)]))
     while wanted:
         name = wanted.pop()
         found.add(name)
         if name != checks.name:
             files = (root / 'helpers' / name).rglob('*.py')
-            wanted |= {*IMPORT.findall('\n'.join(f.read_text('utf-8') for f in files))} - found
+            wanted |= _imported('\n'.join(f.read_text('utf-8') for f in files)) - found
     digests = {
         f'helpers/{name}': _digest_of_files(_files(folder))
         for name in sorted(found - {checks.name})
@@ -208,6 +210,11 @@ def _helpers(cells: list[NotebookNode], root: Path) -> Digests:
     if (command := root / 'ros2' / 'ros2_command').is_dir():
         digests[COMMAND] = _digest_of_files(_files(command))
     return digests
+
+
+def _imported(code: str) -> set[str]:
+    """Return the packages of helpers that a text imports, which may be a cell with a magic."""
+    return {*IMPORT.findall(code), *re.findall(r'\w+', ' '.join(IMPORTS.findall(code)))}
 
 
 def _versions(root: Path) -> Digests:
