@@ -52,8 +52,8 @@ test: set_up ## test the course, each notebook against its saved outputs: LESSON
 		.venv/bin/ruff check --config "$$answers" && .venv/bin/ruff format --check --config "$$answers"
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(lesson) $(PYTEST_ARGS)
 
-notebooks: set_up ## run the notebooks, save their outputs, and the tables and pictures that follow: LESSON=02 for one
-	@$(PYTHON) -m tools.lessons.run $(LESSON)
+notebooks: set_up ## run the notebooks whose code has changed, save outputs, tables, pictures: LESSON=02 for one, RUN=yes (new)
+	@$(PYTHON) -m tools.lessons.run $(LESSON) $(if $(RUN),--run "$(RUN)")
 	@$(PYTHON) -m tools.lessons.first_pictures
 
 lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04; REMOVE=yes takes it out
