@@ -75,7 +75,7 @@ test-packages: set_up ## build and test the packages that learners end with: LES
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/packages $(lesson) $(PYTEST_ARGS)
 
 test-answers: set_up ## let each check judge the answers in tests/answers: LESSON=02, TASK=3
-	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(if $(TASK),-k "$(shell printf task_%02d $(TASK))") $(PYTEST_ARGS)
+	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) tests/answers $(lesson) $(if $(TASK),-k "$(shell printf task_%02d $(TASK))") $(PYTEST_ARGS)
 
 test-browser: ## test JupyterLab and the site in Chromium
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
