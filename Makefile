@@ -92,9 +92,8 @@ test-hub: set_up ## test a hub and a container with a class of twelve
 soak: set_up ## run the notebooks in hard conditions, as root: CONDITIONS="idle busy", LESSON=02
 	@tests/soak/run.sh "$(CONDITIONS)" "$(LESSON)"
 
-bench: set_up ## measure what things cost, on an idle machine: ONLY="20 200" for some rates
-	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks $(ONLY)
-	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks.start
+bench: set_up ## measure what the first start costs, on an idle machine: ROUNDS=3
+	@$(PYTHON) tests/benchmarks/start.py $(ROUNDS)
 
 lock: ## write tools/locks from pyproject.toml: UPGRADE=yes takes newer versions
 	@tools/lock.sh $(if $(filter yes,$(UPGRADE)),--upgrade)
