@@ -75,7 +75,7 @@ test-packages: set_up ## build and test the packages that learners end with: LES
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/packages $(lesson) $(PYTEST_ARGS)
 
 test-answers: set_up ## let each check judge the answers in tests/answers: LESSON=02, TASK=3
-	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(if $(TASK),--task "$(TASK)") $(PYTEST_ARGS)
+	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) tests/answers $(lesson) $(if $(TASK),--task "$(TASK)") $(PYTEST_ARGS)
 
 test-browser: ## test JupyterLab and the site in Chromium
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
@@ -92,9 +92,8 @@ test-hub: set_up ## test a hub and a container with a class of twelve
 soak: set_up ## run the notebooks in hard conditions, as root: CONDITIONS="idle busy", LESSON=02
 	@tests/soak/run.sh "$(CONDITIONS)" "$(LESSON)"
 
-bench: set_up ## measure what things cost, on an idle machine: ONLY="20 200" for some rates
-	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks $(ONLY)
-	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks.start
+bench: set_up ## measure what the first start costs, on an idle machine: ROUNDS=3
+	@$(PYTHON) tests/benchmarks/start.py $(ROUNDS)
 
 lock: ## write tools/locks from pyproject.toml: UPGRADE=yes takes newer versions
 	@tools/lock.sh $(if $(filter yes,$(UPGRADE)),--upgrade)

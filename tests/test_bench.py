@@ -144,7 +144,9 @@ def test_a_constant_that_the_code_reads_gets_another_value(monkeypatch):
 # --- What a verdict says of mistakes
 
 
-def verdict_on(make_node, capsys, act=lambda bench: bench.say('number', *numbers(1))):
+def verdict_on(
+    make_node, capsys, act=lambda bench: bench.say('number', *numbers(1)), points=('it works',)
+):
     tasks = Tasks()
 
     @tasks.add
@@ -155,7 +157,7 @@ def verdict_on(make_node, capsys, act=lambda bench: bench.say('number', *numbers
                 act(bench)
             return True
 
-        return [('it works', judged, '')]
+        return [(point, judged, '') for point in points]
 
     tasks.check('task', make_node)
     return ' '.join(capsys.readouterr().out.split())
@@ -218,20 +220,8 @@ def test_a_mistake_in_a_callback_is_named_with_its_line(callback, found, capsys)
 
 
 def test_after_a_callback_that_never_ends_no_other_point_is_tried(capsys):
-    tasks = Tasks()
-
-    @tasks.add
-    def task(answer):
-        def judged():
-            with Bench() as bench:
-                bench.spin(answer())
-                bench.say('number', *numbers(1))
-            return True
-
-        return [('it works', judged, ''), ('again', judged, '')]
-
-    tasks.check('task', node_with(loops))
-    assert 'not tried, because the one above did not end' in capsys.readouterr().out
+    said = verdict_on(node_with(loops), capsys, points=('it works', 'again'))
+    assert 'not tried, because the one above did not end' in said
 
 
 def holds_until_the_gate_opens(gate):

@@ -156,6 +156,8 @@ def test_a_file_that_does_not_say_all_is_named(tmp_path):
         read(tmp_path)
     with pytest.raises(ValueError, match='has .b. 0 times, not once'):
         edited('a', {'b': 'c'}, 'a file')
+    with pytest.raises(ValueError, match='has .b. 2 times, not once'):
+        edited('b a b', {'b': 'c'}, 'a file')
 
 
 def test_the_healthy_package_drives_and_its_tests_pass(workspace):

@@ -394,3 +394,33 @@ def test_a_name_that_the_students_code_does_not_know_is_one_sentence():
     except NameError as error:
         said = sentence(error)
     assert said.startswith("NameError: name 'distance' is not defined. Is it defined in the cell")
+
+
+class Listener:
+    def on_text(self, message):
+        pass
+
+
+# As in create_subscription(String, 'topic', self.on_text(), 10): it hands over None.
+HANDED_OVER = Listener().on_text('a')
+
+
+@pytest.mark.parametrize(
+    ('call', 'said'),
+    [
+        (
+            lambda: HANDED_OVER('a'),
+            "TypeError: 'NoneType' object is not callable. Are there () after the name of a "
+            'callback that is only handed over? ',
+        ),
+        (
+            lambda: Listener.on_text('a'),
+            "TypeError: Listener.on_text() missing 1 required positional argument: 'message'. Did "
+            'you forget () after a class, or write () after a callback? ',
+        ),
+    ],
+)
+def test_parentheses_too_many_or_too_few_are_a_hint(call, said):
+    with pytest.raises(TypeError) as error:
+        call()
+    assert sentence(error.value).startswith(said)

@@ -10,7 +10,7 @@ from html import escape
 from pathlib import Path
 
 # Not from `quickjs`: importing that starts a thread, which stays in the kernel.
-from _quickjs import Context
+from _quickjs import Context  # private: quickjs-ng, quickjs-ng 0.17.0
 from rjsmin import jsmin
 
 from helpers.notebook import LOOK, LOOK_CSS
