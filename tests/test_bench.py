@@ -14,7 +14,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
-from helpers.checks.bench import Bench, let, must_define, must_have
+from helpers.checks.bench import Bench, must_define, must_have, override
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks
 
@@ -137,7 +137,7 @@ def period():
 
 def test_a_constant_that_the_code_reads_gets_another_value(monkeypatch):
     monkeypatch.setitem(globals(), 'PERIOD_S', PERIOD_S)
-    let(period, PERIOD_S=0.1)
+    override(period, PERIOD_S=0.1)
     assert period() == 0.1
 
 

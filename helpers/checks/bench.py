@@ -6,10 +6,9 @@
         bench.wait(lambda: len(speeds) >= 3)
     return [twist.linear.x for twist in speeds[:3]] == [0.5] * 3 or f'it published {speeds}'
 
-A bench is a `ros_session` with a tester in it. It belongs into the test of a point (see tasks.py),
-which runs in a process apart. What the student's callbacks raise is raised by `wait`, `quiet`,
-`call` and at the end of the `with` block. Waiting itself raises nothing: `wait` says whether it
-came.
+A bench is a `ros_session` with a tester in it. It belongs into the test of a point (see points.py),
+which runs in a sandbox. What the student's callbacks raise is raised by `wait`, `quiet`, `call` and
+at the end of the `with` block. Waiting itself raises nothing: `wait` says whether it came.
 """
 
 from __future__ import annotations
@@ -295,11 +294,11 @@ def must_define(a_class: type, *methods: str) -> None:
             raise Failed(f'the class has no {method} yet')
 
 
-def let(written: type | Callable, **constants: object) -> None:
-    """Give constants that the student's code reads another value: `let(Driver, PERIOD_S=0.1)`.
+def override(written: type | Callable, **constants: object) -> None:
+    """Give constants that the student's code reads another value.
 
-    They are those of the notebook in which the class or function was written. The process ends with
-    the check, and with it what was changed.
+    `override(Driver, PERIOD_S=0.1)`. They are those of the notebook in which the class or function
+    was written. The process ends with the check, and with it what was changed.
     """
     vars(sys.modules[written.__module__]).update(constants)
 

@@ -13,8 +13,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from helpers.checks.bench import RELIABLE, Bench
+from helpers.checks.points import cached
 from helpers.checks.programs import TRACEBACK, error_in, wait_until
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 from helpers.robot import EMPTY, Robot
 from helpers.ros import ros_session
 
@@ -141,7 +142,7 @@ def drive_a_square(Square):
         path = [(pose.x - 5, pose.y - 5) for pose in robot.record.poses]
         return path, commands, timers, running
 
-    small, large = once(lambda: drive(0.6)), once(lambda: drive(1.0))
+    small, large = cached(lambda: drive(0.6)), cached(lambda: drive(1.0))
 
     def corners(path, side):
         for corner in (side, 0), (side, side), (0, side), (0, 0):

@@ -19,8 +19,9 @@ from urdf_parser_py.urdf import URDF
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build
 from helpers.checks.errors import Failed
+from helpers.checks.points import cached
 from helpers.checks.programs import DIED, error_of_launch, started
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 from helpers.fusion import VARIANCES, localize
 from helpers.ros import quaternion, seconds_of, stamp_of, yaw_of
 from helpers.workspace import without_folders
@@ -50,7 +51,7 @@ ARM = """<robot name="arm">
 
 @tasks.add(1)
 def three_sensors(workspace, file):
-    description = once(lambda: described(workspace, file))
+    description = cached(lambda: described(workspace, file))
 
     def has_one_root():
         root = description().get_root()
@@ -111,7 +112,7 @@ def parsed(text):
 
 @tasks.add(2)
 def a_message_for_each_joint(workspace, static_transforms):
-    arm = once(lambda: parsed(ARM))
+    arm = cached(lambda: parsed(ARM))
 
     def transforms_of(robot):
         return {transform.child_frame_id: transform for transform in static_transforms(robot)}
@@ -227,7 +228,7 @@ def from_a_frame_to_its_parent(to_parent):
 
 @tasks.add(5, limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
 def fix_three_faults(workspace, settings, StaticBroadcaster):
-    drive = once(lambda: drive_by(workspace, StaticBroadcaster, settings, seconds=6))
+    drive = cached(lambda: drive_by(workspace, StaticBroadcaster, settings, seconds=6))
 
     def uses(name, sensor, *parts):
         if sensor not in drive().parts[name]:
@@ -544,7 +545,7 @@ def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
 
 @tasks.add(9, limit_s=150)
 def two_filters(workspace, file):
-    @once
+    @cached
     def seen():
         """Return who publishes and receives what, of which type of frame, when all runs."""
         build(workspace, 'small_robot')

@@ -14,8 +14,9 @@ from sensor_msgs.msg import LaserScan
 from helpers.checks.bench import Bench
 from helpers.checks.builds import compile_error, why_it_failed
 from helpers.checks.errors import Failed
+from helpers.checks.points import cached
 from helpers.checks.programs import manifest
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
 check = tasks.check
@@ -62,7 +63,7 @@ class Program:
         self._workspace = workspace
         program = PROGRAM.replace('HEADER', header).replace('CALL', call)
         self._text, self._source = program, source
-        self.error = once(self._compile)
+        self.error = cached(self._compile)
 
     def _compile(self):
         """Return the first error of the compiler, or ''."""
@@ -217,7 +218,7 @@ def printed_by(workspace, package, executable):
 
 @tasks.add(3, limit_s=BUILD_S)
 def make_the_library(workspace, library):
-    @once
+    @cached
     def built():
         for file, text in USER.items():
             workspace.write(f'src/try_library/{file}', text)
@@ -249,7 +250,7 @@ def make_the_library(workspace, library):
 
 @tasks.add(4, limit_s=BUILD_S)
 def link_the_library(workspace, library):
-    built = once(lambda: result_of(workspace, 'scan_tools', 'look', library=library + GIVEN))
+    built = cached(lambda: result_of(workspace, 'scan_tools', 'look', library=library + GIVEN))
 
     def library_is_first():
         order = workspace.terminal('colcon list -t --names-only').split()
@@ -291,7 +292,7 @@ def link_the_library(workspace, library):
 
 @tasks.add(5, limit_s=BUILD_S)
 def give_it_to_others(workspace):
-    built = once(lambda: result_of(workspace, 'scan_tools', 'look'))
+    built = cached(lambda: result_of(workspace, 'scan_tools', 'look'))
 
     def headers_are_installed():
         include = workspace.path / 'install/scan_tools/include'
@@ -322,7 +323,7 @@ print(m.search(4.0))"""
 
 @tasks.add(6, limit_s=BUILD_S)
 def bind(workspace):
-    @once
+    @cached
     def compiled():
         include = f'-I {sysconfig.get_path("include")} -I {sys.prefix}/include'
         output = workspace.terminal(f"""
@@ -362,7 +363,7 @@ def bind(workspace):
 
 @tasks.add(7)
 def name_what_it_needs(workspace):
-    package = once(lambda: manifest(workspace, 'src/scan_tools_py'))
+    package = cached(lambda: manifest(workspace, 'src/scan_tools_py'))
 
     def needs(kind, *right):
         found = sorted(depend.name for depend in getattr(package(), f'{kind}_depends'))
@@ -393,7 +394,7 @@ def imports_the_module(workspace):
 @tasks.add(8, limit_s=BUILD_S)
 def make_the_module(workspace, library):
     shared = re.sub('find_package', 'set(BUILD_SHARED_LIBS ON)\n\\g<0>', library, count=1)
-    built = once(
+    built = cached(
         lambda: result_of(workspace, 'scan_tools', 'scan_tools_py', library=shared + GIVEN)
     )
 
@@ -409,7 +410,7 @@ def make_the_module(workspace, library):
 
 @tasks.add(9, limit_s=BUILD_S)
 def fix_it(workspace):
-    built = once(lambda: result_of(workspace, 'scan_tools', 'look', 'scan_tools_py'))
+    built = cached(lambda: result_of(workspace, 'scan_tools', 'look', 'scan_tools_py'))
 
     def is_imported():
         return imports_the_module(workspace) if built() is True else NOT_BUILT
