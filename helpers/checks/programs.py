@@ -1,26 +1,21 @@
-"""What the checks of programs share: run them, and say exactly what went wrong.
+"""What the checks of packages, programs and launches share: read them, run them, and end them.
 
-A program or a launch says a lot when it fails. These functions find the first error in it: its
-file, its line, its text. builds.py does it for builds.
+first_error.py finds the first error in what they print.
 """
 
 from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 
 from catkin_pkg.package import InvalidPackage, Package, parse_package
 
-from helpers.checks.errors import Failed, is_students
+from helpers.checks.errors import Failed
+from helpers.checks.first_error import error_in
 from helpers.workspace import DIED, Process, Workspace, without_folders
 
 POLL_S = 0.02
-TRACEBACK = 'Traceback (most recent call last)'
-FRAME = re.compile(r'\s*File "(.*?)", line (\d+)')
-CHAINED = re.compile(r'During handling of|The above exception')
-OF_A_PROGRAM = re.compile(r'\[[^\]\s]+-\d+\] ')  # what launch writes before a program's lines
 
 
 # --- Packages
@@ -88,38 +83,6 @@ def line_of(process: Process, text: str, limit_s: float = 20.0) -> str:
         raise Failed(str(error)) from None
 
 
-def error_in(lines: Sequence[str]) -> str:
-    """Return the first error of a program: exception, text, and the line of the workspace.
-
-    Of a program without a traceback it is the last line, or 'it printed nothing'. Lines of a launch
-    may have the name of their program in front.
-    """
-    start = next((number for number, line in enumerate(lines) if TRACEBACK in line), None)
-    if start is None:
-        said = [line.strip() for line in lines if line.strip()]
-        return said[-1] if said else 'it printed nothing'
-    program = OF_A_PROGRAM.match(lines[start])
-    prefix = program[0] if program else ''
-    own = [line.removeprefix(prefix) for line in lines[start:] if line.startswith(prefix)]
-    said, place, inside, chained = '', '', False, True
-    for number, line in enumerate(own):
-        if TRACEBACK in line:
-            if not chained:
-                break
-            inside, place = True, ''
-        elif CHAINED.match(line):
-            chained = True
-        elif inside and (frame := FRAME.match(line)):
-            if _is_own(frame[1]):
-                code = own[number + 1].strip() if number + 1 < len(own) else ''
-                place = f'Line {frame[2]} of {Path(frame[1]).name}: {code}'
-        elif inside and line and not line[0].isspace():
-            said, inside, chained = line, False, False
-    if not said:
-        return place or 'it ends with a traceback'
-    return f'{said}{"" if not place or said[-1] in ".!?" else "."} {place}'.strip()
-
-
 def launch(
     workspace: Workspace, words: str, is_done: Callable[[str], bool], limit_s: float = 40.0
 ) -> str:
@@ -145,25 +108,3 @@ def launch(
 def started(text: str) -> list[str]:
     """Return the programs that a launch says it has started, sorted."""
     return sorted(re.findall(r'\[(\S+)-\d+\]: process started', text))
-
-
-def error_of_launch(text: str) -> str:
-    """Return the first error of a launch or of one of its programs, or nothing if there is none."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    if any(TRACEBACK in line for line in lines):
-        return error_in(lines)
-    if lines and not started(text):
-        return lines[-1]
-    if dead := re.search(rf'\[(\S+-\d+)\]: {DIED}', text):
-        said = [line for line in lines if line.startswith(f'[{dead[1]}] ')]
-        return f'{dead[1]} has died. {said[-1] if said else "It printed nothing"}'
-    return ''
-
-
-def _is_own(file: str) -> bool:
-    """Return whether a file is the learner's: no library, no script that colcon has made."""
-    if re.search(r'/lib/\w+/\w+$', file) or Path(file).name.startswith('.'):
-        return False
-    # What a terminal of the workspace prints has no folders of this machine.
-    in_workspace = re.match(r'(\w+/)?(src|install|build)/', file)
-    return bool(in_workspace) or is_students(file)

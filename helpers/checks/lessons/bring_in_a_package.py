@@ -4,8 +4,9 @@ import math
 import re
 
 from helpers.checks.builds import builds
+from helpers.checks.first_error import error_in
 from helpers.checks.points import cached
-from helpers.checks.programs import error_in, manifest, needed
+from helpers.checks.programs import manifest, needed
 from helpers.checks.tasks import Tasks
 from helpers.workspace import COLLEAGUE
 

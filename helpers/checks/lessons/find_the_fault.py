@@ -7,8 +7,8 @@ from collections import Counter
 
 from helpers.checks import progress
 from helpers.checks.errors import Failed
+from helpers.checks.first_error import error_of_launch
 from helpers.checks.points import cached
-from helpers.checks.programs import error_of_launch
 from helpers.checks.tasks import Tasks
 from helpers.faults import FAULTS, KINDS, OTHER, forget, mend_in_words, take
 from helpers.faults import drive as drive_apart

@@ -6,16 +6,9 @@ import signal
 import time
 
 from helpers.checks.builds import builds
+from helpers.checks.first_error import error_in, error_of_launch
 from helpers.checks.points import cached
-from helpers.checks.programs import (
-    error_in,
-    error_of_launch,
-    launch,
-    manifest,
-    needed,
-    started,
-    wait_until,
-)
+from helpers.checks.programs import launch, manifest, needed, started, wait_until
 from helpers.checks.tasks import Tasks
 
 tasks = Tasks()

@@ -10,16 +10,9 @@ from std_msgs.msg import String
 from helpers.checks.bench import Bench
 from helpers.checks.builds import builds
 from helpers.checks.errors import Failed
+from helpers.checks.first_error import error_in
 from helpers.checks.points import cached
-from helpers.checks.programs import (
-    error_in,
-    line_of,
-    manifest,
-    needed,
-    open_terminal,
-    sourced,
-    wait_until,
-)
+from helpers.checks.programs import line_of, manifest, needed, open_terminal, sourced, wait_until
 from helpers.checks.tasks import Tasks
 
 tasks = Tasks()

@@ -13,8 +13,9 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from helpers.checks.bench import RELIABLE, Bench
+from helpers.checks.first_error import TRACEBACK, error_in
 from helpers.checks.points import cached
-from helpers.checks.programs import TRACEBACK, error_in, wait_until
+from helpers.checks.programs import wait_until
 from helpers.checks.tasks import Tasks
 from helpers.robot import EMPTY, Robot
 from helpers.ros import ros_session

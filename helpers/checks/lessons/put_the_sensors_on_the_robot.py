@@ -19,8 +19,9 @@ from urdf_parser_py.urdf import URDF
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build
 from helpers.checks.errors import Failed
+from helpers.checks.first_error import error_of_launch
 from helpers.checks.points import cached
-from helpers.checks.programs import DIED, error_of_launch, started
+from helpers.checks.programs import DIED, started
 from helpers.checks.tasks import Tasks
 from helpers.fusion import VARIANCES, localize
 from helpers.ros import quaternion, seconds_of, stamp_of, yaw_of

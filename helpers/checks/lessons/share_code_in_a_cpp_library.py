@@ -12,8 +12,9 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 
 from helpers.checks.bench import Bench
-from helpers.checks.builds import compile_error, why_it_failed
+from helpers.checks.builds import why_it_failed
 from helpers.checks.errors import Failed
+from helpers.checks.first_error import compile_error
 from helpers.checks.points import cached
 from helpers.checks.programs import manifest
 from helpers.checks.tasks import Tasks
