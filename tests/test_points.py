@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from helpers.checks.errors import Failed, NeverEnds
-from helpers.checks.points import cached, expect, judge, needs, rows
+from helpers.checks.points import all_of, cached, expect, judge, needs, rows
 
 
 def sent(*points):
@@ -68,6 +68,12 @@ def test_what_is_measured_may_differ_a_little(found, said):
     assert expect(found, 2, 'it drives', within=0.001, unit='m') == said
 
 
+def test_of_several_results_the_first_that_is_not_right_is_said():
+    assert all_of(True, np.bool_(True)) is True
+    assert all_of(True, 'it drives on', 'it turns') == 'it drives on'
+    assert all_of(True, None) is None  # a mistake of the check, which the judge says
+
+
 def test_a_point_can_need_an_earlier_one():
     def built():
         return 'there is no setup.py'
@@ -96,7 +102,8 @@ def test_rows_of_a_table_are_points():
     points = rows(
         lambda number, right=0: expect(number, right, 'it is'),
         'Count them.',
-        {'two are two': (2, 2), 'none is none': 0},
+        ('two are two', 2, 2),
+        ('none is none', 0),
     )
     assert [(what, test(), hint) for what, test, hint in points] == [
         ('two are two', True, 'Count them.'),

@@ -1,9 +1,11 @@
 """What checks say of packages, programs and launches that fail."""
 
+import signal
+
 import pytest
 
 from helpers.checks.errors import Failed
-from helpers.checks.programs import launch, line_of, manifest, started, wait_until
+from helpers.checks.programs import launch, line_of, manifest, run_python, started, wait_until
 from helpers.workspace import Workspace
 
 
@@ -49,3 +51,35 @@ def test_a_launch_is_read_until_it_says_enough_and_its_end_is_no_part(workspace)
 def test_waiting_says_whether_it_came():
     assert wait_until(lambda: True, 0)
     assert not wait_until(lambda: False, 0.1)
+
+
+TALKS = """import signal, sys, time
+print(f'{sys.argv[1]} talks', flush=True)
+try:
+    time.sleep(60)
+except KeyboardInterrupt:
+    if sys.argv[1] == 'red':
+        raise
+"""
+
+
+@pytest.mark.parametrize('team', ['red', 'blue'])
+def test_a_program_talks_until_a_signal_ends_it(workspace, team):
+    workspace.write('src/talker.py', TALKS)
+    with run_python(workspace, 'src/talker.py', team) as talker:
+        assert talker.wait(lambda: talker.says(f'{team} talks'))
+        assert not talker.wait(lambda: False, limit_s=0.1)
+        assert not talker.has_ended(limit_s=0.1)
+        assert talker.end(signal.SIGINT)
+    assert talker.failed == (team == 'red')
+    if talker.failed:
+        assert talker.error == 'KeyboardInterrupt. Line 4 of talker.py: time.sleep(60)'
+
+
+def test_a_program_that_ends_by_itself_says_its_error(workspace):
+    with (
+        run_python(workspace, '-c', 'print("I begin"); int("far")') as program,
+        pytest.raises(Failed, match=r"^the program ended by itself: ValueError: invalid .* 'far'$"),
+    ):
+        program.wait(lambda: False)
+    assert program.exit_code() == 1

@@ -15,9 +15,10 @@ The words of this module, for each judge:
 
     expect(found, right, 'it returns')   True, or 'it returns 3, not 4'
     expect(..., within=0.01, unit='m')   the same for numbers that are measured
+    all_of(expect(...), expect(...))     True, or the first of these texts
     needs(built, 'it is not built')      at the beginning of a test: an earlier point must be right
     cached(function)                     what several points look at is made once
-    rows(test, hint, {what: case, ...})  one point for each case of a table
+    rows(test, hint, (what, 3, 4), ...)  one point for each row of a table, test(3, 4)
 
 Those for nodes are in bench.py, those for programs in programs.py, and those for builds in
 builds.py.
@@ -30,7 +31,7 @@ import math
 import os
 import threading
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial, wraps
 from numbers import Real
 
@@ -66,6 +67,11 @@ def expect(
         return True
     said = _measured(found, within, unit) if is_number else _value(found, '')
     return f'{what} {said}, not {_measured(right, within, unit)}'
+
+
+def all_of(*results: bool | str) -> bool | str:
+    """Return True if all these results are True, or else the first text. Put the cause first."""
+    return next((result for result in results if not _is_true(result)), True)
 
 
 def needs(point: Callable[[], object], otherwise: str = '') -> None:
@@ -106,20 +112,17 @@ def cached(function: Callable[[], object]) -> Callable[[], object]:
     return run
 
 
-def rows(test: Callable, hint: str, cases: Mapping[str, object]) -> list[Test]:
-    """Return a point for each case of a table: what is right, and the arguments of the test.
+def rows(test: Callable, hint: str, *cases: tuple) -> list[Test]:
+    """Return a point for each case of a table: what is right, then the arguments of the test.
 
-        rows(returns, 'math.ceil rounds up.', {
-            '30 messages, 2 threads': (30, 2),
-            'no message': 0,
-        })
-
-    A case that is a tuple gives several arguments, and any other value gives one.
+    return rows(
+        returns,
+        'math.ceil rounds up.',
+        ('30 messages, 2 threads', 30, 2),
+        ('no message', 0, 2),
+    )
     """
-    return [
-        (what, partial(test, *(case if isinstance(case, tuple) else (case,))), hint)
-        for what, case in cases.items()
-    ]
+    return [(what, partial(test, *arguments), hint) for what, *arguments in cases]
 
 
 def _is_equal(found: object, right: object) -> bool:
@@ -197,7 +200,7 @@ def judge(points: Callable[[], Sequence[Test]], send: Callable) -> None:
 def _result(test: Callable[[], object]) -> bool | str:
     """Call a test, and return True or its text. Raises WrongCheckError if it returns neither."""
     result = test()
-    if isinstance(result, bool | np.bool_) and result:
+    if _is_true(result):
         return True
     if isinstance(result, str) and result:
         return result
@@ -205,6 +208,10 @@ def _result(test: Callable[[], object]) -> bool | str:
         f'the test{_place_of_test(test)} returns {_value(result, "")}, and it must return True or '
         'a text that says what was found'
     )
+
+
+def _is_true(result: object) -> bool:
+    return isinstance(result, bool | np.bool_) and bool(result)
 
 
 def _place_of_test(test: Callable) -> str:
