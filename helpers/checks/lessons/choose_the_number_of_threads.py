@@ -78,9 +78,10 @@ def numbers(count):
 @tasks.add(2)
 def the_law(heard_after_burst):
     def law_holds(threads, group, in_flight, depth, more):
+        answer = heard_after_burst(in_flight, depth, more)
         heard = hear_burst(threads, group(), in_flight, depth, more)
-        case = f'in flight {in_flight}, depth {depth}, {more} more'
-        return expect(heard_after_burst(in_flight, depth, more), heard, f'{case}: it returns')
+        case = f'in flight {in_flight}, depth {depth}, {more} more: {heard} were received'
+        return expect(answer, heard, f'{case}, and your function returns')
 
     hint = 'The queue keeps at most depth messages, and not more than come.'
     exclusive, reentrant = MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
