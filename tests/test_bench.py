@@ -5,6 +5,7 @@ import time
 
 import pytest
 import rclpy
+from builtin_interfaces.msg import Time
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import SingleThreadedExecutor
@@ -14,7 +15,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
-from helpers.checks.bench import Bench, let, must_define, must_have
+from helpers.checks.bench import Bench, must_define, must_have, override, scan
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks
 
@@ -102,6 +103,33 @@ def test_goals_are_sent_and_cancelled():
             bench.send_goal('other', Fibonacci, Fibonacci.Goal(), limit_s=0.2)
 
 
+def test_a_gate_holds_callbacks_until_it_opens_or_the_bench_ends():
+    with Bench() as bench:
+        gate, node = bench.gate(), Node('gated')
+        node.create_subscription(Int32, 'number', gate.hold, 10)
+        bench.spin(node)
+        assert not gate.wait_until_entered(limit_s=0.1)
+        bench.say('number', *numbers(1, 2), at_once=True)
+        assert gate.wait_until_entered()
+        assert [message.data for message in gate.entered] == [1]
+        gate.open()
+        assert gate.wait_until_entered(2)
+        held = threading.Thread(target=bench.gate().hold)
+        held.start()
+    held.join(1)
+    assert not held.is_alive()
+
+
+def test_a_scan_is_that_of_the_simulated_robot_unless_it_is_told():
+    message = scan(0.5, age_s=3600)
+    assert list(message.ranges) == [0.5] * 181
+    assert (round(message.angle_min, 2), round(message.angle_max, 2)) == (-1.57, 1.57)
+    assert 3590 < time.time() - message.header.stamp.sec < 3610
+    other = scan([1.0, 2.0], first=0.0, step=0.1, limits=(0.2, 3.5), stamp=Time(sec=7))
+    assert (list(other.ranges), round(other.angle_max, 3)) == ([1.0, 2.0], 0.1)
+    assert (round(other.range_min, 3), other.range_max, other.header.stamp.sec) == (0.2, 3.5, 7)
+
+
 def test_simulated_time_goes_on_only_when_it_is_told():
     ticks = []
     with Bench() as bench:
@@ -137,7 +165,7 @@ def period():
 
 def test_a_constant_that_the_code_reads_gets_another_value(monkeypatch):
     monkeypatch.setitem(globals(), 'PERIOD_S', PERIOD_S)
-    let(period, PERIOD_S=0.1)
+    override(period, PERIOD_S=0.1)
     assert period() == 0.1
 
 

@@ -18,6 +18,7 @@ BELOW = {
     'helpers.checks.progress',  # which tasks are solved: lesson 00 and the tools ask
     'helpers.checks.tasks',  # what a lesson of one's own needs, and slow to load
     'helpers.checks.bench',
+    'helpers.checks.points',
     'helpers.checks.verdict',  # the data of a verdict, which the rules and the tests read
     'helpers.machine.doctor',  # a program, which runs where no ROS is
 }

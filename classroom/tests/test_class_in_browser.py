@@ -22,8 +22,8 @@ TASK = """
 from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
-tasks.add(lambda: [('it is so', lambda: True, '')], name='try_it')
-tasks.check(1)
+tasks.add(lambda: [('it is so', lambda: True, '')], name='publish_numbers')
+tasks.check('publish_numbers')
 raise_hand()
 """
 

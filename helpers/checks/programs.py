@@ -1,26 +1,35 @@
-"""What the checks of programs share: run them, and say exactly what went wrong.
+"""What the checks of packages, programs and launches share: read them, run them, and end them.
 
-A program or a launch says a lot when it fails. These functions find the first error in it: its
-file, its line, its text. builds.py does it for builds.
+The words of a judge for a program:
+
+    with run_python(workspace, 'talker.py', 'red') as talker:   or Program(workspace.start(...))
+        talker.wait(lambda: len(heard) >= 2)    whether; raises Failed if the program ends meanwhile
+        talker.says('red talks')                whether a line has this text
+        talker.end(signal.SIGTERM)              whether the signal ends it
+    talker.failed, talker.error                 whether it printed a traceback; its first error
+
+`launch` runs a launch file, and `started` are its programs. `manifest` and `needed` read a
+package.xml. first_error.py finds the first error in what all of these print.
 """
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
+import signal
+import sys
 import time
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 
 from catkin_pkg.package import InvalidPackage, Package, parse_package
 
-from helpers.checks.errors import Failed, is_students
+from helpers.checks.errors import Failed
+from helpers.checks.first_error import TRACEBACK, error_in
 from helpers.workspace import DIED, Process, Workspace, without_folders
 
 POLL_S = 0.02
-TRACEBACK = 'Traceback (most recent call last)'
-FRAME = re.compile(r'\s*File "(.*?)", line (\d+)')
-CHAINED = re.compile(r'During handling of|The above exception')
-OF_A_PROGRAM = re.compile(r'\[[^\]\s]+-\d+\] ')  # what launch writes before a program's lines
+PROGRAM_S = 8.0  # for a program to start, to say something, to end
 
 
 # --- Packages
@@ -88,36 +97,77 @@ def line_of(process: Process, text: str, limit_s: float = 20.0) -> str:
         raise Failed(str(error)) from None
 
 
-def error_in(lines: Sequence[str]) -> str:
-    """Return the first error of a program: exception, text, and the line of the workspace.
+class Program:
+    """A program of the student that runs. It ends with its `with` block at the latest."""
 
-    Of a program without a traceback it is the last line, or 'it printed nothing'. Lines of a launch
-    may have the name of their program in front.
+    def __init__(self, process: Process) -> None:
+        self._process = process
+
+    def __enter__(self) -> Program:
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self._process.stop()
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._process.running
+
+    @property
+    def lines(self) -> list[str]:
+        """What it has printed so far."""
+        return self._process.lines
+
+    @property
+    def failed(self) -> bool:
+        """Whether it has printed a traceback."""
+        return self.says(TRACEBACK)
+
+    @property
+    def error(self) -> str:
+        """Its first error, with the student's line; without an error, the last line printed."""
+        return error_in(self.lines)
+
+    def says(self, text: str) -> bool:
+        """Return whether it has printed a line with this text."""
+        return any(text in line for line in self.lines)
+
+    def wait(self, condition: Callable[[], object], limit_s: float = PROGRAM_S) -> bool:
+        """Wait until a condition holds, at most `limit_s` seconds. Return whether it holds.
+
+        Raises Failed, with its first error, if the program has ended by then.
+        """
+        holds = wait_until(lambda: condition() or not self.running, limit_s)
+        if not self.running:
+            raise Failed(f'the program ended by itself: {self.error}')
+        return holds
+
+    def has_ended(self, limit_s: float = PROGRAM_S) -> bool:
+        """Wait until it ends by itself, at most `limit_s` seconds. Return whether it has ended."""
+        return wait_until(lambda: not self.running, limit_s)
+
+    def end(self, sent: signal.Signals = signal.SIGINT, limit_s: float = PROGRAM_S) -> bool:
+        """Send it a signal, by default that of Ctrl+C. Return whether it has ended in time."""
+        if self.running:
+            os.kill(self._process.pid, sent)
+        return self.has_ended(limit_s)
+
+    def exit_code(self) -> int:
+        """Return the exit code of a program that has ended, -N if signal N ended it."""
+        return self._process.wait()
+
+
+def run_python(workspace: Workspace, *words: str, name: str = 'the program') -> Program:
+    """Run a file of the workspace with Python: `run_python(workspace, 'talker.py', 'red')`.
+
+    Code runs as in a terminal: `run_python(workspace, '-c', 'import talker')`. The log of a file's
+    nodes has no lines of the libraries below ROS, which would come between its own.
     """
-    start = next((number for number, line in enumerate(lines) if TRACEBACK in line), None)
-    if start is None:
-        said = [line.strip() for line in lines if line.strip()]
-        return said[-1] if said else 'it printed nothing'
-    program = OF_A_PROGRAM.match(lines[start])
-    prefix = program[0] if program else ''
-    own = [line.removeprefix(prefix) for line in lines[start:] if line.startswith(prefix)]
-    said, place, inside, chained = '', '', False, True
-    for number, line in enumerate(own):
-        if TRACEBACK in line:
-            if not chained:
-                break
-            inside, place = True, ''
-        elif CHAINED.match(line):
-            chained = True
-        elif inside and (frame := FRAME.match(line)):
-            if _is_own(frame[1]):
-                code = own[number + 1].strip() if number + 1 < len(own) else ''
-                place = f'Line {frame[2]} of {Path(frame[1]).name}: {code}'
-        elif inside and line and not line[0].isspace():
-            said, inside, chained = line, False, False
-    if not said:
-        return place or 'it ends with a traceback'
-    return f'{said}{"" if not place or said[-1] in ".!?" else "."} {place}'.strip()
+    command = shlex.join([sys.executable, *words])
+    if words[0] != '-c':
+        command += ' --ros-args --disable-external-lib-logs'
+    return Program(workspace.start(f'exec {command}', name))
 
 
 def launch(
@@ -145,25 +195,3 @@ def launch(
 def started(text: str) -> list[str]:
     """Return the programs that a launch says it has started, sorted."""
     return sorted(re.findall(r'\[(\S+)-\d+\]: process started', text))
-
-
-def error_of_launch(text: str) -> str:
-    """Return the first error of a launch or of one of its programs, or nothing if there is none."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    if any(TRACEBACK in line for line in lines):
-        return error_in(lines)
-    if lines and not started(text):
-        return lines[-1]
-    if dead := re.search(rf'\[(\S+-\d+)\]: {DIED}', text):
-        said = [line for line in lines if line.startswith(f'[{dead[1]}] ')]
-        return f'{dead[1]} has died. {said[-1] if said else "It printed nothing"}'
-    return ''
-
-
-def _is_own(file: str) -> bool:
-    """Return whether a file is the learner's: no library, no script that colcon has made."""
-    if re.search(r'/lib/\w+/\w+$', file) or Path(file).name.startswith('.'):
-        return False
-    # What a terminal of the workspace prints has no folders of this machine.
-    in_workspace = re.match(r'(\w+/)?(src|install|build)/', file)
-    return bool(in_workspace) or is_students(file)

@@ -23,7 +23,8 @@ from sensor_msgs.msg import LaserScan
 
 from helpers.checks.bench import STATUS
 from helpers.checks.builds import build
-from helpers.checks.programs import DIED, error_of_launch
+from helpers.checks.first_error import error_of_launch
+from helpers.checks.programs import DIED
 from helpers.robot import (
     CORRIDOR,
     EMPTY,

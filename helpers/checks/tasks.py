@@ -24,35 +24,31 @@ the task, for ever: progress, classes and grades keep it. Its number is its plac
 which is also that in the module.
 
 The function of a task gets what the student wrote, and returns its points: what is right, a test,
-and a hint, which appears at the second wrong try. A test is a function without arguments. It
-returns True, or a text that says what was found instead; whatever it raises is what was found. The
-points are judged in their order, in a process apart (see apart.py), so what a check does to the
-notebook's objects is undone when it ends. What the function itself raises is a mistake of the
-check: the task cannot be judged, and the verdict says in which line.
+and a hint, which appears at the second wrong try. points.py says what a test is, and has the words
+with which judges are written. The points are judged in their order, in a sandbox (see sandbox.py),
+so what a check does to the notebook's objects is undone when it ends. What the function itself
+raises is a mistake of the check: the task cannot be judged, and the verdict says in which line.
 """
 
 from __future__ import annotations
 
-import os
 import re
-import threading
 import time
-import traceback
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import wraps
 
 from IPython import get_ipython
 from IPython.core.error import UsageError
 from IPython.display import display
 
 from helpers.checks import classroom, progress
-from helpers.checks.apart import Apart, Ending
-from helpers.checks.errors import Failed, NeverEnds, own_line, place_of, places, sentence
+from helpers.checks.errors import own_line
+from helpers.checks.points import Test, judge_points
+from helpers.checks.sandbox import Ending, Sandbox
 from helpers.checks.verdict import Point, Verdict, bundle
 from helpers.lesson import check_call
-from helpers.notebook import frames, names_of, somebody_watches
+from helpers.notebook import names_of, somebody_watches
 
 CPU_LIMIT_S = 5.0  # of one point: an endless loop uses it up
 LIMIT_S = 30.0  # of one point by the clock
@@ -61,8 +57,6 @@ ENDLESS = 'it did not end. Is there an endless loop, or a spin() that never retu
 NOT_TRIED = 'not tried, because the one above did not end'
 # Magics that run the lines below them in the notebook:
 RUNS_PYTHON = re.compile(r'\A(\s*%%(time|capture)\b.*\n)+')
-
-Test = tuple[str, Callable[[], object], str]
 
 
 @dataclass
@@ -197,28 +191,6 @@ class Tasks:
 _of_this_notebook: Tasks | None = None
 
 
-def once(function: Callable[[], object]) -> Callable[[], object]:
-    """Return the function, but run at most once: later calls get its result, or its exception.
-
-    For what several points of a task look at: a build, a drive.
-    """
-    results: list[object] = []
-    errors: list[BaseException] = []
-
-    @wraps(function)
-    def run() -> object:
-        if not results and not errors:
-            try:
-                results.append(function())
-            except BaseException as error:
-                errors.append(error)
-        if errors:
-            raise errors[0]
-        return results[0]
-
-    return run
-
-
 def solution(line: str, cell: str) -> None:
     """Run a cell `%%solution hear_the_text` if the student has not solved this task; check it.
 
@@ -236,17 +208,18 @@ def solution(line: str, cell: str) -> None:
 def _judge(
     verdict: Verdict, points: Callable[[], Sequence[Test]], cpu_s: float, limit_s: float
 ) -> list[str]:
-    """Fill the verdict with the points of a task, judged in a process apart; return their hints."""
+    """Fill the verdict with the points of a task, judged in a sandbox; return their hints."""
     started = time.monotonic()
     hints: list[str] = []
-    apart = Apart(lambda send: _worker(points, send), cpu_s, limit_s)
+    sandbox = Sandbox(lambda send: judge_points(points, send), cpu_s, limit_s)
     tried = 0
     with Running(verdict) as running:
-        for kind, content in apart:
+        for kind, content in sandbox:
             if kind == 'points':
                 verdict.points = [Point(what) for what, _ in content]
                 hints = [hint for _, hint in content]
             elif kind == 'mistake':
+                verdict.points = []  # those that were tried count for nothing
                 verdict.note = f'This task cannot be judged: {content}.'
             else:
                 verdict.points[tried].ok, verdict.points[tried].found, names_line = content
@@ -255,80 +228,10 @@ def _judge(
                 tried += 1
             running.update(time.monotonic() - started)
     verdict.seconds = time.monotonic() - started
-    _add_ending(verdict, tried, apart.ending)
-    if apart.ending.printed:
-        print(apart.ending.printed, end='' if apart.ending.printed.endswith('\n') else '\n')
+    _add_ending(verdict, tried, sandbox.ending)
+    if sandbox.ending.printed:
+        print(sandbox.ending.printed, end='' if sandbox.ending.printed.endswith('\n') else '\n')
     return hints
-
-
-def _worker(points: Callable[[], Sequence[Test]], send: Callable) -> None:
-    """Judge the points one by one. This runs in the process apart."""
-    failures: list[str] = []
-    threading.excepthook = lambda error: failures.append(
-        f'A thread of yours ended with {sentence(error.exc_value or error.exc_type())}'
-    )
-    threads = set(threading.enumerate())
-    try:
-        tests = _tests_of(points())
-    except Exception as error:  # of the check, not of the student
-        send(('mistake', _mistake(error)))
-        return
-    send(('points', [(what, hint) for what, _, hint in tests]))
-    for number, (_, test, _) in enumerate(tests):
-        failures.clear()
-        never_ends = names_line = False
-        try:
-            result = test()
-            ok, found = (False, result) if isinstance(result, str) else (bool(result), '')
-        except BaseException as error:  # whatever a student's code raises is an answer, not right
-            ok, found = False, sentence(error)
-            never_ends = isinstance(error, NeverEnds)
-            names_line = bool(place_of(error)) and not isinstance(error, Failed)
-        if failures and not ok:
-            found = found if found[-1:] in ('', '.', '!', '?') else f'{found}.'
-            found = f'{found} {failures[0]}'.strip()
-        if number == len(tests) - 1:
-            left = [
-                thread
-                for thread in threading.enumerate()
-                if thread not in threads and not thread.daemon
-            ]
-            if left and ok:
-                ok, found = False, _still_runs(left[0])
-        send(('point', (ok, found, names_line)))
-        if never_ends:
-            break
-
-
-def _tests_of(points: object) -> list[Test]:
-    """Return the points that a check gave. Raises Failed if it cannot try them."""
-    tests = list(points) if points is not None else []
-    if not tests:
-        raise Failed('its check returns no points, as if a `return` were missing')
-    for point in tests:
-        if not (isinstance(point, tuple) and len(point) == 3 and callable(point[1])):
-            name = point[0] if isinstance(point, tuple) and point else point
-            raise Failed(
-                f'the point {name!r} of its check must be what is right, a test to call and a '
-                "hint, as in ('it keeps 7', lambda: keeps(7), 'Append it.')"
-            )
-    return tests
-
-
-def _mistake(error: Exception) -> str:
-    """Say what is wrong with a check that did not return its points, and in which line."""
-    if isinstance(error, Failed):
-        return str(error)
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    said = f'its check ended with {type(error).__name__}: {error}'
-    if frame.filename == __file__:  # what the notebook hands over is not what the check takes
-        return said
-    return f'{said}, in line {frame.lineno} of {os.path.basename(frame.filename)}'
-
-
-def _still_runs(thread: threading.Thread) -> str:
-    place = next((own_line(places(frame)) for _, frame in frames([thread])), '')
-    return f'the thread {thread.name} that your code has started does not end. {place}'.strip()
 
 
 def _add_ending(verdict: Verdict, tried: int, ending: Ending) -> None:

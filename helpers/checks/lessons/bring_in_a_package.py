@@ -4,8 +4,10 @@ import math
 import re
 
 from helpers.checks.builds import builds
-from helpers.checks.programs import error_in, manifest, needed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.first_error import error_in
+from helpers.checks.points import cached
+from helpers.checks.programs import manifest, needed
+from helpers.checks.tasks import Tasks
 from helpers.workspace import COLLEAGUE
 
 tasks = Tasks()
@@ -75,7 +77,9 @@ def name_the_dependencies(workspace):
 
 @tasks.add
 def write_the_rules(workspace, rules):
-    resolved = once(lambda: resolve(workspace, rules, 'ubuntu:noble', 'opensuse:15.5', 'fedora:40'))
+    resolved = cached(
+        lambda: resolve(workspace, rules, 'ubuntu:noble', 'opensuse:15.5', 'fedora:40')
+    )
 
     def resolves(system, *wanted):
         lines = resolved()[system]
@@ -97,7 +101,7 @@ def build_what_you_need(workspace, commands):
         workspace.terminal(f'rm -rf build install log\n{commands}')
         return not workspace.file('build/brake_gazebo').exists() or 'colcon tried to build it'
 
-    left_out = once(leaves_gazebo_out)
+    left_out = cached(leaves_gazebo_out)
 
     def is_built(module):
         # What else was built when a package failed, is chance.
@@ -116,7 +120,7 @@ def build_what_you_need(workspace, commands):
 
 @tasks.add(limit_s=90)
 def install_the_files(workspace):
-    built = once(lambda: builds(workspace, 'brake'))
+    built = cached(lambda: builds(workspace, 'brake'))
 
     def is_installed(file):
         if built() is not True:
@@ -153,7 +157,7 @@ def slow_down(workspace, links, change):
             return 'config/brake.yaml is not installed'
         return installed() == ['speed:', '0.5'] or f'in src it is 0.5, in install {installed()[-1]}'
 
-    linked = once(links_are_made)
+    linked = cached(links_are_made)
 
     def change_counts(before):
         if linked() == 'brake is not built':
@@ -182,7 +186,7 @@ def make_an_overlay(workspace, commands):
             return True
         return f'its packages: {" ".join(packages.split()) or "none"}. {last_of(printed)}'.strip()
 
-    made = once(make)
+    made = cached(make)
 
     def is_hidden():
         count = workspace.terminal('colcon list --names-only 2>&1 | grep -c brake_tools')
@@ -208,7 +212,7 @@ def make_an_overlay(workspace, commands):
 
 @tasks.add(limit_s=90)
 def fix_the_function(workspace):
-    built = once(lambda: build_overlay(workspace))
+    built = cached(lambda: build_overlay(workspace))
 
     def returns(right, speed, *distances):
         if built() is not True:
@@ -250,7 +254,7 @@ def create_a_package(workspace, commands):
             return True
         return f'there is no folder {folder}. {last_of(printed)}'.strip()
 
-    created = once(create)
+    created = cached(create)
 
     def package():
         created()
@@ -293,7 +297,7 @@ def fill_it(workspace):
             return error_in(lines)
         return lines == ['0.0', '0.4', '0.8'] or f'the last lines are: {" | ".join(lines[-3:])}'
 
-    printed = once(prints_speeds)
+    printed = cached(prints_speeds)
 
     def asks_safe_speed():
         """Run it with a `safe_speed` that returns what it is asked."""

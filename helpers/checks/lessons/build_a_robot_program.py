@@ -25,6 +25,7 @@ from sensor_msgs.msg import BatteryState
 from helpers.checks.bench import STATUS, Bench, must_define, must_have
 from helpers.checks.builds import build, builds
 from helpers.checks.planted import planted, run_tests
+from helpers.checks.points import cached
 from helpers.checks.programs import DIED, started
 from helpers.checks.robot_program import (
     CELLAR,
@@ -55,7 +56,7 @@ from helpers.checks.robot_program import (
     steered,
     write_route_of_cellar,
 )
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 from helpers.robot import (
     CORRIDOR,
     EMPTY,
@@ -185,7 +186,7 @@ def how_it_ended(robot, drove, program, by_itself):
 
 @tasks.add(limit_s=120, cpu_s=20)
 def a_program(workspace):
-    @once
+    @cached
     def run_all():
         """Run main() three times, each beside a base that keeps its last command, and end it."""
         workspace.write('.start.py', 'from patrol_pkg.main import main\nmain()\n')
@@ -560,8 +561,8 @@ def steer_to_a_place(workspace):
 @tasks.add(limit_s=90, cpu_s=60)
 def an_action(workspace):
     show = 'source install/setup.bash\nros2 interface show patrol_interfaces/action/Patrol'
-    shown = once(lambda: workspace.terminal(show))
-    it_builds = once(lambda: builds(workspace, 'patrol_interfaces'))
+    shown = cached(lambda: workspace.terminal(show))
+    it_builds = cached(lambda: builds(workspace, 'patrol_interfaces'))
 
     def has(number, name, right):
         def test():
@@ -974,7 +975,7 @@ def comes_to_each_place(robot):
 
 @tasks.add(cpu_s=60, limit_s=90)
 def the_route(workspace):
-    tour = once(lambda: round_tour(workspace))
+    tour = cached(lambda: round_tour(workspace))
 
     def four_rooms():
         drive, places = tour()
@@ -1000,7 +1001,7 @@ def the_route(workspace):
 
 @tasks.add(limit_s=90)
 def install_it(workspace):
-    it_builds = once(lambda: builds(workspace, 'patrol_pkg'))
+    it_builds = cached(lambda: builds(workspace, 'patrol_pkg'))
 
     def after_build(test):
         return lambda: test() if it_builds() is True else 'not judged: it does not build'
@@ -1283,7 +1284,7 @@ WRONG_NODES = {
 
 def judged_tests(workspace, tests, name, right, wrong, hint):
     """Return the points of tests: they pass for right versions, and fail for each wrong one."""
-    runs = once(
+    runs = cached(
         lambda: run_tests(
             workspace,
             PACKAGE,
@@ -1490,11 +1491,11 @@ def a_turtlebot(workspace):
 def a_floor_of_your_own(workspace, file):
     path = workspace.file(f'{PACKAGE}/{file}')
 
-    @once
+    @cached
     def floor():
         return Floor.from_text(path.read_text(encoding='utf-8'), name=path.stem)
 
-    toured = once(lambda: round_tour(workspace, floor(), path.stem))
+    toured = cached(lambda: round_tour(workspace, floor(), path.stem))
 
     def hits_nothing():
         tour, _ = toured()

@@ -19,7 +19,8 @@ from std_srvs.srv import Trigger
 
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.notebook import frames
 from helpers.recording import CallbackRecording
 from helpers.replay import replay_calls
@@ -227,7 +228,7 @@ def if_you_do_not_know_stop(SafeBrake):
                 raise Failed(f'{why}, and it does not stop within {limit_s} s. {waits}'.strip())
         return True
 
-    @once
+    @cached
     def gives_up():
         return stops_without_an_answer(camera_is_there=True)
 
@@ -331,7 +332,7 @@ def if_you_do_not_know_stop(SafeBrake):
 
 @tasks.add
 def three_callbacks_four_threads(Explorer):
-    @once
+    @cached
     def during_scan_0():
         """Return the number of timers, and the callbacks that begin while scan 0 is drawn."""
         gate, calls = threading.Event(), []

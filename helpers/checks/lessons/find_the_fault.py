@@ -7,8 +7,9 @@ from collections import Counter
 
 from helpers.checks import progress
 from helpers.checks.errors import Failed
-from helpers.checks.programs import error_of_launch
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.first_error import error_of_launch
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.faults import FAULTS, KINDS, OTHER, forget, mend_in_words, take
 from helpers.faults import drive as drive_apart
 
@@ -172,7 +173,7 @@ def found(case, kind, command, line):
             return 'it is judged when the line shows the fault'
         return word in (case.fault.kind, *case.fault.also) or f'{kind}: no'
 
-    word, shown = words(kind).lower(), once(shows_the_fault)
+    word, shown = words(kind).lower(), cached(shows_the_fault)
     return [
         ('the command was run', was_run, 'Run it in a cell that begins with %%terminal.'),
         ('it has printed the line', was_printed, 'Copy the line from its output.'),
@@ -188,7 +189,7 @@ def mended(case):
     if missing:  # nothing to drive for
         return [(title, lambda: missing, '')]
 
-    @once
+    @cached
     def driven():
         return drive_apart(case, OTHER, trouble=case.fault.trouble, params=params(case))
 

@@ -12,7 +12,8 @@ from sensor_msgs.msg import Imu, NavSatFix, NavSatStatus
 
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.fusion import VARIANCES, simulate
 from helpers.robot import odometry_message
 from helpers.ros import seconds_of, stamp_of, yaw_of
@@ -294,8 +295,8 @@ def again(message, count=8):
 @tasks.add
 def find_the_process_noise(best_noise):
     drive, other_drive = (
-        once(lambda: simulate(1, seconds=20)),
-        once(lambda: simulate(5, seconds=20)),
+        cached(lambda: simulate(1, seconds=20)),
+        cached(lambda: simulate(5, seconds=20)),
     )
 
     def finds(right, candidates, drive):

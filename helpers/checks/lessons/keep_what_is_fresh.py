@@ -19,7 +19,8 @@ from std_msgs.msg import Empty, Int32
 
 from helpers.checks.bench import Bench, must_define
 from helpers.checks.errors import Failed, sentence
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.ros import ros_session
 
 tasks = Tasks()
@@ -378,7 +379,7 @@ def a_place_for_one(Newest):
 
 @tasks.add
 def a_worker(NewestBrake):
-    stopped_while_looking = once(lambda: stop_while_looking(make))
+    stopped_while_looking = cached(lambda: stop_while_looking(make))
     ended = threading.Thread(target=int)
     ended.start()
 
@@ -469,7 +470,7 @@ def stop_while_looking(make_brake):
 def a_watchdog(LaserWatchdog):
     long_s, middle_s, short_s = 1.3, 0.9, 0.3
 
-    @once
+    @cached
     def trial():
         """Let it hear nothing, then one scan, then nothing."""
         with Bench() as bench:
@@ -610,7 +611,7 @@ def hear_stops(bench):
 
 @tasks.add
 def listen_for_two_events(listen):
-    @once
+    @cached
     def events():
         """Send one scan and none after it, then take the laser away."""
         missed, counts, tester_missed = [], [], []
@@ -657,7 +658,7 @@ def listen_for_two_events(listen):
 
 @tasks.add
 def choose_the_qos(laser_qos, map_qos):
-    @once
+    @cached
     def hear_laser():
         """Return the scans heard after a pause, and whether silence was reported."""
         must_be_profile('laser_qos', laser_qos)

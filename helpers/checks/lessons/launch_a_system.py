@@ -6,16 +6,10 @@ import signal
 import time
 
 from helpers.checks.builds import builds
-from helpers.checks.programs import (
-    error_in,
-    error_of_launch,
-    launch,
-    manifest,
-    needed,
-    started,
-    wait_until,
-)
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.first_error import error_in, error_of_launch
+from helpers.checks.points import cached
+from helpers.checks.programs import launch, manifest, needed, started, wait_until
+from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
 check = tasks.check
@@ -27,7 +21,7 @@ OWN_SPEEDS = '[one.driver]: I drive at 0.3 m/s', '[two.driver]: I drive at 0.6 m
 
 @tasks.add(limit_s=60)
 def one_file(workspace, file):
-    text = once(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
+    text = cached(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
     hint = '<node pkg=... exec="driver">, in it <param name=... value=.../>, and then </node>.'
     return [
         ('the driver drives the robot at 0.4 m/s', lambda: says(text(), *ROBOT_AND_DRIVER), hint),
@@ -37,7 +31,7 @@ def one_file(workspace, file):
 
 @tasks.add(limit_s=60)
 def the_same_in_yaml(workspace, file):
-    text = once(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
+    text = cached(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
     hint = 'Below "param:" write "- name: speed", and below "name" write "value: 0.4".'
     return [
         ('the driver drives the robot at 0.4 m/s', lambda: says(text(), *ROBOT_AND_DRIVER), hint),
@@ -60,7 +54,7 @@ def a_file_for_all_floors(workspace, file):
             return said.splitlines()[-1]
         return f'the arguments with a default are {pairs or "none"}'
 
-    declared = once(declares)
+    declared = cached(declares)
 
     def starts_without():
         if declared() is not True:
@@ -107,7 +101,7 @@ def one_robot_with_a_name(workspace, file):
         return run(workspace, '.tried/launch/two.launch.xml', *lines, programs=4)
 
     lines = ['floor corridor', *(f'[{name}.driver]: I drive at 0.25 m/s' for name in ('ada', 'bo'))]
-    text = once(launch_two)
+    text = cached(launch_two)
     hint = '<group>, push_ros_namespace with $(var name), and only then the two nodes; in the '
     hint += 'driver <param from="$(dirname)/../config/driver.yaml"/>.'
     both = ['driver', 'robot'] * 2
@@ -120,7 +114,7 @@ def one_robot_with_a_name(workspace, file):
 @tasks.add(limit_s=60)
 def two_robots(workspace, file):
     lines = [f'[{name}.driver]: I drive' for name in ('one', 'two')]
-    text = once(lambda: run(workspace, file, *lines, programs=4))
+    text = cached(lambda: run(workspace, file, *lines, programs=4))
     hint = '<include file="$(dirname)/...">, <arg name="name" value="one"/>, </include>; twice.'
     both = ['driver', 'robot'] * 2
     return [
@@ -144,7 +138,7 @@ def start_it_again(workspace, file):
         log, text = guarded(workspace, f'{file} speed:=0.4', kill=True)
         starts_s, died_s = times(log, 'process started'), times(log, 'has died')
         if not starts_s:
-            return error_of_launch(text)
+            return error_of_launch(text) or 'no program is started'
         if len(starts_s) != 2:
             return 'it was killed, and is not started again'
         return starts_s[1] - died_s[0] > 0.45 or 'it is started again at once'
@@ -153,7 +147,7 @@ def start_it_again(workspace, file):
         log, text = guarded(workspace, f'{file} speed:=fast')
         starts_s = times(log, 'process started')
         if not starts_s:
-            return error_of_launch(text)
+            return error_of_launch(text) or 'no program is started'
         often = {1: 'once', 2: 'twice'}.get(len(starts_s), 'again and again')
         return len(starts_s) == 3 or f'with speed:=fast it is started {often}'
 
@@ -187,7 +181,7 @@ rclpy.spin(node)
 def a_camera_that_waits(workspace):
     ros2_run = 'source install/setup.bash\nros2 run'
 
-    @once
+    @cached
     def seen():
         """Return how it waits and turns and, tried meanwhile, how it gives up."""
         workspace.write('.tried/silent.py', SILENT)
@@ -243,7 +237,7 @@ def install_the_files(workspace):
         workspace.write('src/fleet_pkg/launch/__pycache__/robot.launch.pyc', '')
         return builds(workspace, 'fleet_pkg')
 
-    built = once(build)
+    built = cached(build)
 
     def is_installed():
         if built() is not True:

@@ -13,9 +13,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from helpers.checks.bench import Bench, let, must_have
+from helpers.checks.bench import Bench, must_have, override
 from helpers.checks.errors import Failed, sentence
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.recording import explain, predict
 from helpers.ros import ros_session
 
@@ -62,7 +63,7 @@ def publish_numbers(MinimalPublisher, PERIOD_S):
 def a_slow_subscriber(SlowSubscriber):
     def hear_once(text, callback_s=0.0):
         """Return what the node logs of one message, and how long its callback takes."""
-        let(SlowSubscriber, CALLBACK_S=callback_s)
+        override(SlowSubscriber, CALLBACK_S=callback_s)
         with Bench() as bench:
             node, executor = SlowSubscriber(10), SingleThreadedExecutor()
             must_have(node, 'subscription')
@@ -220,7 +221,7 @@ def losses(period_s, callback_s, depth, messages):
 @tasks.add
 def count_the_losses(LossCounter):
     def finds(numbers, missing):
-        let(LossCounter, CALLBACK_S=0.02)
+        override(LossCounter, CALLBACK_S=0.02)
         with Bench() as bench:
             node, executor = LossCounter(100, callback_group=None), SingleThreadedExecutor()
             executor.add_node(node)
@@ -331,7 +332,7 @@ def a_program_of_its_own(workspace, file):
         numbers = [text.removeprefix('Hello World: ') for text in heard]
         return f'with depth {depth}, these were received: {", ".join(numbers) or "none"}'
 
-    last_ten = once(lambda: last_ones(10))
+    last_ten = cached(lambda: last_ones(10))
 
     def last_three():
         last_ten()  # what raises there would raise here, too

@@ -10,16 +10,10 @@ from std_msgs.msg import String
 from helpers.checks.bench import Bench
 from helpers.checks.builds import builds
 from helpers.checks.errors import Failed
-from helpers.checks.programs import (
-    error_in,
-    line_of,
-    manifest,
-    needed,
-    open_terminal,
-    sourced,
-    wait_until,
-)
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.first_error import error_in
+from helpers.checks.points import cached
+from helpers.checks.programs import line_of, manifest, needed, open_terminal, sourced, wait_until
+from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
 check = tasks.check
@@ -44,7 +38,7 @@ def create_a_package(workspace):
 @tasks.add
 def a_slow_listener(workspace, file):
     texts = ['Hello World: 7', 'Good morning']
-    run = once(lambda: run_main(workspace, file, texts))
+    run = cached(lambda: run_main(workspace, file, texts))
 
     def logs():
         lines, went_on = run()
@@ -102,7 +96,7 @@ def what_it_needs(workspace):
 
 @tasks.add(limit_s=90)
 def what_is_installed(workspace):
-    built = once(lambda: builds(workspace, 'hello_pkg'))
+    built = cached(lambda: builds(workspace, 'hello_pkg'))
 
     def executables():
         if built() is not True:
@@ -111,7 +105,7 @@ def what_is_installed(workspace):
         right = ['hello_pkg listener', 'hello_pkg talker']
         return names == right or f'it has {", ".join(names) or "none"}'
 
-    installed = once(executables)
+    installed = cached(executables)
 
     def they_talk():
         if installed() is not True:
@@ -175,7 +169,7 @@ def callbacks_in_parallel(workspace, file):
             return f'{count} callbacks did not run at the same time'
         return error_in(lines)
 
-    two = once(lambda: meet(2))
+    two = cached(lambda: meet(2))
 
     def eight():
         return meet(8) if two() is True else 'not even two'
@@ -232,7 +226,7 @@ def other_arguments(workspace):
     def has_the_file():
         value = sourced(workspace, 'ros2 param get /talker period_s')
         if value != 'Double value is: 0.25':
-            return value
+            return value or 'ros2 param get prints nothing'
         words = words_of(open_terminal(workspace, 'other_talker'))
         installed = workspace.file('install/hello_pkg/share/hello_pkg/config/slow.yaml')
         for option, file in zip(words, words[1:], strict=False):
@@ -264,7 +258,7 @@ def fix_a_package(workspace):
         write_forgetful(workspace)
         return builds(workspace, 'forgetful_pkg')
 
-    built = once(build)
+    built = cached(build)
 
     def counts():
         if built() is not True:

@@ -19,8 +19,10 @@ from urdf_parser_py.urdf import URDF
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build
 from helpers.checks.errors import Failed
-from helpers.checks.programs import DIED, error_of_launch, started
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.first_error import error_of_launch
+from helpers.checks.points import cached
+from helpers.checks.programs import DIED, started
+from helpers.checks.tasks import Tasks
 from helpers.fusion import VARIANCES, localize
 from helpers.ros import quaternion, seconds_of, stamp_of, yaw_of
 from helpers.workspace import without_folders
@@ -52,7 +54,7 @@ ARM = """<robot name="arm">
 
 @tasks.add
 def three_sensors(workspace, file):
-    description = once(lambda: described(workspace, file))
+    description = cached(lambda: described(workspace, file))
 
     def has_one_root():
         root = description().get_root()
@@ -113,7 +115,7 @@ def parsed(text):
 
 @tasks.add
 def a_message_for_each_joint(workspace, static_transforms):
-    arm = once(lambda: parsed(ARM))
+    arm = cached(lambda: parsed(ARM))
 
     def transforms_of(robot):
         return {transform.child_frame_id: transform for transform in static_transforms(robot)}
@@ -229,7 +231,7 @@ def from_a_frame_to_its_parent(to_parent):
 
 @tasks.add(limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
 def fix_three_faults(workspace, StaticBroadcaster):
-    drive = once(lambda: drive_by(workspace, StaticBroadcaster, SETTINGS, seconds=6))
+    drive = cached(lambda: drive_by(workspace, StaticBroadcaster, SETTINGS, seconds=6))
 
     def uses(name, sensor, *parts):
         if sensor not in drive().parts[name]:
@@ -546,7 +548,7 @@ def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
 
 @tasks.add(limit_s=150)
 def two_filters(workspace, file):
-    @once
+    @cached
     def seen():
         """Return who publishes and receives what, of which type of frame, when all runs."""
         build(workspace, 'small_robot')

@@ -14,7 +14,8 @@ from test_msgs.action import Fibonacci as Patrol
 
 from helpers.checks.bench import STATUS, Bench
 from helpers.checks.errors import Failed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.replay import ActionRecording, replay_action
 from helpers.robot import Floor
 
@@ -37,7 +38,7 @@ def the_job(EagerPatroller):
         raise_first(errors)
         return status, visited, len(moves), [list(feedback.sequence) for feedback in goal.feedback]
 
-    three, one = once(lambda: patrol(3)), once(lambda: patrol(1))
+    three, one = cached(lambda: patrol(3)), cached(lambda: patrol(1))
 
     def ends(run, places):
         status, visited, moves, _ = run()
@@ -71,7 +72,7 @@ def the_job(EagerPatroller):
 
 @tasks.add
 def the_client(Operator):
-    three = once(lambda: operate(Operator, 3))
+    three = cached(lambda: operate(Operator, 3))
 
     def hears():
         server, operator = three()
@@ -258,7 +259,7 @@ def answer_at_the_end(ChargingPatroller):
             return 'an answer while the robot was on patrol'
         return '' if answered else 'no answer'
 
-    twice = once(lambda: charge(2, 'succeeds'))
+    twice = cached(lambda: charge(2, 'succeeds'))
     hint = 'self.job_ended.wait() without a time-out; clear() first, set() in a finally.'
     return [
         ('it answers when a patrol has ended', lambda: twice()[0] or True, hint),

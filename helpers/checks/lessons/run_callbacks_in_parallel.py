@@ -11,7 +11,8 @@ from std_msgs.msg import Int32, String
 
 from helpers.checks.bench import Bench, must_define, must_have
 from helpers.checks.errors import Failed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.ros import ros_session
 
 tasks = Tasks()
@@ -203,7 +204,7 @@ def wait_for_the_small_one(UnequalSubscriber):
 
 @tasks.add
 def take_a_lock(LockingSubscriber):
-    forty = once(lambda: hear_numbers(LockingSubscriber, 40, 'count'))
+    forty = cached(lambda: hear_numbers(LockingSubscriber, 40, 'count'))
 
     def counts(count, trial):
         found = trial.node.read('count')
@@ -227,7 +228,7 @@ def take_a_lock(LockingSubscriber):
 
 @tasks.add
 def an_odometer(Odometer):
-    forty = once(lambda: hear_numbers(Odometer, 40, 'total', 'longest'))
+    forty = cached(lambda: hear_numbers(Odometer, 40, 'total', 'longest'))
 
     def shows(count, trial):
         right = {'total': sum(range(count)), 'longest': count - 1}

@@ -10,7 +10,8 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Int32
 
 from helpers.checks.bench import Bench
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.robot import EMPTY, Robot
 from helpers.ros import ros_session
 
@@ -232,7 +233,7 @@ def a_file_for_three_robots(workspace, file):
 
 @tasks.add(limit_s=60)
 def keep_what_was_good(by_command, good, LimitedDriver):
-    @once
+    @cached
     def set_values():
         """Return the values that the commands set while a node spins."""
         values = []

@@ -12,10 +12,12 @@ from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
 
 from helpers.checks.bench import Bench
-from helpers.checks.builds import compile_error, why_it_failed
+from helpers.checks.builds import why_it_failed
 from helpers.checks.errors import Failed
+from helpers.checks.first_error import compile_error
+from helpers.checks.points import cached
 from helpers.checks.programs import manifest
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
 check = tasks.check
@@ -62,7 +64,7 @@ class Program:
         self._workspace = workspace
         program = PROGRAM.replace('HEADER', header).replace('CALL', call)
         self._text, self._source = program, source
-        self.error = once(self._compile)
+        self.error = cached(self._compile)
 
     def _compile(self):
         """Return the first error of the compiler, or ''."""
@@ -217,7 +219,7 @@ def printed_by(workspace, package, executable):
 
 @tasks.add(limit_s=BUILD_S)
 def make_the_library(workspace, library):
-    @once
+    @cached
     def built():
         for file, text in USER.items():
             workspace.write(f'src/try_library/{file}', text)
@@ -249,7 +251,7 @@ def make_the_library(workspace, library):
 
 @tasks.add(limit_s=BUILD_S)
 def link_the_library(workspace, library):
-    built = once(lambda: result_of(workspace, 'scan_tools', 'look', library=library + GIVEN))
+    built = cached(lambda: result_of(workspace, 'scan_tools', 'look', library=library + GIVEN))
 
     def library_is_first():
         order = workspace.terminal('colcon list -t --names-only').split()
@@ -291,7 +293,7 @@ def link_the_library(workspace, library):
 
 @tasks.add(limit_s=BUILD_S)
 def give_it_to_others(workspace):
-    built = once(lambda: result_of(workspace, 'scan_tools', 'look'))
+    built = cached(lambda: result_of(workspace, 'scan_tools', 'look'))
 
     def headers_are_installed():
         include = workspace.path / 'install/scan_tools/include'
@@ -322,7 +324,7 @@ print(m.search(4.0))"""
 
 @tasks.add(limit_s=BUILD_S)
 def bind(workspace):
-    @once
+    @cached
     def compiled():
         include = f'-I {sysconfig.get_path("include")} -I {sys.prefix}/include'
         output = workspace.terminal(f"""
@@ -362,7 +364,7 @@ def bind(workspace):
 
 @tasks.add
 def name_what_it_needs(workspace):
-    package = once(lambda: manifest(workspace, 'src/scan_tools_py'))
+    package = cached(lambda: manifest(workspace, 'src/scan_tools_py'))
 
     def needs(kind, *right):
         found = sorted(depend.name for depend in getattr(package(), f'{kind}_depends'))
@@ -393,7 +395,7 @@ def imports_the_module(workspace):
 @tasks.add(limit_s=BUILD_S)
 def make_the_module(workspace, library):
     shared = re.sub('find_package', 'set(BUILD_SHARED_LIBS ON)\n\\g<0>', library, count=1)
-    built = once(
+    built = cached(
         lambda: result_of(workspace, 'scan_tools', 'scan_tools_py', library=shared + GIVEN)
     )
 
@@ -409,7 +411,7 @@ def make_the_module(workspace, library):
 
 @tasks.add(limit_s=BUILD_S)
 def fix_it(workspace):
-    built = once(lambda: result_of(workspace, 'scan_tools', 'look', 'scan_tools_py'))
+    built = cached(lambda: result_of(workspace, 'scan_tools', 'look', 'scan_tools_py'))
 
     def is_imported():
         return imports_the_module(workspace) if built() is True else NOT_BUILT

@@ -12,7 +12,8 @@ from rclpy.lifecycle import TransitionCallbackReturn
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build
 from helpers.checks.planted import planted, run_tests
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
 check = tasks.check
@@ -84,7 +85,7 @@ ROWS = {
 @tasks.add(limit_s=60)
 def test_the_function(workspace, tests):
     versions = {'our': '', 'another': SPEED, **WRONG_SPEEDS}
-    runs = once(lambda: run_tests(workspace, PACKAGE, tests, 'brake_pkg.speed', versions))
+    runs = cached(lambda: run_tests(workspace, PACKAGE, tests, 'brake_pkg.speed', versions))
     right = {'our': 'our function', 'another': 'another function'}
     return [
         ('it passes for two right functions', all_pass(runs, right), 'Is each row what it says?'),
@@ -140,7 +141,7 @@ def test_again_ends():
 
 @tasks.add(limit_s=60)
 def a_domain_of_its_own(workspace):
-    @once
+    @cached
     def runs():
         versions = {'alone': BRAKE, 'again': BRAKE}
         return run_ours(workspace, 'alone.py', ALONE, 'brake_pkg.brake', versions)
@@ -199,7 +200,7 @@ def run_busy(workspace, tests='test/test_brake.py'):
 
 @tasks.add(limit_s=60)
 def catch_it(workspace, tests):
-    busy = once(lambda: run_busy(workspace, tests))
+    busy = cached(lambda: run_busy(workspace, tests))
 
     def runs_nine_times():
         run = busy()
@@ -246,7 +247,7 @@ def test_waits(ticks, wanted, limit_s):
 
 @tasks.add(limit_s=60)
 def wait_for_an_event(workspace):
-    @once
+    @cached
     def runs():
         versions = dict.fromkeys(('events', 'at_once', 'in_vain'), '')
         return run_ours(workspace, 'our_waits.py', WAITS, 'none', versions)
@@ -265,7 +266,7 @@ def wait_for_an_event(workspace):
 
 @tasks.add(limit_s=60)
 def fix_the_flaky_test(workspace, tests):
-    @once
+    @cached
     def runs():
         versions = {
             'busy': BUSY.replace('0.4', '2'),
@@ -423,7 +424,7 @@ OUR_TESTS = {
 
 @tasks.add(limit_s=60)
 def a_brake_with_a_lifecycle(workspace):
-    @once
+    @cached
     def runs():
         versions = {name: '' for name, _ in OUR_TESTS.values()}
         return run_ours(workspace, 'ours.py', OURS, 'brake_pkg.brake', versions)
@@ -649,7 +650,7 @@ HINTS = {
 
 @tasks.add(limit_s=90)
 def find_six_bugs(workspace, tests):
-    @once
+    @cached
     def runs():
         versions = {'right': RIGHT_NODE, 'other': OTHER_NODE}
         versions |= {bug: planted(RIGHT_NODE, old, new) for bug, (old, new) in BUGS.items()}

@@ -10,8 +10,9 @@ from sensor_msgs.msg import Image
 
 from helpers.checks.bench import Bench
 from helpers.checks.builds import builds
+from helpers.checks.points import cached
 from helpers.checks.programs import manifest, needed, sourced
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 from helpers.robot import ROOMS, Robot
 from helpers.ros import ros_session
 
@@ -103,7 +104,7 @@ def the_client(ask, pixels):
                 return f'it returns {type(image).__name__}, not an Image'
             return is_picture(image, robot, degrees)
 
-    first = once(lambda: asks(30.0))
+    first = cached(lambda: asks(30.0))
 
     def asks_again():
         first()  # what it raises is raised again, without another call

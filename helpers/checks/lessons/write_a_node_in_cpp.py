@@ -13,7 +13,8 @@ from std_msgs.msg import Float32
 from helpers.checks.bench import RELIABLE, Bench
 from helpers.checks.builds import build
 from helpers.checks.errors import Failed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
 check = tasks.check
@@ -57,18 +58,19 @@ def write_try_nearest(workspace):
 
 
 def install_anew(workspace, *packages):
-    """Build packages. Raises Failed with the first error.
+    """Build packages, and return True. Raises Failed with the first error.
 
     A build takes nothing away: what an earlier try of the last package has installed would stay.
     It is removed before. The other packages stay, and need not be compiled again.
     """
     shutil.rmtree(workspace.file(f'install/{packages[-1]}'), ignore_errors=True)
-    return build(workspace, *packages)
+    build(workspace, *packages)
+    return True
 
 
 @tasks.add(limit_s=BUILD_S)
 def the_nearest_range(workspace):
-    built = once(lambda: install_anew(workspace, 'scan_tools'))
+    built = cached(lambda: install_anew(workspace, 'scan_tools'))
 
     def nearest_is(right, range_min, range_max, *ranges):
         built()
@@ -186,7 +188,7 @@ def code_of(workspace, file):
 @tasks.add(limit_s=BUILD_S)
 def its_cmakelists(workspace):
     packages = 'scan_tools', 'small_rclcpp', 'std_msgs'
-    built = once(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'watcher'))
+    built = cached(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'watcher'))
 
     def finds_the_packages():
         """Test the text: a package that another one has found is there, too."""
@@ -227,7 +229,7 @@ def brakes(workspace, *pairs, pause_s=0.0):
 
 @tasks.add(limit_s=BUILD_S)
 def a_node_of_your_own(workspace):
-    built = once(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake'))
+    built = cached(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake'))
 
     def drives(*pairs):
         return built() and brakes(workspace, *pairs)
@@ -289,7 +291,7 @@ def a_node_of_your_own(workspace):
 
 @tasks.add(limit_s=BUILD_S)
 def another_robot(workspace, ARGUMENTS):
-    @once
+    @cached
     def started():
         """Start the brake. Return the topics that it uses, and what it prints."""
         if isinstance(ARGUMENTS, str):
@@ -413,14 +415,14 @@ TRY_SPIN_XML = """<package format="3"><name>try_spin</name><version>0.0.0</versi
 
 @tasks.add(limit_s=BUILD_S)
 def your_executor(workspace):
-    @once
+    @cached
     def built():
         code = code_of(workspace, 'src/brake/src/brake.cpp')
         if not re.search(r'\bmy_spin\s*\(', code):
             raise Failed(CALLS_MY_SPIN)
         return install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake')
 
-    @once
+    @cached
     def answers_each():
         return built() and brakes(workspace, (3, 0.5), (0.55, 0.2), (0.25, 0.0))
 
