@@ -27,7 +27,7 @@ from nbformat import NotebookNode
 from packaging.requirements import Requirement
 
 from classroom.update import BASE, committed
-from helpers.lesson import PICTURES, ROOT, chosen, tags
+from helpers.lesson import PICTURES, ROOT, chosen, is_for_instructors, tags
 from helpers.notebook import MARK
 from tools.lessons.clean import text_of
 
@@ -50,7 +50,6 @@ MAKEFILE, COMMANDS = 'Makefile', 'classroom/handout.mk'
 LESSONS = re.compile(
     r'<!-- made by `make notebooks`: lessons -->\n\n(.*?)\n\n<!-- end -->', re.DOTALL
 )
-FOR_INSTRUCTORS = re.compile(r'## \d+\. For instructors')
 NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', re.DOTALL)
 GTEST = 'ros-gtest-vendor=='
 GTEST_PYTHON = '3.12'  # whose wheel holds the sources: see tools/set_up.sh
@@ -151,7 +150,7 @@ def lesson_for_students(notebook: NotebookNode, left_out: set[str]) -> NotebookN
     notebook.cells = [
         cell
         for cell in notebook.cells
-        if not left_out & tags(cell) and not FOR_INSTRUCTORS.match(cell.source)
+        if not left_out & tags(cell) and not is_for_instructors(cell)
     ]
     notebook.metadata.pop(MARK, None)  # what hides outputs of the repository
     for cell in notebook.cells:

@@ -21,6 +21,7 @@ from helpers.checks.lessons.find_the_fault import (
 )
 from helpers.faults import FAULTS, KINDS, OTHER, Case, drive, take
 from helpers.faults.cases import FILE, HEALTHY, edited, read
+from helpers.lesson import path_of
 from helpers.workspace import Workspace
 
 MENDS = [(fault, mend) for fault in FAULTS.values() for mend in (*fault.right, *fault.wrong)]
@@ -124,7 +125,7 @@ def test_a_robot_whose_build_was_cleaned_is_built_as_it_was_left(name, tmp_path)
 @pytest.mark.parametrize('seeds', [[1], [3], range(32)])
 def test_after_the_others_all_robots_come_again_each_with_its_fault(seeds, tmp_path, monkeypatch):
     monkeypatch.setenv(progress.FILE_VARIABLE, str(tmp_path / 'progress.txt'))
-    monkeypatch.setenv('JPY_SESSION_NAME', 'notebooks/19_find_the_fault.ipynb')
+    monkeypatch.setenv('JPY_SESSION_NAME', str(path_of('find_the_fault')))
     workspace, seeds, came = Offline(tmp_path), cycle(seeds), []
     others = {*FAULTS} - {*CORE.values()}
     rounds = [others, {*FAULTS}, {*FAULTS}]

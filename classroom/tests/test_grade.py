@@ -17,23 +17,23 @@ from classroom.grade.answers import answers_of, handed_out, lesson_of
 from classroom.grade.results import Kept, digest_of, job_of, result_of
 from classroom.grade.submissions import submissions_of, workspace_files
 from helpers.checks.verdict import KEY
-from helpers.lesson import ROOT, cells_of, tags
+from helpers.lesson import cells_of, path_of, tags
 from helpers.lesson import lessons as lessons_of_course
 
 RIGHT, WRONG = 'speed = 1.75 / 3.5\nshow(speed)', 'speed = 1.75\nshow(speed)'
 STARTER = 'task-00-1-starter'
+NUMBER = {lesson.name: lesson.number for lesson in lessons_of_course()}
 OF = len(lessons_of_course()[0].tasks)  # of lesson 00
 
 
 @pytest.fixture(scope='module')
 def lessons():
-    return {one.lesson.number: one for one in handed_out()}
+    return {one.lesson.name: one for one in handed_out()}
 
 
-def notebook(number='00', **sources):
+def notebook(name='start_here', **sources):
     """Return a lesson as a student saves it, with other sources of some cells."""
-    [path] = (ROOT / 'notebooks').glob(f'{number}_*.ipynb')
-    content = json.loads(path.read_text(encoding='utf-8'))
+    content = json.loads(path_of(name).read_text(encoding='utf-8'))
     for cell in content['cells']:
         cell['source'] = sources.get(cell['id'], cell['source'])
     return content
@@ -188,11 +188,11 @@ def read(content, lessons):
 
 
 def test_a_lesson_is_found_by_what_is_in_it(lessons):
-    content = notebook('02')
-    assert read(content, lessons)[0] is lessons['02']
+    content = notebook('lose_messages')
+    assert read(content, lessons)[0] is lessons['lose_messages']
     for cell in content['cells']:
         cell.pop('id')  # as another program may save it
-    assert read(content, lessons)[0] is lessons['02']
+    assert read(content, lessons)[0] is lessons['lose_messages']
     assert lesson_of(cells_of(b'{"cells": [{"cell_type": "code", "source": "1"}]}'), ()) is None
 
 
@@ -207,15 +207,15 @@ def test_a_lesson_is_found_by_what_is_in_it(lessons):
 )
 def test_answers_go_into_the_cells_of_the_lesson(lessons, change):
     """By the id of a cell, else by the heading of its task and the tag, else by the place."""
-    first = next(iter(lessons['02'].tasks.values())).exercises[0].id
-    content = notebook('02', **{first: 'mine = 1\n'})
+    first = next(iter(lessons['lose_messages'].tasks.values())).exercises[0].id
+    content = notebook('lose_messages', **{first: 'mine = 1\n'})
     for cell in content['cells']:
         if isinstance(cell['source'], list):
             cell['source'] = ''.join(cell['source'])
         change(cell)
     _, answers = read(content, lessons)
     assert answers.sources[first] == 'mine = 1\n'
-    assert [n for n, task in lessons['02'].tasks.items() if answers.changed(task)] == [
+    assert [n for n, task in lessons['lose_messages'].tasks.items() if answers.changed(task)] == [
         'publish_numbers'
     ]
     assert not answers.said
@@ -231,7 +231,7 @@ def test_missing_and_doubled_cells_are_named(lessons):
     content['cells'] = [one for one in content['cells'] if one['id'] != STARTER]
     _, answers = read(content, lessons)
     assert answers.said == ['task 1 has no cell']
-    assert job_of(lessons['00'], answers, {}) is None
+    assert job_of(lessons['start_here'], answers, {}) is None
 
 
 def test_an_answer_beside_its_cell_is_named(lessons):
@@ -270,7 +270,9 @@ def test_a_notebook_in_an_archive_or_with_another_ending_is_read(submit, capsys)
 def test_why_there_is_no_verdict_is_said_in_words(lessons, output, why):
     _, answers = read(notebook(**{STARTER: 'x = 1'}), lessons)
     said = runner.Said({STARTER: [output]}, begun=True, ended=True)
-    assert result_of(lessons['00'], answers, {}, said, '').tasks['through_the_door'].why == why
+    assert (
+        result_of(lessons['start_here'], answers, {}, said, '').tasks['through_the_door'].why == why
+    )
 
 
 def test_only_exercise_cells_are_taken(lessons):
@@ -341,7 +343,7 @@ GOOD = {
 )
 def test_a_verdict_counts_if_it_is_one(lessons, verdicts, solved):
     _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
-    result = result_of(lessons['00'], answers, {}, said_of(*verdicts), 'digest')
+    result = result_of(lessons['start_here'], answers, {}, said_of(*verdicts), 'digest')
     assert result.tasks['through_the_door'].solved == solved
     assert result.points == solved
 
@@ -350,10 +352,10 @@ def test_without_a_verdict_the_error_is_said(lessons):
     _, answers = read(notebook(**{STARTER: 'speed = input()'}), lessons)
     error = {'output_type': 'error', 'ename': 'NameError', 'evalue': 'speed', 'traceback': []}
     said = runner.Said({STARTER: [error | {'ename': 'KeyboardInterrupt', 'evalue': ''}]})
-    result = result_of(lessons['00'], answers, {}, said, 'digest')
+    result = result_of(lessons['start_here'], answers, {}, said, 'digest')
     assert result.tasks['through_the_door'].why == 'its cell ended with KeyboardInterrupt'
     said = runner.Said({'check-00-1': [error]})
-    result = result_of(lessons['00'], answers, {}, said, 'digest')
+    result = result_of(lessons['start_here'], answers, {}, said, 'digest')
     assert result.tasks['through_the_door'].why == 'its check ended with NameError: speed'
 
 
@@ -444,7 +446,7 @@ def test_a_line_for_each_strange_submission(submit, capsys):
     folder = submit(
         **{
             'Ada/x.ipynb': with_answer(RIGHT),
-            'Bob/02.ipynb': json.dumps(notebook('02')).encode(),
+            'Bob/02.ipynb': json.dumps(notebook('lose_messages')).encode(),
             'Cy/notes.txt': b'I was ill',
             'Di/00.ipynb': json.dumps(notebook()).encode(),
             'Eve/a.ipynb': with_answer(WRONG),
@@ -458,7 +460,7 @@ def test_a_line_for_each_strange_submission(submit, capsys):
     assert lines[:8] == [
         f'=cmd(): lesson 00: 0 of {OF}',
         f'Ada: lesson 00: 1 of {OF}',
-        'Bob: 02.ipynb is lesson 02, not asked for; lesson 00 is not there',
+        f'Bob: 02.ipynb is lesson {NUMBER["lose_messages"]}, not asked for; lesson 00 is not there',
         'Cy: no notebook, but notes.txt',
         f'Di: lesson 00: 0 of {OF}; nothing is written in lesson 00',
         f'Eve: lesson 00: 0 of {OF}; lesson 00 is there twice: a.ipynb counts',
@@ -502,16 +504,19 @@ def test_moodle_takes_its_worksheet_back(submit, capsys):
 
 @pytest.mark.parametrize('options', [[], ['--no-stars']])
 def test_tasks_with_a_star_count_or_not(submit, capsys, lessons, options):
-    tasks = lessons['01'].lesson.tasks
+    tasks = lessons['publish_and_subscribe'].lesson.tasks
     starred = [task for task in tasks if task.star]
     of = len(tasks) - (len(starred) if options else 0)
     points = 1 if options else 2
     core = next(task for task in tasks[1:] if not task.star)
     solved = (task.exercises[0].id for task in (core, starred[0]))
-    data = json.dumps(notebook('01', **dict.fromkeys(solved, RIGHT))).encode()
+    data = json.dumps(notebook('publish_and_subscribe', **dict.fromkeys(solved, RIGHT))).encode()
     folder = submit(**{'Student_500_assignsubmission_file/lesson.ipynb': data})
     assert main([str(folder), *options], Stand()) == 0
-    assert f'Student: lesson 01: {points} of {of}\n' in capsys.readouterr().out
+    assert (
+        f'Student: lesson {NUMBER["publish_and_subscribe"]}: {points} of {of}\n'
+        in capsys.readouterr().out
+    )
     [row] = rows_of(folder)
     counts = row['points'], row['of'], row[f'publish_and_subscribe {starred[0].name}']
     assert counts == (str(points), str(of), '1')
@@ -521,7 +526,9 @@ def test_tasks_with_a_star_count_or_not(submit, capsys, lessons, options):
 
 def test_an_exam_of_two_tasks(submit, capsys):
     """What a student has run to look at the robot is run again; two tasks are all points."""
-    data = notebook('19', **{'find-next': RIGHT, 'mend-next': RIGHT, 'next': 'SEED = 7  # mine'})
+    data = notebook(
+        'find_the_fault', **{'find-next': RIGHT, 'mend-next': RIGHT, 'next': 'SEED = 7  # mine'}
+    )
     at = next(i for i, cell in enumerate(data['cells']) if cell['id'] == 'find-next')
     look = {
         'cell_type': 'code',
@@ -533,14 +540,16 @@ def test_an_exam_of_two_tasks(submit, capsys):
     path = 'Student_500_assignsubmission_file/19_first.ipynb'
     folder = submit(**{path: json.dumps(data).encode()})
     assert main([str(folder), '--tasks', '9 10'], Stand()) == 0
-    assert 'Student: lesson 19: 2 of 2; SEED 7\n' in capsys.readouterr().out
-    [handed] = [one for one in handed_out() if one.lesson.number == '19']
+    assert (
+        f'Student: lesson {NUMBER["find_the_fault"]}: 2 of 2; SEED 7\n' in capsys.readouterr().out
+    )
+    [handed] = [one for one in handed_out() if one.lesson.name == 'find_the_fault']
     cells = job_of(handed, answers_of(cells_of(json.dumps(data).encode()), handed), {})['cells']
     ids = [cell['id'] for cell in cells]
     assert ids[ids.index('find-next') - 1] == 'find-next-look-0'
     assert 'SEED = 7' in next(cell['source'] for cell in cells if cell['id'] == 'next')
     assert main([str(folder), '--tasks', '99'], Stand()) == 1
-    assert "19_find_the_fault.ipynb has no task '99'" in capsys.readouterr().err
+    assert "_find_the_fault.ipynb has no task '99'" in capsys.readouterr().err
 
 
 def test_two_assignments_in_one_folder_are_refused(submit, capsys):
@@ -602,7 +611,7 @@ def test_feedback_has_verdicts_and_no_solution(submit):
 
 
 def test_equal_answers_are_named(lessons):
-    task = next(iter(lessons['02'].tasks.values()))
+    task = next(iter(lessons['lose_messages'].tasks.values()))
     [cell] = task.exercises
     own = 'for my_own_number in range(100, 10_000, 7):\n    print("What I think", my_own_number)\n'
     own += 'my_second_thought = [my_own_number for _ in range(12)]\n'
@@ -620,18 +629,18 @@ def test_equal_answers_are_named(lessons):
     }
     students = []
     for name, source in written.items():
-        students.append((name, read(notebook('02', **{cell.id: source}), lessons)[1]))
-    assert alike.groups(lessons['02'], students) == [(task.name, ['Ada', 'Bob'])]
+        students.append((name, read(notebook('lose_messages', **{cell.id: source}), lessons)[1]))
+    assert alike.groups(lessons['lose_messages'], students) == [(task.name, ['Ada', 'Bob'])]
 
 
 def test_what_is_kept_is_that_of_the_same_answers_and_lesson(lessons, tmp_path):
     _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
-    digest = digest_of(lessons['00'], answers, {})
-    result = result_of(lessons['00'], answers, {}, said_of(GOOD), digest)
+    digest = digest_of(lessons['start_here'], answers, {})
+    result = result_of(lessons['start_here'], answers, {}, said_of(GOOD), digest)
     kept = Kept(tmp_path / 'judged')
     kept.put('ada', result)
     assert kept.get('ada', digest, 20) == result
-    assert kept.get('ada', digest_of(lessons['00'], answers, {'a': b''}), 20) is None
+    assert kept.get('ada', digest_of(lessons['start_here'], answers, {'a': b''}), 20) is None
     result.trouble, result.minutes = 'it was ended after 5 min', 5.0
     kept.put('ada', result)
     assert kept.get('ada', digest, 5) == result
@@ -658,14 +667,14 @@ def test_what_is_kept_is_that_of_the_same_helpers(lessons, tmp_path, monkeypatch
         path.parent.mkdir(parents=True)
         path.write_text(text)
         monkeypatch.setattr(results, 'ROOT', tmp_path / text)
-        digests.append(digest_of(lessons['00'], answers, {}))
+        digests.append(digest_of(lessons['start_here'], answers, {}))
     assert (digests[0] != digests[1]) == is_new
 
 
 def test_the_number_of_a_lesson_that_draws_its_task(lessons):
-    lesson = lessons['02']
+    lesson = lessons['lose_messages']
     first = lesson.tasks['publish_numbers'].exercises[0].id
-    _, answers = read(notebook('02', **{first: 'mine = 1'}), lessons)
+    _, answers = read(notebook('lose_messages', **{first: 'mine = 1'}), lessons)
     answers.seed = '7'
     cells = [cell.copy() for cell in lesson.cells]
     cells[[cell.cell_type for cell in cells].index('code')].source = 'SEED = 1\nother(SEED)'

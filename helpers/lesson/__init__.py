@@ -36,6 +36,7 @@ from helpers.lesson.cells import (
     cells_of,
     first_heading,
     has_heading,
+    is_for_instructors,
     is_question,
     tags,
 )
@@ -82,6 +83,7 @@ from helpers.lesson.lesson import (
 )
 from helpers.lesson.mentions import (
     bare_mentions,
+    links_to_tasks,
     with_mentions,
     with_slugs,
     without_links,
@@ -122,9 +124,11 @@ __all__ = [
     'heading_of',
     'name_of_solution',
     'is_check',
+    'is_for_instructors',
     'is_question',
     'is_solution',
     'lessons',
+    'links_to_tasks',
     'minutes_of_note',
     'names_of_memory',
     'outline',

@@ -7,6 +7,7 @@ import re
 
 LONGEST_NAME = 40  # letters of a cell's first line that are enough to find it
 QUESTION = '### Question '
+FOR_INSTRUCTORS = r'## \d+\. For instructors'
 
 
 class Node(dict):
@@ -87,6 +88,11 @@ def called(cell: Node) -> str:
 def has_heading(cell: Node, form: str) -> bool:
     """Return whether a cell of text begins with a heading of this form, a regular expression."""
     return cell.cell_type == 'markdown' and bool(re.match(form, cell.source))
+
+
+def is_for_instructors(cell: Node) -> bool:
+    """Return whether a cell of text is for teachers, who have more than a student's edition."""
+    return has_heading(cell, FOR_INSTRUCTORS)
 
 
 def is_question(cell: Node) -> bool:

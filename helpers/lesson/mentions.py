@@ -80,6 +80,11 @@ def with_slugs(text: str) -> str:
     return LINK.sub(written, text)
 
 
+def links_to_tasks(text: str) -> list[str]:
+    """Return the targets of the links to tasks of the same notebook."""
+    return [link['task'] for link in LINK.finditer(text) if link['task'] and not link['name']]
+
+
 def bare_mentions(text: str) -> Iterator[str]:
     """Yield what calls a lesson or a task by its number outside a link, where no tool follows."""
     yield from BARE.findall(ANY_LINK.sub('[]()', text))

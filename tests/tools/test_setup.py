@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from support.processes import put
 
-from helpers.lesson import ROOT
+from helpers.lesson import ROOT, path_of
 from helpers.machine import OWNED
 
 LOCKS = Path('tools/locks')
@@ -294,7 +294,7 @@ def test_what_somebody_wrote_is_not_cleaned(tmp_path):
         'scratch/find_the_fault/src/ada/__pycache__/brake.pyc',
     ]
     kept = [
-        'notebooks/02_lose_messages.ipynb',
+        f'notebooks/{path_of("lose_messages").name}',
         '.jupyter/hub/jupyterhub.sqlite',
         '.jupyter/class/class.sqlite',
         '.jupyter/data/ros2_notebooks_progress.txt',

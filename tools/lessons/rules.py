@@ -26,8 +26,10 @@ from helpers.lesson import (
     bare_mentions,
     called,
     check_call,
+    code_of_solution,
     has_heading,
     is_question,
+    links_to_tasks,
     name_of_solution,
     names_of_memory,
     starts_memory,
@@ -196,7 +198,7 @@ def solutions_import_what_they_use(lesson: Lesson) -> Iterator[str]:
         names = names_of(cell.source)
         known |= names.given | names.imported
     for cell in lesson.code_cells():
-        _, _, source = cell.source.partition('\n')
+        source = code_of_solution(cell.source)
         if 'solution' in tags(cell) and not source.startswith('%%'):
             names = names_of(source)
             for name in sorted(names.taken - known):
@@ -274,6 +276,7 @@ def links_lead_somewhere(lesson: Lesson) -> Iterator[str]:
 
 def mentions_are_links(lesson: Lesson) -> Iterator[str]:
     """A lesson or a task that a text calls by its number is a link: its number follows."""
+    anchors = {task.anchor for task in lesson.tasks}
     for cell in lesson.cells:
         source = cell.source if cell.cell_type != 'code' else _comments(cell.source)
         for mention in bare_mentions(source):
@@ -282,9 +285,9 @@ def mentions_are_links(lesson: Lesson) -> Iterator[str]:
                 'link, [lesson 05](05_keep_what_is_fresh.ipynb) or [task 3](#✎-Task-3:-A-driver), '
                 'or in code the name.'
             )
-        for target in re.findall(r'\]\((#✎[^)]*)\)', source):
-            if target not in {task.anchor for task in lesson.tasks}:
-                yield f'The link {target} leads to no task.'
+        for target in links_to_tasks(source):
+            if target not in anchors:
+                yield f'The link {target} leads to no task of this lesson.'
 
 
 def _comments(source: str) -> str:
