@@ -52,15 +52,15 @@ test: set_up ## test the course, each notebook against its saved outputs: LESSON
 		.venv/bin/ruff check --config "$$answers" && .venv/bin/ruff format --check --config "$$answers"
 	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 $(lesson) $(PYTEST_ARGS)
 
-notebooks: set_up ## run the notebooks, save their outputs, and the tables and pictures that follow: LESSON=02 for one
-	@$(PYTHON) -m tools.lessons.run $(LESSON)
+notebooks: set_up ## run the notebooks whose code has changed, save outputs, tables, pictures: LESSON=02 for one, RUN=yes (new)
+	@$(PYTHON) -m tools.lessons.run $(LESSON) $(if $(RUN),--run "$(RUN)")
 	@$(PYTHON) -m tools.lessons.first_pictures
 
 lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04; REMOVE=yes takes it out
 	@$(PYTHON) -m tools.lessons.new "$(NAME)" $(if $(AFTER),--after "$(AFTER)") $(if $(filter yes,$(REMOVE)),--remove)
 
-task: set_up ## begin a task in a lesson: LESSON=02, AFTER=3
-	@$(PYTHON) -m tools.lessons.task "$(LESSON)" $(if $(AFTER),--after "$(AFTER)")
+task: set_up ## begin a task in a lesson: LESSON=02, AFTER=3, NAME=count_them
+	@$(PYTHON) -m tools.lessons.task "$(LESSON)" $(if $(AFTER),--after "$(AFTER)") $(if $(NAME),--name "$(NAME)")
 
 lint: set_up ## check style and format with ruff
 	@.venv/bin/ruff check && .venv/bin/ruff format --check
@@ -75,7 +75,7 @@ test-packages: set_up ## build and test the packages that learners end with: LES
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/packages $(lesson) $(PYTEST_ARGS)
 
 test-answers: set_up ## let each check judge the answers in tests/answers: LESSON=02, TASK=3
-	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) -o faulthandler_timeout=1800 tests/answers $(lesson) $(if $(TASK),-k "$(shell printf task_%02d $(TASK))") $(PYTEST_ARGS)
+	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) tests/answers $(lesson) $(if $(TASK),--task "$(TASK)") $(PYTEST_ARGS)
 
 test-browser: ## test JupyterLab and the site in Chromium
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
@@ -92,9 +92,8 @@ test-hub: set_up ## test a hub and a container with a class of twelve
 soak: set_up ## run the notebooks in hard conditions, as root: CONDITIONS="idle busy", LESSON=02
 	@tests/soak/run.sh "$(CONDITIONS)" "$(LESSON)"
 
-bench: set_up ## measure what things cost, on an idle machine: ONLY="20 200" for some rates
-	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks $(ONLY)
-	@PYTHONPATH="$(CURDIR)/tests" $(PYTHON) -m benchmarks.start
+bench: set_up ## measure what the first start costs, on an idle machine: ROUNDS=3
+	@$(PYTHON) tests/benchmarks/start.py $(ROUNDS)
 
 lock: ## write tools/locks from pyproject.toml: UPGRADE=yes takes newer versions
 	@tools/lock.sh $(if $(filter yes,$(UPGRADE)),--upgrade)
@@ -118,8 +117,6 @@ licences: groups := test browser site hub licences
 .PHONY: help lab present class test test-ros2 test-tools test-packages test-answers test-browser test-classroom test-hub image lab-container hub handout grade update notebooks \
 	lesson task site soak bench release lint lock licences clean set_up
 
-PYTHON := .venv/bin/python
-
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None
 # is replaced: where one has crashed, pytest-xdist may wait for its successor for ever.
 WORKERS := 4
@@ -132,23 +129,4 @@ slow := --dist worksteal --max-worker-restart 0 -o faulthandler_timeout=600
 
 this_python = $(shell $(PYTHON) -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 
-ROOT := .
-# A port that you name is the one you get, or an error.
-server = --root "$(ROOT)" $(if $(PORT),--port "$(PORT)") $(if $(filter no,$(BROWSER)),--no-browser)
-
-# What you have set for other work stays out: another ROS 2 that is sourced, Python's and Jupyter's
-# variables, the settings in your home folder. What must not reach a build stands in
-# helpers/machine/build_tools.py. JupyterLab's state of this course is in .jupyter.
-unexport $(filter PYTHON% ROS_% RMW_% RCUTILS_% FASTDDS_% FASTRTPS_% JUPYTER% IPYTHON% \
-	_ROS_WHEELS_BOOTSTRAP_COMPLETE AMENT_PREFIX_PATH VIRTUAL_ENV MPLBACKEND,$(.VARIABLES))
-ifneq ($(AMENT_PREFIX_PATH)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)
-# The libraries of that other ROS 2. The wheels set their own path.
-unexport LD_LIBRARY_PATH
-endif
-export JUPYTER_CONFIG_DIR := $(CURDIR)/.jupyter
-export JUPYTER_DATA_DIR := $(CURDIR)/.jupyter/data
-export JUPYTER_RUNTIME_DIR := $(CURDIR)/.jupyter/runtime
-export IPYTHONDIR := $(CURDIR)/.jupyter/ipython
-export ROS_LOG_DIR := $(CURDIR)/.jupyter/ros_log
-# Its list of fonts. In a home that cannot be written each kernel would make it anew, and warn.
-export MPLCONFIGDIR := $(CURDIR)/.jupyter/matplotlib
+include tools/environment.mk

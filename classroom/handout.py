@@ -6,7 +6,7 @@
     python -m classroom.handout --wheels 3.11 3.12    with all packages for these Pythons
     python -m classroom.handout --lessons FOLDER      the lessons only, into this folder
 
-It is a student's: KEPT, with students.md as its README and a Makefile of COMMANDS.
+It is a student's: KEPT, with students.md as its README and handout.mk as its Makefile.
 environment.md is without what is between `<!-- not in the handout -->` and `<!-- end -->`. The
 notebooks have no outputs. `.handed_out` holds the same files once more, so that `make update` can
 see what the student has written since. An archive with more solutions brings them to those who have
@@ -27,9 +27,9 @@ from nbformat import NotebookNode
 from packaging.requirements import Requirement
 
 from classroom.update import BASE, committed
+from helpers.lesson import PICTURES, ROOT, chosen, is_for_instructors, tags
 from helpers.notebook import MARK
 from tools.lessons.clean import text_of
-from tools.lessons.lesson import PICTURES, ROOT, chosen, tags
 
 NAME = 'ros2_notebooks'
 ALL = 'yes'  # SOLUTIONS=: of all lessons
@@ -37,21 +37,19 @@ LOCK = 'tools/locks/requirements.lock'
 WHEELS = 'wheels'
 # What `make lab` and `make update` need. The lock of uv is that of the installer itself.
 KEPT = (
-    *('LICENSE', 'Makefile', 'environment.md', 'pyproject.toml', 'helpers', 'notebooks', 'ros2'),
-    *('tools/lab.py', 'tools/lab.css', 'tools/pip.py', 'tools/set_up.sh', 'tools/uv.sh'),
-    *('tools/jupyter', LOCK, 'tools/locks/requirements-uv.lock', 'tools/locks/files.sh'),
+    *('LICENSE', 'environment.md', 'pyproject.toml', 'helpers', 'notebooks', 'ros2'),
+    *('tools/environment.mk', 'tools/set_up.sh', 'tools/uv.sh', 'tools/pip.py', 'tools/jupyter'),
+    *('tools/lab.py', 'tools/lab.css', LOCK, 'tools/locks/requirements-uv.lock'),
+    *('tools/locks/files.sh'),
     *('classroom/__init__.py', 'classroom/update.py'),
 )
 LEFT_OUT = ('ros2/tests',)
 README, STUDENTS = 'README.md', 'classroom/students.md'
+ENVIRONMENT = 'environment.md'
+MAKEFILE, COMMANDS = 'Makefile', 'classroom/handout.mk'
 LESSONS = re.compile(
     r'<!-- made by `make notebooks`: lessons -->\n\n(.*?)\n\n<!-- end -->', re.DOTALL
 )
-COMMANDS = ('help', 'lab', 'set_up', 'update')
-NOT_NEEDED = re.compile(
-    r'^## |^(groups|WORKERS|lesson|slow|this_python)\b.*=|: groups :=', re.MULTILINE
-)
-FOR_INSTRUCTORS = re.compile(r'## \d+\. For instructors')
 NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', re.DOTALL)
 GTEST = 'ros-gtest-vendor=='
 GTEST_PYTHON = '3.12'  # whose wheel holds the sources: see tools/set_up.sh
@@ -66,11 +64,13 @@ def handout(root: Path, output: Path, *, solutions: str = ALL, pythons: tuple = 
     """
     with tempfile.TemporaryDirectory() as folder:
         course = committed(root, 'HEAD', Path(folder, NAME))
-        texts = {README: readme_for_students(course)}
+        texts = {
+            README: readme_for_students(course),
+            MAKEFILE: (course / COMMANDS).read_text(encoding='utf-8'),
+        }
+        if (course / ENVIRONMENT).exists():
+            texts[ENVIRONMENT] = for_students((course / ENVIRONMENT).read_text(encoding='utf-8'))
         _keep_only(course)
-        for name, change in (('Makefile', commands_of), ('environment.md', for_students)):
-            if (course / name).exists():
-                texts[name] = change((course / name).read_text(encoding='utf-8'))
         for name, text in texts.items():
             (course / name).write_text(text, encoding='utf-8')
         write_lessons(course / 'notebooks', course / 'notebooks', solutions=solutions)
@@ -145,22 +145,12 @@ def for_students(text: str) -> str:
     return NOT_HANDED_OUT.sub('', text)
 
 
-def commands_of(makefile: str) -> str:
-    """Return the Makefile with COMMANDS only, and what they need."""
-    kept = []
-    for part in makefile.split('\n\n'):
-        rule = re.match(r'([a-z][a-z0-9_-]*|\.PHONY):', part)
-        if not NOT_NEEDED.search(part) and (not rule or rule[1] in COMMANDS):
-            kept.append(part.replace(', OUTPUTS=yes (saved ones)', ''))
-    return '\n\n'.join([*kept[:-1], kept[-1].rstrip(), f'.PHONY: {" ".join(COMMANDS)}\n'])
-
-
 def lesson_for_students(notebook: NotebookNode, left_out: set[str]) -> NotebookNode:
     """Return a notebook without outputs, and without what is for instructors."""
     notebook.cells = [
         cell
         for cell in notebook.cells
-        if not left_out & tags(cell) and not FOR_INSTRUCTORS.match(cell.source)
+        if not left_out & tags(cell) and not is_for_instructors(cell)
     ]
     notebook.metadata.pop(MARK, None)  # what hides outputs of the repository
     for cell in notebook.cells:

@@ -1,13 +1,11 @@
-"""A timetable of teaching.md: its lessons, and their steps."""
+"""A timetable for the slides: its lessons, their steps and their minutes."""
 
 import itertools
 import re
 from typing import NamedTuple
 
-from tools.lessons.lesson import ROOT
-from tools.lessons.tables import BLOCK, LINK, ROW
-
-HEADING = re.compile(r'^### (.+)$', re.MULTILINE)
+from helpers.lesson import lessons
+from tools.lessons.timetables import Timetable, minutes_and_lesson, timetables
 
 
 class Row(NamedTuple):
@@ -19,56 +17,47 @@ class Row(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What happens, as (minutes, text)."""
+    """What happens, in its order."""
 
     title: str
-    rows: list[tuple[str, str]]
+    rows: list[Row]
 
     @property
     def steps(self) -> dict[str, tuple[int, int] | None]:
         """The lessons in their order, by file name: the first and the last step, None for all."""
         found = {}
-        for _, what in self.rows:
-            file, steps = lesson_of(what)
-            if file:  # a lesson may come again, with later steps
-                found[file] = steps and (found.get(file, steps)[0], steps[1])
+        for row in self.rows:
+            if row.file:  # a lesson may come again, with later steps
+                found[row.file] = row.steps and (found.get(row.file, row.steps)[0], row.steps[1])
         return found
 
     @property
     def from_first_lesson(self) -> list[Row]:
         """The rows without what comes before the first lesson."""
-        rows = [Row(int(minutes), *lesson_of(what)) for minutes, what in self.rows]
-        return list(itertools.dropwhile(lambda row: not row.file, rows))
-
-
-def lesson_of(what: str) -> tuple[str, tuple[int, int] | None]:
-    """Return the file of a row's lesson and its steps, None for all; no file for another row."""
-    if not (link := LINK.match(what)):
-        return '', None
-    _, path, first, last = link.groups()
-    return path.rpartition('/')[2], (int(first), int(last or first)) if first else None
+        return list(itertools.dropwhile(lambda row: not row.file, self.rows))
 
 
 NO_PLAN = Plan('', [])
 
 
-def plans() -> list[Plan]:
-    """Return the timetables of teaching.md."""
-    text = (ROOT / 'teaching.md').read_text(encoding='utf-8')
-    tables = [block for block in BLOCK.finditer(text) if block[2] == 'timetable']
-    return [
-        Plan(HEADING.findall(text, 0, table.start())[-1], ROW.findall(table[3])) for table in tables
-    ]
-
-
 def plan_of(name: str) -> Plan:
-    """Return the timetable whose heading holds this word, such as `90` or `half`.
+    """Return the timetable whose title holds this word, such as `90` or `half`.
 
-    Raises ValueError with one sentence if there is none, or more than one.
+    Raises ValueError with one sentence if there is none, or more than one, or if a notebook does
+    not say what it needs.
     """
-    known = plans()
-    found = [plan for plan in known if re.search(rf'\b{re.escape(name)}\b', plan.title, re.I)]
+    known = timetables()
+    found = [one for one in known if re.search(rf'\b{re.escape(name)}\b', one.title, re.I)]
     if len(found) != 1:
-        names = ', '.join(repr(plan.title) for plan in known)
+        names = ', '.join(repr(timetable.title) for timetable in known)
         raise ValueError(f'There is no single timetable {name!r}. Give a word of one: {names}.')
-    return found[0]
+    return _plan(found[0])
+
+
+def _plan(timetable: Timetable) -> Plan:
+    known = lessons()
+    rows = []
+    for row in timetable.rows:
+        minutes, lesson = minutes_and_lesson(row, known)
+        rows.append(Row(minutes, lesson.file if lesson else '', row.steps))
+    return Plan(timetable.title, rows)

@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Become the server that shows the copies, or return an exit status."""
     options = parser('Show copies of lessons as a deck, slides whose cells run.')
     options.add_argument('--lessons', default='', help="numbers such as '2 3', the first is shown")
-    options.add_argument('--plan', default='', help='a timetable of teaching.md, such as 90')
+    options.add_argument('--plan', default='', help='a timetable, such as 90')
     options.add_argument(
         '--class', dest='page', default='', help='the class of a hub, as its page says'
     )

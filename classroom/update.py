@@ -7,12 +7,8 @@
 Three versions are compared: what was handed out, what the student has made of it, what is newer.
 JupyterLab keeps the id of a cell, and so do the lessons: a cell is found again by its id, and a
 lesson by its name without its number. A cell, or another file, that only one side has changed is
-taken from that side. Where both have changed it, both are there.
-
-In version 0.2 the code of a check stood in the lesson, in folded cells, and `helpers` had other
-rooms. A cell of that version that a student has changed may no longer run: it is kept as text. In a
-folder of version 0.2 `make update` runs the program of version 0.2, which leaves such a cell as
-code: the next `make update` makes it text.
+taken from that side. Where both have changed it, both are there. If a newer lesson calls its
+workspace by another name, the files that a student has in `scratch` come along.
 
 Why no kept tool: of 200 histories drawn as in classroom/tests/test_update.py, nbdime 4.0.4 left
 conflict markers inside cells in 39 (strategy inline), or lost words in 5 (union). nbgitpuller keeps
@@ -35,6 +31,8 @@ import nbformat
 from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell, new_notebook
 
+from helpers.lesson import outline
+from helpers.machine import Renamed, give_new_names, set_apart
 from helpers.notebook import MARK
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -43,11 +41,25 @@ APART = (BASE, '.git', 'wheels')
 LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # wherever they are
 # What nbformat and this program raise for a file that is no notebook, or has no ids.
 UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, nbformat.ValidationError)
+# How the lessons of version 0.3.0 call their workspaces. Its own program brings newer lessons, and
+# leaves the workspaces as they are: the next update finds them by these names.
+OF_0_3 = {
+    'publish_and_subscribe': 'lesson_01',
+    'lose_messages': 'lesson_02',
+    'set_parameters': 'lesson_08',
+    'make_a_package': 'lesson_09',
+    'bring_in_a_package': 'lesson_10',
+    'use_a_message_in_your_own_interface': 'lesson_11',
+    'launch_a_system': 'lesson_12',
+    'test_a_node': 'lesson_13',
+    'share_code_in_a_cpp_library': 'lesson_14',
+    'write_a_node_in_cpp': 'lesson_15',
+    'put_the_sensors_on_the_robot': 'lesson_17',
+    'record_a_bag': 'lesson_18',
+    'find_the_fault': 'lesson_19',
+    'build_a_robot_program': 'lesson_20',
+}
 YOURS = '*Your version of the cell above, from before the update:*'
-NO_LONGER_RUNS = 'Your version, from before the update. It no longer runs: copy what you need.'
-# What was in version 0.2 only: the first line of each check, and the imports of each lesson.
-CHECK_OF_0_2 = '✔ Check of task'
-IMPORT_OF_0_2 = re.compile(r'^from helpers\.(classroom|session) import ', re.MULTILINE)
 
 
 def merge(base: NotebookNode, mine: NotebookNode, newer: NotebookNode) -> NotebookNode:
@@ -124,61 +136,20 @@ def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
     return said
 
 
-def keep_old_cells_as_text(mine: Path, newer: Path) -> list[str]:
-    """Turn cells of version 0.2 that no longer run into text; return a sentence for each lesson."""
-    said = []
+def renamed_workspaces(base: Path, newer: Path) -> list[Renamed]:
+    """Return the workspaces that the newer lessons call by another name than those of `base`."""
+    found = {}
     for file in files_of(newer):
-        if file.suffix != '.ipynb' or _bytes(mine / file) in (None, _bytes(newer / file)):
+        if file.suffix != '.ipynb':
             continue
-        try:
-            own, lesson = (nbformat.read(folder / file, as_version=4) for folder in (mine, newer))
-            old = ids_of_0_2(own, lesson)
-        except UNREADABLE:
-            continue
-        if old:
-            _make_text(own, old)
-            data = (nbformat.writes(own) + '\n').encode()
-            _write(mine / file, data, (mine / file).stat().st_mode)
-            said.append(f'{file}: cells of yours that no longer run, now kept as text: {len(old)}.')
-    return said
-
-
-def ids_of_0_2(mine: NotebookNode, newer: NotebookNode) -> set[str]:
-    """Return the ids of cells of version 0.2 that a student has changed and that no longer run.
-
-    What supports a check (the tag `harness`) would even take the place of a function of the same
-    name that the lesson imports now.
-    """
-    ids, sources = ({cell[key] for cell in newer.cells} for key in ('id', 'source'))
-    found, above = set(), ''
-    for cell in mine.cells:
-        tags = cell.metadata.get('tags', [])
-        is_old = (
-            'harness' in tags
-            or ('check' in tags and CHECK_OF_0_2 in cell.source)
-            or (above == YOURS and IMPORT_OF_0_2.search(cell.source))
-        )
-        is_known = cell.id in ids or cell.source in sources
-        if cell.cell_type == 'code' and is_old and not is_known:
-            found.add(cell.id)
-        above = cell.source
-    return found
-
-
-def _make_text(notebook: NotebookNode, ids: set[str]) -> None:
-    """Turn cells of code into text that unfolds."""
-    cells = []
-    for cell in notebook.cells:
-        if cell.id in ids:
-            if cells and cells[-1].source == YOURS:
-                cells.pop()
-            longest = max(map(len, re.findall('`+', cell.source)), default=0)
-            fence = '`' * max(3, longest + 1)
-            code = f'{fence}python\n{cell.source}\n{fence}'
-            summary = f'<summary><em>{NO_LONGER_RUNS}</em></summary>'
-            cell = new_markdown_cell(f'<details>{summary}\n\n{code}\n\n</details>')
-        cells.append(cell)
-    notebook.cells = cells
+        lesson, old = outline(newer / file), outline(_found(base / file))
+        old_name = old.workspace
+        if old_name == lesson.workspace:
+            old_name = OF_0_3.get(lesson.name, '')
+        if old_name and lesson.workspace not in ('', old_name):
+            packages = frozenset(old.packages | lesson.packages)
+            found.setdefault(old_name, Renamed(old_name, lesson.workspace, packages))
+    return [*found.values()]
 
 
 def files_of(folder: Path) -> list[Path]:
@@ -223,13 +194,14 @@ def _write(path: Path, data: bytes, mode: int) -> None:
     new.replace(path)
 
 
-def update_from_folder(newer: Path, mine: Path) -> list[str]:
+def update_from_folder(newer: Path, mine: Path, course: Path) -> list[str]:
     """Merge a folder into `mine`, and keep it there as what was handed out last.
 
-    After an interruption the next update goes on: to merge once more changes nothing.
+    `course` is the checkout whose lessons are open: its workspaces follow. After an interruption
+    the next update goes on: to merge once more changes nothing.
     """
-    said = merge_folders(mine / BASE, mine, newer)
-    said += keep_old_cells_as_text(mine, newer)
+    said = set_apart(renamed_workspaces(mine / BASE, newer), course)
+    said += merge_folders(mine / BASE, mine, newer)
     if (mine / BASE).is_dir():
         before, after = with_solutions(mine / BASE), with_solutions(newer)
         for numbers, what in (
@@ -239,13 +211,14 @@ def update_from_folder(newer: Path, mine: Path) -> list[str]:
             if numbers:
                 said.append(f'Lessons {", ".join(sorted(numbers))} {what}.')
     merge_folders(mine / BASE, mine / BASE, newer)
-    return said
+    # Not before: if this were done twice, two workspaces that change names would change them back.
+    return said + give_new_names(course)
 
 
 def with_solutions(folder: Path) -> set[str]:
     """Return the numbers of the lessons of a folder that have a solution."""
-    lessons = folder.rglob('[0-9][0-9]_*.ipynb')
-    return {path.name[:2] for path in lessons if b'"%%solution ' in path.read_bytes()}
+    lessons = map(outline, folder.rglob('[0-9][0-9]_*.ipynb'))
+    return {lesson.number for lesson in lessons if any(task.solutions for task in lesson.tasks)}
 
 
 def update_from_archive(archive: Path, mine: Path) -> list[str]:
@@ -259,7 +232,7 @@ def update_from_archive(archive: Path, mine: Path) -> list[str]:
         if newer is None:
             raise ValueError(f'{archive} is no archive of `make handout`.')
         lock = _bytes(mine / 'tools/locks/requirements.lock')
-        said = update_from_folder(newer, mine)
+        said = update_from_folder(newer, mine, course=mine)
         brought = (newer / 'wheels').is_dir()
         if brought or _bytes(mine / 'tools/locks/requirements.lock') != lock:
             shutil.rmtree(mine / 'wheels', ignore_errors=True)  # they are those of the old lock
@@ -298,10 +271,10 @@ def update_from_git(mine: Path) -> list[str]:
         base, newer = (
             committed(mine, name, Path(folder, name[-4:])) for name in ('HEAD', '@{upstream}')
         )
-        said = merge_folders(base, mine, newer)
-        said += keep_old_cells_as_text(mine, newer)
-    _git(mine, 'The lessons are new, but git could not note it', 'reset', '@{upstream}')
-    return said
+        said = set_apart(renamed_workspaces(base, newer), mine)
+        said += merge_folders(base, mine, newer)
+        _git(mine, 'The lessons are new, but git could not note it', 'reset', '@{upstream}')
+    return said + give_new_names(mine)
 
 
 def _git(folder: Path, trouble: str, *command: str) -> None:
@@ -330,7 +303,7 @@ def main(arguments: list[str] | None = None) -> int:
         if source is None:
             said = update_from_git(mine)
         elif source.is_dir():
-            said = update_from_folder(source, mine)
+            said = update_from_folder(source, mine, course=ROOT)
         elif source.is_file():
             said = update_from_archive(source.resolve(), mine)
         else:

@@ -5,6 +5,7 @@ import time
 
 import pytest
 import rclpy
+from builtin_interfaces.msg import Time
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import SingleThreadedExecutor
@@ -14,7 +15,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
-from helpers.checks.bench import Bench, let, must_define, must_have
+from helpers.checks.bench import Bench, must_define, must_have, override, scan
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks
 
@@ -102,6 +103,33 @@ def test_goals_are_sent_and_cancelled():
             bench.send_goal('other', Fibonacci, Fibonacci.Goal(), limit_s=0.2)
 
 
+def test_a_gate_holds_callbacks_until_it_opens_or_the_bench_ends():
+    with Bench() as bench:
+        gate, node = bench.gate(), Node('gated')
+        node.create_subscription(Int32, 'number', gate.hold, 10)
+        bench.spin(node)
+        assert not gate.wait_until_entered(limit_s=0.1)
+        bench.say('number', *numbers(1, 2), at_once=True)
+        assert gate.wait_until_entered()
+        assert [message.data for message in gate.entered] == [1]
+        gate.open()
+        assert gate.wait_until_entered(2)
+        held = threading.Thread(target=bench.gate().hold)
+        held.start()
+    held.join(1)
+    assert not held.is_alive()
+
+
+def test_a_scan_is_that_of_the_simulated_robot_unless_it_is_told():
+    message = scan(0.5, age_s=3600)
+    assert list(message.ranges) == [0.5] * 181
+    assert (round(message.angle_min, 2), round(message.angle_max, 2)) == (-1.57, 1.57)
+    assert 3590 < time.time() - message.header.stamp.sec < 3610
+    other = scan([1.0, 2.0], first=0.0, step=0.1, limits=(0.2, 3.5), stamp=Time(sec=7))
+    assert (list(other.ranges), round(other.angle_max, 3)) == ([1.0, 2.0], 0.1)
+    assert (round(other.range_min, 3), other.range_max, other.header.stamp.sec) == (0.2, 3.5, 7)
+
+
 def test_simulated_time_goes_on_only_when_it_is_told():
     ticks = []
     with Bench() as bench:
@@ -137,17 +165,19 @@ def period():
 
 def test_a_constant_that_the_code_reads_gets_another_value(monkeypatch):
     monkeypatch.setitem(globals(), 'PERIOD_S', PERIOD_S)
-    let(period, PERIOD_S=0.1)
+    override(period, PERIOD_S=0.1)
     assert period() == 0.1
 
 
 # --- What a verdict says of mistakes
 
 
-def verdict_on(make_node, capsys, act=lambda bench: bench.say('number', *numbers(1))):
+def verdict_on(
+    make_node, capsys, act=lambda bench: bench.say('number', *numbers(1)), points=('it works',)
+):
     tasks = Tasks()
 
-    @tasks.add(1)
+    @tasks.add
     def task(answer):
         def judged():
             with Bench() as bench:
@@ -155,9 +185,9 @@ def verdict_on(make_node, capsys, act=lambda bench: bench.say('number', *numbers
                 act(bench)
             return True
 
-        return [('it works', judged, '')]
+        return [(point, judged, '') for point in points]
 
-    tasks.check(1, make_node)
+    tasks.check('task', make_node)
     return ' '.join(capsys.readouterr().out.split())
 
 
@@ -218,20 +248,8 @@ def test_a_mistake_in_a_callback_is_named_with_its_line(callback, found, capsys)
 
 
 def test_after_a_callback_that_never_ends_no_other_point_is_tried(capsys):
-    tasks = Tasks()
-
-    @tasks.add(1)
-    def task(answer):
-        def judged():
-            with Bench() as bench:
-                bench.spin(answer())
-                bench.say('number', *numbers(1))
-            return True
-
-        return [('it works', judged, ''), ('again', judged, '')]
-
-    tasks.check(1, node_with(loops))
-    assert 'not tried, because the one above did not end' in capsys.readouterr().out
+    said = verdict_on(node_with(loops), capsys, points=('it works', 'again'))
+    assert 'not tried, because the one above did not end' in said
 
 
 def holds_until_the_gate_opens(gate):

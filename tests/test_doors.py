@@ -18,11 +18,10 @@ BELOW = {
     'helpers.checks.progress',  # which tasks are solved: lesson 00 and the tools ask
     'helpers.checks.tasks',  # what a lesson of one's own needs, and slow to load
     'helpers.checks.bench',
+    'helpers.checks.points',
     'helpers.checks.verdict',  # the data of a verdict, which the rules and the tests read
     'helpers.machine.doctor',  # a program, which runs where no ROS is
 }
-# What the lessons of version 0.2 imported stands there as text.
-TELL_OF_0_2 = 'update.py', 'test_update.py'
 IMPORT = re.compile(
     r'^[ \t]*(?:from (helpers[.\w]*) import (\([^)]*\)|[^\n#]*)|import (helpers[.\w]*))',
     re.MULTILINE,
@@ -43,8 +42,7 @@ def files():
     """Yield each Python file that is no test, and each notebook, with its code."""
     for folder in ('helpers', 'tools', 'classroom'):
         for file in sorted((ROOT / folder).rglob('*.py')):
-            if file.name not in TELL_OF_0_2:
-                yield file, file.read_text()
+            yield file, file.read_text()
     for file in sorted((ROOT / 'notebooks').glob('*.ipynb')):
         cells = json.loads(file.read_text())['cells']
         code = (''.join(cell['source']) for cell in cells if cell['cell_type'] == 'code')

@@ -15,7 +15,7 @@ from support.waits import wait_for
 
 from helpers.robot import CORRIDOR, EMPTY, KIND, TURTLEBOT3, Robot
 from helpers.robot.robot import command_type
-from helpers.robot.view.picture import fan
+from helpers.robot_view.picture import fan
 from helpers.ros import ros_session, yaw_of
 
 

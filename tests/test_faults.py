@@ -12,9 +12,9 @@ import yaml
 
 from helpers.checks import next_robot, progress
 from helpers.checks.lessons.find_the_fault import found, mended
-from helpers.checks.other_robots import LAST
 from helpers.faults import CORE, FAULTS, KINDS, OTHER, OTHERS, Case, drive, order_of, take
 from helpers.faults.cases import FILE, HEALTHY, edited, read
+from helpers.lesson import path_of
 from helpers.workspace import Workspace
 
 MENDS = [(fault, mend) for fault in FAULTS.values() for mend in (*fault.right, *fault.wrong)]
@@ -118,7 +118,7 @@ def test_a_robot_whose_build_was_cleaned_is_built_as_it_was_left(name, tmp_path)
 @pytest.mark.parametrize('seeds', [[1], [3], range(32)])
 def test_after_the_others_all_robots_come_again_each_with_its_fault(seeds, tmp_path, monkeypatch):
     monkeypatch.setenv(progress.FILE_VARIABLE, str(tmp_path / 'progress.txt'))
-    monkeypatch.setenv('JPY_SESSION_NAME', 'notebooks/19_find_the_fault.ipynb')
+    monkeypatch.setenv('JPY_SESSION_NAME', str(path_of('find_the_fault')))
     workspace, seeds, came = Offline(tmp_path), cycle(seeds), []
     others = {*FAULTS} - {*CORE.values()}
     rounds = [others, {*FAULTS}, {*FAULTS}]
@@ -129,8 +129,8 @@ def test_after_the_others_all_robots_come_again_each_with_its_fault(seeds, tmp_p
         robot.mend(robot.fault.right[0])
         (robot.folder / 'notes.txt').write_text('mine')
         assert next_robot(workspace, seed).files == robot.files  # it is not judged yet
-        progress.record(LAST, robot.fault.name)
-        progress.record(LAST, robot.fault.name)  # the check is run again
+        progress.record('mend_the_next', robot.fault.name)
+        progress.record('mend_the_next', robot.fault.name)  # the check is run again
         came.append(robot.fault.name)
     for faults in rounds:
         assert {*came[: len(faults)]} == faults
@@ -150,6 +150,8 @@ def test_a_file_that_does_not_say_all_is_named(tmp_path):
         read(tmp_path)
     with pytest.raises(ValueError, match='has .b. 0 times, not once'):
         edited('a', {'b': 'c'}, 'a file')
+    with pytest.raises(ValueError, match='has .b. 2 times, not once'):
+        edited('b a b', {'b': 'c'}, 'a file')
 
 
 def test_the_healthy_package_drives_and_its_tests_pass(workspace):

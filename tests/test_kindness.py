@@ -4,15 +4,14 @@ It hits nothing, it arrives, and it stands if the laser is blind: whatever the d
 who takes the program of lesson 20 to another robot relies on that.
 """
 
-import json
 import math
 import re
 import runpy
 
 import pytest
 from std_msgs.msg import Header
-from support.kernel import NOTEBOOKS
 
+from helpers.lesson import code_of_solution, outline, path_of
 from helpers.patrol import LAST
 from helpers.robot import KIND, TURTLEBOT3, Robot
 from helpers.robot.messages import laser_scan
@@ -26,15 +25,15 @@ DRIVERS = {
     'slow, and turns quickly': KIND.but(max_speed=0.21, max_turn=2.63, radius_m=0.105),
     'a TurtleBot 3': TURTLEBOT3,
 }
-PART = re.compile(r'%%solution \d+\n%%write src/patrol_pkg/patrol_pkg/logic\.py part \d+\n')
+PART = re.compile(r'%%write src/patrol_pkg/patrol_pkg/logic\.py part \d+\n')
 
 
 @pytest.fixture(scope='module')
 def logic(tmp_path_factory):
     """Return the functions of logic.py, as the lesson's solutions write them."""
-    [path] = NOTEBOOKS.glob('20_*.ipynb')
-    cells = [''.join(cell['source']) for cell in json.loads(path.read_text())['cells']]
-    parts = [PART.sub('', cell) for cell in cells if PART.match(cell)]
+    tasks = outline(path_of('build_a_robot_program')).tasks
+    solutions = [code_of_solution(cell.source) for task in tasks for cell in task.solutions]
+    parts = [PART.sub('', solution) for solution in solutions if PART.match(solution)]
     assert len(parts) == 3
     file = tmp_path_factory.mktemp('project') / 'logic.py'
     file.write_text('\n\n'.join(parts))

@@ -7,8 +7,7 @@ from itertools import pairwise
 import pytest
 
 from helpers.checks import memory, progress, remember
-from tools.lessons.code import recalled
-from tools.lessons.lesson import lessons
+from helpers.lesson import lessons, names_of_memory
 from tools.lessons.new import template
 
 BANK = memory.questions()
@@ -18,7 +17,7 @@ ASKED = [
     (name, lesson)
     for lesson in LESSONS.values()
     for cell in lesson.notebook.cells
-    for name in sorted((cell.cell_type == 'code' and recalled(cell.source)) or ())
+    for name in sorted((cell.cell_type == 'code' and names_of_memory(cell.source)) or ())
 ]
 
 
@@ -124,7 +123,9 @@ def test_one_miss_comes_back_at_a_time(capsys, monkeypatch):
 
 
 def test_each_question_is_asked_once():
-    [of_the_template] = [found for cell in template().cells if (found := recalled(cell.source))]
+    [of_the_template] = [
+        found for cell in template().cells if (found := names_of_memory(cell.source))
+    ]
     calls = Counter(name for name, _ in ASKED)
     assert {name for name, count in calls.items() if count > 1} == set()
     assert of_the_template & calls.keys() == set(), 'Write two questions of your own.'

@@ -1,16 +1,14 @@
 """Every lesson keeps the rules, and what is said of it elsewhere is right. nbval runs it."""
 
-import re
-from functools import partial
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 from support.answers import LEAST, answers_of, source_of
 
-from helpers.checks import progress
+from helpers.lesson import code_of_solution, lessons
 from tools.lessons import rules, tables
-from tools.lessons.first_pictures.__main__ import IMAGES, pictures
-from tools.lessons.lesson import lessons, tags
+from tools.lessons.first_pictures.__main__ import IMAGES, is_same, pictures
 
 LESSONS = lessons()
 ANSWERS = Path(__file__).parent / 'answers'
@@ -33,11 +31,9 @@ def test_what_follows_from_the_notebooks():
 
 
 def test_the_first_pictures_follow_from_the_notebooks():
-    # Photographs are compressed by zlib, whose versions write other bytes for the same pixels.
-    bare = partial(re.sub, r'base64,[^"]*', '')
     made = pictures()
     differ = [
-        name for name in made if bare(made[name]) != bare((IMAGES / f'{name}.svg').read_text())
+        name for name in made if not is_same(made[name], (IMAGES / f'{name}.svg').read_text())
     ]
     assert not differ, f'They differ from what follows from the notebooks: run `{tables.COMMAND}`.'
 
@@ -50,8 +46,7 @@ def test_lesson_00_shows_the_tasks_that_there_are():
 def test_each_task_has_answers_that_try_its_check(lesson):
     file = ANSWERS / f'{lesson.name}.yaml'
     answers = answers_of(file) if file.exists() else {}
-    numbers = range(1, len(lesson.tasks) + 1)
-    wanted = {f'{number} {kind}' for number in numbers for kind in ('wrong', 'right')}
+    wanted = {f'{task.name} {kind}' for task in lesson.tasks for kind in ('wrong', 'right')}
     differ = ', '.join(sorted(answers.keys() ^ wanted))
     assert not differ, (
         f'tests/answers/{file.name} lacks these, or has too many: {differ}. The top of '
@@ -66,19 +61,20 @@ def test_each_answer_can_still_be_made_from_its_task(lesson):
     file = ANSWERS / f'{lesson.name}.yaml'
     answers = answers_of(file) if file.exists() else {}
     problems = []
-    for number, cells in enumerate(rules.tasks(lesson).values(), 1):
-        starters = [cell.source for cell in cells if 'exercise' in tags(cell)]
-        [solution] = [cell.source for cell in cells if 'solution' in tags(cell)]
+    for task in lesson.tasks:
+        sources = [code_of_solution(cell.source) for cell in task.solutions]
+        sources += [cell.source for cell in task.exercises]
         for kind in ('wrong', 'right'):
-            for answer in answers.get(f'{number} {kind}', []):
+            for answer in answers.get(f'{task.name} {kind}', []):
                 try:
-                    source_of(answer, solution.partition('\n')[2], *starters)
+                    source_of(answer, *sources)
                 except ValueError as error:
-                    problems.append(f'Below `{number} {kind}:` of {file.name}. {error}')
+                    problems.append(f'Below `{task.name} {kind}:` of {file.name}. {error}')
     assert not problems, '\n'.join(problems)
 
 
-def test_kernels_and_rules_read_the_same_tasks():
-    assert progress.with_tasks() == tables.with_tasks(LESSONS)
-    for lesson in LESSONS:
-        assert lesson.tasks == list(rules.tasks(lesson))
+@pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
+def test_the_judges_are_those_of_the_tasks_in_their_order(lesson):
+    if lesson.tasks:
+        judges = import_module(f'helpers.checks.lessons.{lesson.name}').tasks.judges
+        assert [*judges] == [task.name for task in lesson.tasks]

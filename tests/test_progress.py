@@ -3,16 +3,28 @@
 import subprocess
 import sys
 
+import nbformat
 import pytest
 
 from helpers.checks import progress
 from helpers.checks.tasks import Tasks
 
+
+def notebook(title, *tasks):
+    """Return the text of a notebook with these tasks, by their names."""
+    cells = [nbformat.v4.new_markdown_cell(f'# {title}')]
+    for number, task in enumerate(tasks, 1):
+        cells.append(nbformat.v4.new_markdown_cell(f'### ✎ Task {number}: {task}\n\nDo it.'))
+        source = f"check('{task}', answer)"
+        cells.append(nbformat.v4.new_code_cell(source, metadata={'tags': ['check']}))
+    return nbformat.writes(nbformat.v4.new_notebook(cells=cells))
+
+
 NOTEBOOKS = {
-    '00_start_here': ['# 00 Start here', '### ✎ Task 1: Two robots'],
-    '01_publish': ['# 01 Publish'],
-    '92_lose_them': ['# 92 Lose them\\n', '### ✎ Task 1: A\\n', '### ✎ Task 2: B\\n'],
-    '93_share_cpp': ['# 93 Share \\"C++\\"', '### ✎ Task 1: A', '"### ✎ Task 1: A'],
+    '00_start_here': notebook('00 Start here', 'two_robots'),
+    '01_publish': notebook('01 Publish'),
+    '92_lose_them': notebook('92 Lose them', 'a_queue', 'b_thread'),
+    '93_share_cpp': notebook('93 Share "C++"', 'a_library'),
 }
 
 
@@ -21,9 +33,8 @@ def folder(tmp_path, monkeypatch):
     """The folder of the notebooks, in which a kernel works."""
     folder = tmp_path / 'notebooks'
     folder.mkdir()
-    for name, lines in NOTEBOOKS.items():
-        source = ''.join(f'    "{line}",\n' for line in lines)
-        (folder / f'{name}.ipynb').write_text(source, encoding='utf-8')
+    for name, text in NOTEBOOKS.items():
+        (folder / f'{name}.ipynb').write_text(text, encoding='utf-8')
     monkeypatch.chdir(folder)
     monkeypatch.setenv('JPY_SESSION_NAME', 'notebooks/92_lose_them.ipynb')
     return folder
@@ -54,26 +65,46 @@ def test_a_new_student(kept, capsys):
 
 
 def test_progress_survives_a_new_lesson_number(kept, capsys, folder):
-    progress.record(2)
+    progress.record('b_thread')
     (folder / '92_lose_them.ipynb').rename(folder / '94_lose_them.ipynb')
-    (folder / '92_count.ipynb').write_text('"# 92 Count",\n"### ✎ Task 1: A",\n')
+    (folder / '92_count.ipynb').write_text(notebook('92 Count', 'b_thread'))
     text = shown(capsys)
     assert '\n92 Count        0 of 1  task 1\n' in text
     assert '94 Lose them    1 of 2  task 1\n' in text
 
 
+def test_a_task_keeps_its_progress_whatever_its_number_is(kept, capsys, folder):
+    progress.record('a_queue')
+    inserted = notebook('92 Lose them', 'new_one', 'b_thread', 'a_queue')
+    (folder / '92_lose_them.ipynb').write_text(inserted)
+    assert '\n92 Lose them    1 of 3  tasks 1, 2\n' in shown(capsys)
+    (folder / '92_lose_them.ipynb').write_text(notebook('92 Lose them', 'b_thread'))
+    assert '\n92 Lose them    0 of 1  task 1\n' in shown(capsys)  # it was taken out: not credited
+    (folder / '92_lose_them.ipynb').write_text(NOTEBOOKS['92_lose_them'])
+    assert '\n92 Lose them    1 of 2  task 2\n' in shown(capsys)
+
+
+def test_progress_of_version_0_3_is_read_by_its_numbers(kept, capsys, folder):
+    kept.parent.mkdir()
+    kept.write_text('lose_messages 4\nfind_the_fault 10 deaf_brake\nlose_messages 99\n')
+    text = notebook('92 Lose messages', 'inserted', 'publish_numbers', 'be_the_queue')
+    (folder / '92_lose_them.ipynb').rename(folder / '92_lose_messages.ipynb')
+    (folder / '92_lose_messages.ipynb').write_text(text)
+    assert '\n92 Lose messages  1 of 3  tasks 1, 2\n' in shown(capsys)
+
+
 @pytest.mark.parametrize('broken', [b'', b'\xff\xfe{'])
 def test_a_broken_notebook_breaks_nothing(kept, capsys, folder, broken):
     (folder / '92_lose_them.ipynb').write_bytes(broken)
-    progress.record(1)
+    progress.record('a_queue')
     assert '\n00 Start here ' in shown(capsys)
-    assert kept.read_text() == 'lose_them 1\n'
+    assert kept.read_text() == 'lose_them a_queue\n'
 
 
 def pressed(solved):
     tasks = Tasks()
-    tasks.add(1)(lambda: [('it is right', lambda: solved, '')])
-    tasks.check(1)
+    tasks.add(lambda: [('it is right', lambda: solved or 'it is not', '')], name='a_queue')
+    tasks.check('a_queue')
 
 
 def test_passed_tasks_are_kept(kept):
@@ -82,12 +113,12 @@ def test_passed_tasks_are_kept(kept):
     pressed(True)
     pressed(False)
     pressed(True)
-    assert kept.read_text() == 'lose_them 1\n'
+    assert kept.read_text() == 'lose_them a_queue\n'
 
 
 def test_the_total_counts_tasks(kept):
-    progress.add('another_lesson 1')
-    progress.record(1, 'ada')
+    progress.add('another_lesson a_queue')
+    progress.record('a_queue', 'ada')
     assert progress.total() == '1 of 4 tasks'
 
 
@@ -98,18 +129,23 @@ def test_without_a_file_there_is_no_total(monkeypatch):
 
 def test_what_a_task_was_about_is_kept_if_it_differs(kept):
     tasks = Tasks()
-    tasks.add(1, about=str.lower)(lambda word: [('it is right', lambda: word != 'WRONG', '')])
+    tasks.add(
+        lambda word: [('it is right', lambda: word != 'WRONG' or 'it is wrong', '')],
+        name='a_queue',
+        about=str.lower,
+    )
     for word in ('WRONG', 'ADA', 'ADA', 'BO', 'ADA'):
-        tasks.check(1, word)
-    assert progress.about(1) == ['ada', 'bo', 'ada']
-    assert progress.about(2) == []
-    assert kept.read_text().splitlines().count('lose_them 1') == 1
+        tasks.check('a_queue', word)
+    assert progress.about('a_queue') == ['ada', 'bo', 'ada']
+    assert progress.about('b_thread') == []
+    assert kept.read_text().splitlines().count('lose_them a_queue') == 1
 
 
 def test_kernels_that_write_at_once_lose_nothing(kept, capsys):
     write = (
         'import random, sys; from helpers.checks import progress; '
-        'tasks = [1, 2, 3]; random.shuffle(tasks); print(flush=True); sys.stdin.read(1)\n'
+        'tasks = ["a_queue", "b_thread", "other"]; random.shuffle(tasks); print(flush=True)\n'
+        'sys.stdin.read(1)\n'
         'for task in tasks: progress.record(task)'
     )
     options = {'stdin': subprocess.PIPE, 'stdout': subprocess.PIPE}
@@ -121,7 +157,9 @@ def test_kernels_that_write_at_once_lose_nothing(kept, capsys):
     for writer in writers:
         assert writer.wait(60) == 0
         writer.stdout.close()
-    assert set(kept.read_text().splitlines()) == {f'lose_them {count}' for count in (1, 2, 3)}
+    assert set(kept.read_text().splitlines()) == {
+        f'lose_them {task}' for task in ('a_queue', 'b_thread', 'other')
+    }
     assert '\n2 of 4 tasks are solved.\n' in shown(capsys)
 
 
@@ -140,10 +178,10 @@ def test_an_unwritable_file_fails_no_lesson(tmp_path, monkeypatch, capsys):
 def test_start_again(kept, capsys):
     for _ in range(2):  # first there is nothing to keep
         progress.start_again()
-        progress.record(1)
+        progress.record('a_queue')
     assert capsys.readouterr().out == 2 * 'Your table is empty again.\n'
     assert '1 of 4' in shown(capsys)
-    assert kept.with_suffix('.old').read_text() == kept.read_text() == 'lose_them 1\n'
+    assert kept.with_suffix('.old').read_text() == kept.read_text() == 'lose_them a_queue\n'
 
 
 def test_where_it_is_kept(tmp_path, monkeypatch):

@@ -17,14 +17,14 @@ from support.runs import (
     happenings,
     heard,
     lose,
+    made_table,
     runs,
     tries,
 )
 from support.waits import wait_for
 
-from helpers.notebook.values import RUN_COLUMNS, check_table
-from helpers.recording import Recording
-from helpers.recording.queue_model import ALLOWED_REST, explain, predict
+from helpers.recording import RUN_COLUMNS, Recording, check_table
+from helpers.recording.queue_model import explain, predict
 from helpers.ros import ros_session
 
 # predict
@@ -166,11 +166,13 @@ def test_explain_finds_what_cannot_have_happened(happening):
 
 # explain: how long a worker may rest
 
+MAY_REST = 0.4  # for this part of a callback
+
 
 @st.composite
 def regular_runs(draw):
     """A run of a timer, whose callbacks need about 20 s and begin late."""
-    late = st.integers(0, draw(st.sampled_from([0, int(ALLOWED_REST * 20), 20])))
+    late = st.integers(0, draw(st.sampled_from([0, int(MAY_REST * 20), 20])))
     lasts = st.integers(20, 20 + draw(st.sampled_from([0, 0, 3])))
     period = draw(st.integers(1, 20))
     return draw(happenings(period, late, lasts, most=(10, 4, 40)))
@@ -219,11 +221,16 @@ def test_no_worker_rests_while_messages_are_pushed_out(run, fewer, data):
     event(f'rests: {bool(rests)}')
     # Nothing but the callbacks was late: on a precise record this is 8 s.
     callbacks = (table['finished_s'] - table['started_s']).dropna()
-    allowed = ALLOWED_REST * callbacks.median() + callbacks.max() - callbacks.min()
+    allowed = MAY_REST * callbacks.median() + callbacks.max() - callbacks.min()
     assert bool(rests) == (longest_rest(table, depth, threads) > allowed)
 
 
 # explain: examples
+
+
+def said_of(table, depth):
+    """What `explain` finds against a run with one worker."""
+    return explain(table, depth, 1).contradictions
 
 
 def without(table, seq):
@@ -234,6 +241,28 @@ def without(table, seq):
 
 
 TABLE = predict(0.05, 0.2, 10, 1, 41)  # message 3 starts at 0.6 s, message 4 is lost
+
+
+@pytest.mark.parametrize(('rest_s', 'may'), [(0, True), (7, True), (8, True), (9, False)])
+def test_a_worker_may_be_late_by_two_fifths_of_a_callback(rest_s, may):
+    # A callback of 20 s, a message each second, depth 1: the newest is taken after the rest.
+    starts = [0, 20 + rest_s, 40 + 2 * rest_s]
+    table = made_table(range(61), {start: (start, start + 20, 'thread 1') for start in starts})
+    rests = [said for said in said_of(table, 1) if f'a worker was free for {rest_s} s' in said]
+    assert bool(rests) is not may
+
+
+def test_one_impossible_message_makes_no_later_one_impossible():
+    # Depth 5. Message 1 is lost: before 2 is taken, 6 must have come, at 6 s. It was heard at 2 s.
+    starts = {seq: seq for seq in range(12) if seq != 1}
+    table = made_table(
+        range(12), {seq: (start, start + 0.5, 'thread 1') for seq, start in starts.items()}
+    )
+    impossible = [said for said in said_of(table, 5) if 'cannot have been the oldest' in said]
+    assert impossible == [
+        'Message 2 cannot have been the oldest in the queue for a free worker when its callback '
+        'started.'
+    ]
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,7 @@ from sensor_msgs.msg import Imu
 from std_msgs.msg import Int64, String
 from support.nodes import LIMIT_S, Answerer, Asker, Gate, Listener, Talker, spin
 
-from helpers.notebook.values import RUN_COLUMNS, check_table
-from helpers.recording import CallbackRecording, Recording
+from helpers.recording import RUN_COLUMNS, CallbackRecording, Recording, check_table
 from helpers.ros import ros_session
 
 TIMES = ['published_s', 'started_s', 'finished_s']

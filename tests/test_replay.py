@@ -21,6 +21,7 @@ from support.runs import (
 
 from helpers.recording import explain, predict
 from helpers.replay import FreePlay, level, replay, side_by_side
+from helpers.replay.events import events
 from tools.lessons.comparison import masked
 
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
@@ -95,6 +96,25 @@ def test_what_cannot_have_happened_is_one_sentence(script, happening):
     else:
         states = script.call('states', record(replay(table, depth, threads, group)))
         assert_is_the_run(states, table, depth)
+
+
+def test_a_take_waits_until_its_thread_is_free():
+    # Depth 1. Message 2 is published at 2 s, and 1 is not pushed out: so 2 arrives after 0 has
+    # ended, at 2.5 s, and 1 has been taken.
+    callbacks = {0: (0, 2.5), 1: (2.5, 3.5), 3: (3.5, 4)}
+    table = made_table(range(4), {seq: (*when, 'thread 1') for seq, when in callbacks.items()})
+    assert events(table, 1, 1) == [
+        (0, 'arrive', 0, None),
+        (0, 'take', 0, 'thread 1'),
+        (1, 'arrive', 1, None),
+        (2.5, 'end', 0, 'thread 1'),
+        (2.5, 'take', 1, 'thread 1'),
+        (2.5, 'arrive', 2, None),
+        (3, 'arrive', 3, None),
+        (3.5, 'end', 1, 'thread 1'),
+        (3.5, 'take', 3, 'thread 1'),
+        (4, 'end', 3, 'thread 1'),
+    ]
 
 
 # What else the rules say: sentences, causes, calls, locks

@@ -16,23 +16,14 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, LaserScan
 
-from helpers.robot import (
-    CORRIDOR,
-    EMPTY,
-    ROOMS,
-    DriveRecord,
-    Pose,
-    Robot,
-    drive_by_hand,
-    replay_drive,
-    view,
-    watch,
-)
+from helpers import robot_view
+from helpers.robot import CORRIDOR, EMPTY, ROOMS, DriveRecord, Pose, Robot
 from helpers.robot.body import Body
 from helpers.robot.record import Command, Event, Scan, Step
 from helpers.robot.sensors import Sensors
-from helpers.robot.view.by_hand import Tour
-from helpers.robot.view.live import LiveView
+from helpers.robot_view import drive_by_hand, replay_drive, watch
+from helpers.robot_view.by_hand import Tour
+from helpers.robot_view.live import LiveView
 from helpers.ros import ros_session
 
 MOST_BYTES = 60_000
@@ -52,7 +43,7 @@ def record_of(shown, index=0):
 def script():
     """Return a function that looks at a drive as the page does, at these milliseconds."""
     context = quickjs.Context()
-    context.eval(Path(view.__file__).with_name('drive.js').read_text())
+    context.eval(Path(robot_view.__file__).with_name('drive.js').read_text())
     context.eval("""function looked(record, times) {
         const run = drive(record);
         return { seen: times.map(run.look), told: run.told, times: run.times,
@@ -209,7 +200,8 @@ def test_one_sees_which_scan_it_acted_on(script, capsys):
 # In a kernel
 
 CELL = """
-from helpers.robot import EMPTY, Robot, drive_by_hand, watch
+from helpers.robot import EMPTY, Robot
+from helpers.robot_view import drive_by_hand, watch
 from helpers.ros import ros_session
 import threading
 with ros_session():

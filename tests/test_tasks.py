@@ -10,53 +10,54 @@ from support.kernel import Kernel
 
 from helpers.checks import tasks as module
 from helpers.checks.errors import sentence
-from helpers.checks.tasks import NOT_TRIED, Tasks, once
+from helpers.checks.tasks import NOT_TRIED, Tasks
 from helpers.checks.verdict import AGAIN, Point, Verdict, bundle
 
 
 @pytest.fixture
-def number(request):
-    """A number of its own for each test: the tries at a task are counted by its number."""
-    return hash(request.node.name)
+def lesson():
+    """A lesson of one task, which `judged` judges."""
+    return Tasks()
 
 
-def judged(capsys, number, *points, answer=None, **limits):
+def judged(capsys, lesson, *points, answer=None, **limits):
     """Return the lines that a check of these points prints."""
-    tasks = Tasks()
-    tasks.add(number, **limits)(lambda answer: list(points))
-    tasks.check(number, answer)
+    lesson.judges.clear()
+    lesson.add(lambda answer: list(points), name='it', **limits)
+    lesson.check('it', answer)
     return capsys.readouterr().out.splitlines()
 
 
-def tried(capsys, number, second=True):
+def tried(capsys, lesson, second=True):
     return judged(
         capsys,
-        number,
+        lesson,
         ('the group is Reentrant', lambda: True, 'Look at the second argument.'),
-        ('no message is lost', lambda: second, 'Count the threads.'),
+        ('no message is lost', lambda: second or 'one is lost', 'Count the threads.'),
     )
 
 
-def test_hints_appear_at_the_second_wrong_try(capsys, number):
+def test_hints_appear_at_the_second_wrong_try(capsys, lesson):
     first = ['[ok] the group is Reentrant', '[not yet] no message is lost']
-    assert tried(capsys, number, second=False) == [*first, f'Task {number}: 1 of 2. {AGAIN}']
-    assert 'Hint' not in str(tried(capsys, number + 1, second=False))
+    first += ['    Found: one is lost']
+    assert tried(capsys, lesson, second=False) == [*first, f'Task 1: 1 of 2. {AGAIN}']
+    assert 'Hint' not in str(tried(capsys, Tasks(), second=False))
     hint = '    Hint: Count the threads.'
-    assert tried(capsys, number, second=False) == [*first, hint, f'Task {number}: 1 of 2. {AGAIN}']
+    assert tried(capsys, lesson, second=False) == [*first, hint, f'Task 1: 1 of 2. {AGAIN}']
 
 
-def test_a_second_run_prints_the_same(capsys, number):
+def test_a_second_run_prints_the_same(capsys, lesson):
     # Starter, then solution, as in a notebook that is run from top to bottom.
-    runs = [(tried(capsys, number, second=False), tried(capsys, number)) for _ in range(3)]
+    runs = [(tried(capsys, lesson, second=False), tried(capsys, lesson)) for _ in range(3)]
     assert runs[0] == runs[1] == runs[2]
-    assert runs[0][1][-1] == f'Task {number}: 2 of 2. All done.'
+    assert runs[0][1][-1] == 'Task 1: 2 of 2. All done.'
 
 
 class Group:
     def add(self, timer): ...
 
 
-def test_what_the_code_did_is_said_with_its_line(capsys, number):
+def test_what_the_code_did_is_said_with_its_line(capsys, lesson):
     def broken():
         raise RuntimeError(f'no {object()!r}\nmore')
 
@@ -71,14 +72,13 @@ def test_what_the_code_did_is_said_with_its_line(capsys, number):
 
     lines = judged(
         capsys,
-        number,
+        lesson,
         ('2, 4', lambda: 'your node published [1, 2]', ''),
         ('the node exists', broken, ''),
         ('it is in a group', lambda: Group.add('a timer'), ''),
         ('it publishes', hidden, ''),
         ('it is called', lambda: broken('an argument'), ''),
         ('it is heard', in_a_thread, ''),
-        ('some', list, ''),
         ('equal', lambda: np.bool_(True), ''),
     )
     text = ' '.join(' '.join(lines).split())
@@ -90,38 +90,38 @@ def test_what_the_code_did_is_said_with_its_line(capsys, number):
     assert 'Found: TypeError: a float [not yet] it is called' in text
     assert 'TypeError: broken() takes 0 positional arguments but 1 was given' in text
     assert 'Found: nothing came. A thread of yours ended with RuntimeError: no' in text
-    assert '[not yet] some [ok] equal' in text
-    assert lines[-1] == f'Task {number}: 1 of 8. {AGAIN}'
+    assert '[ok] equal' in text
+    assert lines[-1] == f'Task 1: 1 of 7. {AGAIN}'
 
 
-def test_an_error_is_said_once_and_its_line_takes_the_place_of_a_hint(capsys, number):
+def test_an_error_is_said_once_and_its_line_takes_the_place_of_a_hint(capsys, lesson):
     def broken():
         raise RuntimeError('the wheel is stuck')
 
     hint = 'Turn it.'
     for _ in range(2):
-        lines = judged(capsys, number, ('one', broken, hint), ('two', broken, hint))
+        lines = judged(capsys, lesson, ('one', broken, hint), ('two', broken, hint))
     text = ' '.join(' '.join(lines).split())
     assert 'RuntimeError: the wheel is stuck. Line' in text
-    assert text.endswith(f'[not yet] two Found: the same Task {number}: 0 of 2. {AGAIN}')
+    assert text.endswith(f'[not yet] two Found: the same Task 1: 0 of 2. {AGAIN}')
     assert hint not in text
 
 
-def test_after_an_endless_point_the_others_wait(capsys, number):
+def test_after_an_endless_point_the_others_wait(capsys, lesson):
     waits = ('it waits', threading.Event().wait, '')
-    lines = judged(capsys, number, waits, ('and again', lambda: True, ''), limit_s=0.3)
+    lines = judged(capsys, lesson, waits, ('and again', lambda: True, ''), limit_s=0.3)
     text = ' '.join(' '.join(lines).split())
     assert 'TimeoutError: it did not end. Is there an endless loop' in text
     assert f'[not yet] and again Found: {NOT_TRIED}' in text
 
 
-def test_what_it_prints_is_shown_and_bounded(capsys, number):
+def test_what_it_prints_is_shown_and_bounded(capsys, lesson):
     def talk():
         print('my own line')
         print('x' * 100_000)
         return True
 
-    lines = judged(capsys, number, ('it talks', talk, ''))
+    lines = judged(capsys, lesson, ('it talks', talk, ''))
     assert lines[0] == 'my own line'
     assert lines[-1].endswith('All done.')
     assert sum(map(len, lines)) < 25_000
@@ -136,28 +136,27 @@ def test_what_it_prints_is_shown_and_bounded(capsys, number):
         (lambda answer: answer.points, 'its check ended with AttributeError: '),
     ],
 )
-def test_a_mistake_of_the_check_is_not_the_students(capsys, number, points, sentence):
-    tasks = Tasks()
-    tasks.add(number)(points)
-    tasks.check(number, 'an answer')
+def test_a_mistake_of_the_check_is_not_the_students(capsys, lesson, points, sentence):
+    lesson.add(points, name='it')
+    lesson.check('it', 'an answer')
     said = ' '.join(capsys.readouterr().out.split())
     assert sentence in said
-    assert said.endswith(f'Task {number}: not judged.')
+    assert said.endswith('Task 1: not judged.')
     assert 'your code' not in said
 
 
-def test_interrupt_is_no_try(capsys, number, monkeypatch):
+def test_interrupt_is_no_try(capsys, lesson, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(module.Apart, '__iter__', interrupted)
+        patched.setattr(module.Sandbox, '__iter__', interrupted)
         with pytest.raises(KeyboardInterrupt):
-            tried(capsys, number)
-    assert 'Hint' not in str(tried(capsys, number, second=False))
+            tried(capsys, lesson)
+    assert 'Hint' not in str(tried(capsys, lesson, second=False))
 
 
-def test_an_interrupt_takes_the_message_of_a_running_check_away(capsys, number, monkeypatch):
+def test_an_interrupt_takes_the_message_of_a_running_check_away(capsys, lesson, monkeypatch):
     shown = []
 
     class Shown:
@@ -173,40 +172,28 @@ def test_an_interrupt_takes_the_message_of_a_running_check_away(capsys, number, 
     monkeypatch.setattr(module, 'SHOW_AFTER_S', 0)
     monkeypatch.setattr(module, 'display', Shown)
     with pytest.raises(KeyboardInterrupt):
-        tried(capsys, number)
+        tried(capsys, lesson)
     assert shown == ['Checking: 0 of 2 …', 'Checking: 1 of 2 …', '']
     assert psutil.Process().children() == []
 
 
-def test_long_lines_are_broken_at_blanks(capsys, number):
+def test_long_lines_are_broken_at_blanks(capsys, lesson):
     words = ' '.join(f'word{count}' for count in range(40))
     for _ in range(2):
-        lines = judged(capsys, number, (words, lambda: words, words))
+        lines = judged(capsys, lesson, (words, lambda: words, words))
         assert max(map(len, lines)) <= 94
     assert ' '.join(' '.join(lines).split()).count(words) == 3
 
 
-def test_what_several_points_look_at_is_made_once():
-    made = []
-    build = once(lambda: made.append(1) or 'built')
-    assert (build(), build(), made) == ('built', 'built', [1])
-
-    @once
-    def broken():
-        made.append(2)
-        raise ValueError('no')
-
-    for _ in range(2):
-        with pytest.raises(ValueError, match='no'):
-            broken()
-    assert made == [1, 2]
-
-
 def test_an_unknown_task_is_a_sentence():
     tasks = Tasks()
-    tasks.add(1)(list)
-    with pytest.raises(ValueError, match=r'^This lesson has no task 7: the tasks are \[1\][.]$'):
-        tasks.check(7)
+    tasks.add(list, name='a_list')
+    with pytest.raises(
+        ValueError, match="^This lesson has no task 'a_lisp'. Its tasks are called: a_"
+    ):
+        tasks.check('a_lisp')
+    with pytest.raises(ValueError, match='^This lesson has two tasks that are called a_list[.]$'):
+        tasks.add(list, name='a_list')
 
 
 # --- Data and card
@@ -232,13 +219,13 @@ class Tags(HTMLParser):
 
 def test_data_text_and_card_say_the_same():
     points = [Point('x < 3', True), Point('it turns', False, 'nothing & more', 'Look.')]
-    data, metadata = bundle(Verdict(3, points))
+    data, metadata = bundle(Verdict('turn', 3, points))
     card = Tags(data['text/html'])
     assert card.open == []
     for part in ('x < 3', 'it turns', 'Found  nothing & more', 'Hint  Look.', 'Task 3: 1 of 2.'):
         assert part in card.text
     assert metadata['ros2_notebooks'] == {
-        'task': 3,
+        'task': 'turn',
         'of': 'answer',
         'solved': False,
         'points': [
@@ -246,7 +233,7 @@ def test_data_text_and_card_say_the_same():
             {'what': 'it turns', 'ok': False, 'found': 'nothing & more', 'hint': 'Look.'},
         ],
     }
-    assert bundle(Verdict(3, points[:1]))[1]['ros2_notebooks']['solved']
+    assert bundle(Verdict('turn', 3, points[:1]))[1]['ros2_notebooks']['solved']
 
 
 # --- In a notebook
@@ -256,26 +243,29 @@ from helpers.checks.tasks import Tasks
 tasks = Tasks()
 check = tasks.check
 
-@tasks.add(1)
+@tasks.add
 def two_is_two(two):
     return [('it is 2', lambda: two == 2 or f'it is {two}', 'One and one.')]
 """
 
 
+CHECK = "check('two_is_two', two)"
+
+
 def test_a_lesson_goes_on_with_the_code_that_passes():
-    solution = '%%solution 1\ntwo = 1 + 1'
+    solution = '%%solution two_is_two\ntwo = 1 + 1'
     with Kernel() as kernel:
         kernel.run(LESSON)
-        assert 'its check has not' in kernel.run('%%solution 1\nthree = 3')
-        assert '[not yet]' in kernel.run('two = 3\ncheck(1, two)')
+        assert 'its check has not' in kernel.run('%%solution two_is_two\nthree = 3')
+        assert '[not yet]' in kernel.run(f'two = 3\n{CHECK}')
         assert kernel.run(solution) == '[ok] it is 2\nSolution of task 1: 1 of 1.\n'
         assert [verdict['of'] for verdict in kernel.verdicts] == ['solution']
         # What the solution gave is not the student's, and stays for the later cells. An equal value
         # that a cell gives is.
-        assert 'This is the code of the solution.' in kernel.run('check(1, two)')
+        assert 'This is the code of the solution.' in kernel.run(CHECK)
         assert kernel.run('print(two)') == '2\n'
         kernel.run('two = 2')
-        assert 'All done.' in kernel.run('check(1, two)')
+        assert 'All done.' in kernel.run(CHECK)
         assert 'goes on with your code' in kernel.run(solution)
         assert kernel.run('print(two)') == '2\n'
 
@@ -284,13 +274,13 @@ def test_a_cell_that_failed_is_not_judged_by_what_it_was_before():
     with Kernel() as kernel:
         kernel.run(LESSON)
         kernel.run('two = 2')
-        assert 'All done.' in kernel.run('check(1, two)')
+        assert 'All done.' in kernel.run(CHECK)
         kernel.run('two = 1 + three')
-        said = kernel.run('check(1, two)')
+        said = kernel.run(CHECK)
         assert 'The last cell that defines two ended with an error.' in said
         assert said.endswith('Task 1: not judged.\n')
         kernel.run('two = 3')
-        assert 'Found: it is 3' in kernel.run('check(1, two)')
+        assert 'Found: it is 3' in kernel.run(CHECK)
 
 
 @pytest.mark.parametrize(
@@ -307,9 +297,9 @@ def test_a_name_is_found_wherever_a_cell_assigns_it(cell):
     with Kernel() as kernel:
         kernel.run(f'{LESSON}\ntwo = 2')
         kernel.run(f'{cell}\n1 / 0')
-        assert 'The last cell that defines two' in kernel.run('check(1, two)')
+        assert 'The last cell that defines two' in kernel.run(CHECK)
         kernel.run(cell)
-        assert 'Found: it is 3' in kernel.run('check(1, two)')
+        assert 'Found: it is 3' in kernel.run(CHECK)
 
 
 @pytest.mark.parametrize('cell', ['two = (3', 'def two(:\n    pass', 'class two\n    pass'])
@@ -317,7 +307,7 @@ def test_a_name_is_found_in_a_cell_that_python_cannot_read(cell):
     with Kernel() as kernel:
         kernel.run(f'{LESSON}\ntwo = 2')
         kernel.run(cell)
-        assert 'The last cell that defines two' in kernel.run('check(1, two)')
+        assert 'The last cell that defines two' in kernel.run(CHECK)
 
 
 @pytest.mark.parametrize(
@@ -334,20 +324,20 @@ def test_a_failed_cell_that_assigns_another_name_is_nothing_to_the_check(cell):
     with Kernel() as kernel:
         kernel.run(f'{LESSON}\ntwo = 2')
         kernel.run(cell)
-        assert 'All done.' in kernel.run('check(1, two)')
+        assert 'All done.' in kernel.run(CHECK)
 
 
 def test_the_solution_mends_a_cell_that_failed_if_it_runs():
-    lesson = f'{LESSON}\ntasks.add(2)(lambda two: [("it is 4", lambda: two == 4, "")])'
+    lesson = f'{LESSON}\ntasks.add(lambda two: [("it is 4", lambda: two == 4, "")], name="four")'
     with Kernel() as kernel:
         kernel.run(lesson)
         kernel.run('two = 1 / 0')
-        kernel.run('%%solution 1\ntwo = 4')
-        assert 'All done.' in kernel.run('check(2, two)')
-        kernel.run('two = 2\ncheck(1, two)')
+        kernel.run('%%solution two_is_two\ntwo = 4')
+        assert 'All done.' in kernel.run("check('four', two)")
+        kernel.run(f'two = 2\n{CHECK}')
         kernel.run('two = 1 / 0')
-        assert 'goes on with your code' in kernel.run('%%solution 1\ntwo = 4')
-        assert 'The last cell that defines two' in kernel.run('check(1, two)')
+        assert 'goes on with your code' in kernel.run('%%solution two_is_two\ntwo = 4')
+        assert 'The last cell that defines two' in kernel.run(CHECK)
 
 
 def test_an_interrupt_outside_of_a_cell_prints_nothing_more():
@@ -358,19 +348,19 @@ def test_an_interrupt_outside_of_a_cell_prints_nothing_more():
 
 def test_a_check_before_its_task_says_what_to_run():
     with Kernel() as kernel:
-        kernel.run(f'%load_ext helpers.notebook.kernel\nimport helpers.ros.session{LESSON}')
-        assert 'two is not there yet: run the cell of the task above' in kernel.run('check(1, two)')
+        kernel.run(f'%load_ext helpers.kernel\nimport helpers.ros.session{LESSON}')
+        assert 'two is not there yet: run the cell of the task above' in kernel.run(CHECK)
         assert 'not there yet' not in kernel.run('print(two)')
 
 
 def test_a_check_leaves_the_kernel_as_it_was():
     with Kernel() as kernel:
         kernel.run(LESSON.replace('two == 2', 'two.append(4)'))
-        assert 'it is [3, 4]' in kernel.run('two = [3]\ncheck(1, two)')
+        assert 'it is [3, 4]' in kernel.run(f'two = [3]\n{CHECK}')
         assert kernel.run('print(two)') == '[3]\n'
         assert 'Line 2: return 1 / 0' in kernel.run(
-            'def two():\n    return 1 / 0\ntasks.add(2)(lambda two: [("a", two, "")]); '
-            'check(2, two)'
+            'def two():\n    return 1 / 0\ntasks.add(lambda two: [("a", two, "")], name="a"); '
+            'check("a", two)'
         )
 
 
@@ -388,3 +378,33 @@ def test_a_name_that_the_students_code_does_not_know_is_one_sentence():
     except NameError as error:
         said = sentence(error)
     assert said.startswith("NameError: name 'distance' is not defined. Is it defined in the cell")
+
+
+class Listener:
+    def on_text(self, message):
+        pass
+
+
+# As in create_subscription(String, 'topic', self.on_text(), 10): it hands over None.
+HANDED_OVER = Listener().on_text('a')
+
+
+@pytest.mark.parametrize(
+    ('call', 'said'),
+    [
+        (
+            lambda: HANDED_OVER('a'),
+            "TypeError: 'NoneType' object is not callable. Are there () after the name of a "
+            'callback that is only handed over? ',
+        ),
+        (
+            lambda: Listener.on_text('a'),
+            "TypeError: Listener.on_text() missing 1 required positional argument: 'message'. Did "
+            'you forget () after a class, or write () after a callback? ',
+        ),
+    ],
+)
+def test_parentheses_too_many_or_too_few_are_a_hint(call, said):
+    with pytest.raises(TypeError) as error:
+        call()
+    assert sentence(error.value).startswith(said)

@@ -26,9 +26,10 @@ from support.packages import (
 from support.processes import running
 from support.waits import wait_for
 
+from helpers.machine import folders
 from helpers.ros import ros_session
 from helpers.ros.domain import reserve_domain_id
-from helpers.workspace import Workspace, folders, processes
+from helpers.workspace import Workspace, processes
 from helpers.workspace.build_output import lines_that_matter
 from helpers.workspace.processes import Process
 from helpers.workspace.wheels import fix_wheels
@@ -503,13 +504,19 @@ def test_a_wait_that_gives_up_names_topics_that_do_not_meet(other):
         other.start('ros2 topic echo /topic std_msgs/msg/String', 'echo') as echo,
     ):
         publisher.wait_for('publishing')
+        listens = 'Subscription count: 1'
+        wait_for(lambda: listens in other.terminal('ros2 topic info /topic'), timeout_s=60)
         with pytest.raises(TimeoutError) as failure:
             echo.wait_for('data', timeout_s=1)
-    assert str(failure.value) == (
-        "Waited 1 s, but echo did not print 'data'. Its last lines: none. The topic /topik has a "
-        'publisher and no subscription. Nearly the same name: /topic. The topic /topic has a '
-        'subscription and no publisher. Nearly the same name: /topik'
-    )
+    waited, *topics = str(failure.value).split('The topic ')
+    assert 'echo' in waited
+    assert "'data'" in waited
+    said = dict(topic.split(maxsplit=1) for topic in topics)
+    assert said.keys() == {'/topik', '/topic'}
+    assert 'no subscription' in said['/topik']
+    assert '/topic' in said['/topik']
+    assert 'no publisher' in said['/topic']
+    assert '/topik' in said['/topic']
 
 
 def test_a_killed_kernel_closes_its_terminals(built):
@@ -622,10 +629,10 @@ def test_two_kernels_do_not_share_a_folder():
         kernel.kill()
         kernel.wait()
         build.suspend()
-        assert folders.claim(path.name) != path
+        assert folders.claim_workspace(path.name) != path
         build.resume()
         build.wait(timeout=60)
-        assert folders.claim(path.name) == path
+        assert folders.claim_workspace(path.name) == path
 
 
 def test_a_checkout_with_spaces_and_accents(other, monkeypatch, tmp_path):

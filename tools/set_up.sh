@@ -97,7 +97,7 @@ if [ ! -e .venv/src/gtest_vendor ]; then
         "$uv" pip sync --quiet $no_index --target .venv/gtest --python-version 3.12 \
             --python-platform x86_64-manylinux_2_28 --only-binary :all: --require-hashes \
             .venv/gtest.lock && mv .venv/gtest/src/gtest_vendor .venv/src
-    } || echo 'The sources of googletest are not there: one test of lesson 14 needs `sudo apt install libgtest-dev`.' >&2
+    } || echo 'The sources of googletest are not there: one test of share_code_in_a_cpp_library needs `sudo apt install libgtest-dev`.' >&2
     rm -rf .venv/gtest .venv/gtest.lock
 fi
 

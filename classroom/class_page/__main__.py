@@ -22,7 +22,7 @@ from classroom.class_page.addresses import in_networks
 from classroom.class_page.lessons import Known
 from classroom.class_page.store import ClassStore
 from classroom.class_page.web import PAGE_EVERY_S, Room, application, serve
-from tools.lessons.lesson import GLOSSARY, ROOT, lessons
+from helpers.lesson import GLOSSARY, ROOT, lessons
 
 FILE = 'class.sqlite'
 

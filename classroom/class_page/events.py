@@ -30,8 +30,8 @@ EVENT = {
 KINDS = {
     'guess': _form(**EVENT, question=TEXT, value=VALUE),
     'outcome': _form(**EVENT, question=TEXT, value=VALUE),
-    'task': _form(**EVENT, task={'type': 'integer'}, solved={'type': 'boolean'}),
-    'about': _form(**EVENT, about=TEXT, task={'type': 'integer'}),
+    'task': _form(**EVENT, task=TEXT, solved={'type': 'boolean'}),
+    'about': _form(**EVENT, about=TEXT, task=TEXT),
     'cell': _form(**EVENT, cell=TEXT),
     'hand': _form(**EVENT, up={'type': 'boolean'}),
 }

@@ -1,6 +1,5 @@
 """What a class knows of the lessons: steps, tasks and guesses, read from the notebooks."""
 
-import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -8,8 +7,7 @@ from typing import NamedTuple
 from nbformat import NotebookNode
 
 from classroom.class_page.notes import of_step
-from tools.lessons.code import guess_of
-from tools.lessons.lesson import Lesson, first_heading, has_heading
+from helpers.lesson import Lesson, first_heading, has_heading
 
 
 class Guess(NamedTuple):
@@ -28,7 +26,7 @@ class Known:
     @property
     def cells(self) -> list[NotebookNode]:
         """The cells of the notebook."""
-        return self.lesson.notebook.cells
+        return self.lesson.cells
 
     @cached_property
     def title(self) -> str:
@@ -58,18 +56,12 @@ class Known:
     def guesses(self) -> dict[str, Guess]:
         """By question what is guessed."""
         found = {}
-        for index, cell in enumerate(self.cells):
-            if guess := guess_of(cell):
-                question = guess[1]
-                later = (
-                    one.id
-                    for one in self.cells[index + 1 :]
-                    if one.cell_type == 'code' and repr(question) in one.source
-                )
-                found[question] = Guess(cell.id, next(later, cell.id))
+        for guess in self.lesson.guesses:
+            compared = self.lesson.comparison_of(guess) or guess.cell
+            found[guess.question] = Guess(guess.cell.id, compared.id)
         return found
 
     @cached_property
-    def tasks(self) -> list[int]:
-        """The numbers of its tasks."""
-        return sorted({int(re.search(r'\d+', name)[0]) for name in self.lesson.tasks})
+    def tasks(self) -> dict[str, int]:
+        """The numbers of its tasks, by their names."""
+        return {task.name: task.number for task in self.lesson.tasks}

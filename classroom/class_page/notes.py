@@ -5,7 +5,7 @@ import re
 from nbconvert.filters import markdown2html
 from nbformat import NotebookNode
 
-from tools.lessons.lesson import first_heading, has_heading, minutes_of_note, tags
+from helpers.lesson import first_heading, has_heading, minutes_of_note, tags, without_links
 
 
 def of_step(cells: list[NotebookNode], at: int) -> dict:
@@ -21,7 +21,7 @@ def of_step(cells: list[NotebookNode], at: int) -> dict:
     return {
         'lesson': first_heading(cells[0].source),
         'step': title,
-        'notes': ''.join(markdown2html(_with_breaks(cells[i].source)) for i in own),
+        'notes': ''.join(markdown2html(_with_breaks(without_links(cells[i].source))) for i in own),
         'own': sum(minutes[i] for i in own),
         'planned': sum(minutes[i] for i in before),
         'all': sum(minutes.values()),

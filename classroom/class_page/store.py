@@ -16,6 +16,7 @@ from pathlib import Path
 
 from classroom.class_page import events
 from classroom.class_page.lessons import Guess, Known
+from helpers.lesson import earlier_name
 
 WORDS = Path(__file__).with_name('words.txt').read_text().split()
 CODE_WORDS = 3  # of 256: 24 bits
@@ -49,8 +50,8 @@ SELECT max(value) FROM events WHERE kind = 'task' AND lesson = ? AND what = ? GR
 """
 # Who has solved a task of which each student has another one, by what it was about.
 ABOUT = """
-SELECT DISTINCT what, value, seat FROM events WHERE kind = 'about' AND lesson = ?
-ORDER BY what, CAST(value AS INTEGER), seat
+SELECT what, value, seat FROM events WHERE kind = 'about' AND lesson = ?
+ORDER BY what, seat
 """
 
 
@@ -67,10 +68,22 @@ class ClassStore:
             code = '-'.join(secrets.choice(WORDS) for _ in range(CODE_WORDS))
             with self._db:
                 self._db.execute('INSERT INTO class VALUES (?, ?)', (code, secrets.token_hex(8)))
+        self._name_tasks()
         self.code, self.secret = self._db.execute('SELECT code, secret FROM class').fetchone()
         self.went_on = self._db.execute('SELECT 1 FROM events').fetchone() is not None
         self.shown: set[tuple[str, str]] = set()  # lesson and question
         self.removed: dict[tuple[str, str], set[str]] = {}  # of a question: answers out of sight
+
+    def _name_tasks(self) -> None:
+        """Give the tasks of a class that version 0.3 has broken off their names."""
+        tasks = self._db.execute(
+            "SELECT n, lesson, what FROM events WHERE kind = 'task'"
+        ).fetchall()
+        names = [
+            (earlier_name(lesson, int(what)), n) for n, lesson, what in tasks if what.isdecimal()
+        ]
+        with self._db:
+            self._db.executemany('UPDATE events SET what = ? WHERE n = ?', names)
 
     # Seats
 
@@ -105,7 +118,7 @@ class ClassStore:
         """Keep the events of a seat. Return why some were refused, in one sentence, or nothing."""
         refused = ''
         rows = []
-        for event in messages:
+        for event in map(_with_name, messages):
             problem = self._problem(event)
             refused = refused or problem
             if not problem:
@@ -179,7 +192,9 @@ class ClassStore:
                 for question, guess in known.guesses.items()
                 if known.step_of[guess.asked] <= step <= known.step_of[guess.compared]
             ],
-            'tasks': [self._task(lesson, number, len(names)) for number in known.tasks],
+            'tasks': [
+                self._task(lesson, task, number, len(names)) for task, number in known.tasks.items()
+            ],
             'about': self._about(lesson, names),
             'hands': [{'seat': seat, 'name': names.get(seat, '')} for seat in hands],
         }
@@ -204,21 +219,26 @@ class ClassStore:
             'by': len(outcomes),
         }
 
-    def _task(self, lesson: str, number: int, seats: int) -> dict:
-        tries = self._db.execute(SOLVED, (lesson, str(number))).fetchall()
+    def _task(self, lesson: str, task: str, number: int, seats: int) -> dict:
+        tries = self._db.execute(SOLVED, (lesson, task)).fetchall()
         solved = tries.count(('true',))
         tried = len(tries) - solved
         return {'number': number, 'solved': solved, 'tried': tried, 'open': seats - len(tries)}
 
     def _about(self, lesson: str, names: dict[int, str]) -> list[dict]:
         found: dict[str, dict[str, list[str]]] = {}
+        numbers = self.lessons[lesson].tasks
         for about, task, seat in self._db.execute(ABOUT, [lesson]):
             who = names.get(seat) or f'seat {seat}'
-            found.setdefault(about, {}).setdefault(task, []).append(who)
+            found.setdefault(about, {}).setdefault(json.loads(task), []).append(who)
         return [
             {
                 'about': about,
-                'tasks': [{'number': int(task), 'who': who} for task, who in by.items()],
+                'tasks': [
+                    {'number': number, 'who': [*dict.fromkeys(by[task])]}
+                    for task, number in numbers.items()
+                    if task in by
+                ],
             }
             for about, by in found.items()
         ]
@@ -318,6 +338,13 @@ def _counted(answers) -> list[tuple]:
         first.setdefault(_key(answer), answer)
     counts = Counter(map(_key, answers))
     return [(first[text], count) for text, count in counts.most_common()]
+
+
+def _with_name(event: object) -> object:
+    """Return an event of version 0.3, which called a task by its number, with the task's name."""
+    if isinstance(event, dict) and type(number := event.get('task')) is int:
+        return event | {'task': earlier_name(str(event.get('lesson')), number)}
+    return event
 
 
 def _content(event: dict) -> tuple[str, str, str]:

@@ -19,8 +19,8 @@ from nbformat.v4 import new_markdown_cell
 
 from classroom.deck.slides import folded, slide_types
 from classroom.plan import NO_PLAN, Plan, plan_of
+from helpers import lesson
 from helpers.notebook import MARK
-from tools.lessons import lesson
 from tools.lessons.clean import text_of, write
 
 FOLDER = 'presentation'

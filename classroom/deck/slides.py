@@ -14,7 +14,7 @@ import ast
 
 from nbformat import NotebookNode
 
-from tools.lessons.lesson import has_heading, tags
+from helpers.lesson import has_heading, tags
 
 LINES = 18  # of code that is not folded: more of it is on the next slide
 

@@ -12,20 +12,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from classroom.grade import alike, tables
-from classroom.grade.answers import (
-    Answers,
-    Cell,
-    Handed,
-    answers_of,
-    cells_of,
-    handed_out,
-    lesson_of,
-)
+from classroom.grade.answers import Answers, Handed, answers_of, handed_out, lesson_of
 from classroom.grade.feedback import feedback
 from classroom.grade.results import Kept, digest_of, job_of, result_of
 from classroom.grade.runner import Container, Said, Trusted, Where, run
 from classroom.grade.submissions import ARCHIVES, Submission, submissions_of, workspace_files
-from tools.lessons.lesson import FOLDER, chosen
+from helpers.lesson import FOLDER, Node, cells_of, chosen
 
 LIMIT_MIN = 20.0
 # A browser, or a system that hides endings, adds one.
@@ -47,7 +39,7 @@ class Read:
     """A notebook of a student."""
 
     path: str
-    cells: list[Cell]
+    cells: list[Node]
     lesson: Handed | None
 
 
@@ -95,19 +87,19 @@ def choose(work: Work, notebooks: list[Read], wanted: list[Handed]) -> None:
             continue
         answers = answers_of(one.cells, lesson)
         count = sum(map(answers.changed, lesson.tasks.values()))
-        number = lesson.lesson.number
-        twice = number in best
-        if number not in best or count >= best[number][0]:
-            best[number] = count, answers
-            work.paths[number] = one.path
+        name = lesson.lesson.name
+        twice = name in best
+        if name not in best or count >= best[name][0]:
+            best[name] = count, answers
+            work.paths[name] = one.path
         if twice:
-            which = Path(work.paths[number]).name
-            said.append(f'lesson {number} is there twice: {which} counts')
-    for number, (_, answers) in best.items():
-        work.answers[number] = answers
+            which = Path(work.paths[name]).name
+            said.append(f'lesson {lesson.lesson.number} is there twice: {which} counts')
+    for name, (_, answers) in best.items():
+        work.answers[name] = answers
         said += answers.said
     for lesson in wanted:
-        if notebooks and lesson.lesson.number not in best:
+        if notebooks and lesson.lesson.name not in best:
             said.append(f'lesson {lesson.lesson.number} is not there')
 
 
@@ -134,8 +126,8 @@ def judge_all(
     def judge_one(work: Work) -> None:
         student, lines = work.row.student, []
         for lesson in wanted:
-            number = lesson.lesson.number
-            answers = work.answers.get(number)
+            number, name = lesson.lesson.number, lesson.lesson.name
+            answers = work.answers.get(name)
             if answers is None:
                 continue
             if options.seed:
@@ -153,14 +145,14 @@ def judge_all(
                 kept.put(key, result)
             else:
                 again = ', judged before'
-            work.row.results[number] = result
+            work.row.results[name] = result
             if all(outcome.why == 'not answered' for outcome in result.tasks.values()):
                 work.row.said.append(f'nothing is written in lesson {number}')
             if result.trouble:
                 work.row.said.append(result.trouble)
             for task, outcome in result.tasks.items():
                 if outcome.why not in ('', 'not answered', result.trouble) and not outcome.of:
-                    work.row.said.append(f'task {task}: {outcome.why}')
+                    work.row.said.append(f'task {lesson.tasks[task].number}: {outcome.why}')
             points = sum(result.tasks[task].solved for task in lesson.counted)
             work.row.points += points
             lines.append(f'lesson {number}: {points} of {len(lesson.counted)}{again}')
@@ -208,17 +200,17 @@ def write(
     with zipfile.ZipFile(output / 'feedback.zip', 'w', zipfile.ZIP_DEFLATED) as archive:
         for work in works:
             for lesson in wanted:
-                number = lesson.lesson.number
-                if result := work.row.results.get(number):
-                    text = feedback(lesson, work.answers[number], result)
-                    archive.writestr(work.paths[number], text)
+                name = lesson.lesson.name
+                if result := work.row.results.get(name):
+                    text = feedback(lesson, work.answers[name], result)
+                    archive.writestr(work.paths[name], text)
     said.append('feedback.zip')
     equal = []
     for lesson in wanted:
-        number = lesson.lesson.number
-        students = [(w.row.student.name, w.answers[number]) for w in works if number in w.answers]
+        number, key = lesson.lesson.number, lesson.lesson.name
+        students = [(w.row.student.name, w.answers[key]) for w in works if key in w.answers]
         for task, names in alike.groups(lesson, students):
-            equal.append(f'lesson {number}, task {task}: {", ".join(names)}')
+            equal.append(f'lesson {number}, task {lesson.tasks[task].number}: {", ".join(names)}')
     put('equal_answers.txt', ''.join(f'{line}\n' for line in equal) or 'none\n')
     for line in equal:
         print(f'The same answer: {line}')
@@ -235,15 +227,14 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
     parser.add_argument('--trust', action='store_true', help='without a container, as you')
     parser.add_argument('--limit', type=float, default=LIMIT_MIN, help='minutes for a lesson')
     parser.add_argument('--seed', default='', help='of a lesson that has one, for all students')
-    parser.add_argument('--tasks', default='', help='only these give points: "9 10"')
+    parser.add_argument('--tasks', default='', help='only these give points: "a_driver 4"')
     parser.add_argument('--no-stars', action='store_true', help='tasks with ★ give no points')
     parser.add_argument('--assignment', default='', help='its name or id in Canvas')
     parser.add_argument('--notebooks', type=Path, default=FOLDER, help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     try:
-        tasks = options.tasks.split()
-        if options.jobs < 1 or not all(map(str.isdecimal, [options.seed or '0', *tasks])):
-            raise ValueError('JOBS= is a number from 1 on, SEED= a number, and TASKS= numbers.')
+        if options.jobs < 1 or not (options.seed or '0').isdecimal():
+            raise ValueError('JOBS= is a number from 1 on, and SEED= is a number.')
         students, files = submissions_of(options.folder)
         if not students:
             raise ValueError(f'Nobody has handed in anything in {options.folder}.')
@@ -254,8 +245,7 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
                     f'{" and ".join(same)} are of two assignments: each one has a folder of its '
                     'own, such as FOLDER=submissions_02.'
                 )
-        only = {*map(int, tasks)}
-        known = handed_out(options.notebooks, stars=not options.no_stars, only=only)
+        known = handed_out(options.notebooks, stars=not options.no_stars, only=options.tasks)
         reads = [read(student, known) for student in students]
         if options.lesson:
             names = {path.name for path in chosen(options.lesson, options.notebooks)}

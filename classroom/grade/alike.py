@@ -7,7 +7,8 @@ import tokenize
 from collections import defaultdict
 from collections.abc import Iterable
 
-from classroom.grade.answers import Answers, Handed, Task
+from classroom.grade.answers import Answers, Handed
+from helpers.lesson import Task, code_of_solution
 
 LEAST = 80  # letters of one's own code: shorter answers are equal by themselves
 
@@ -48,17 +49,14 @@ def own(task: Task, answers: Answers) -> str:
 
 
 def _of_lesson(cell: object) -> list[str]:
-    lines = cell.source.splitlines()
-    while lines and lines[0].startswith('%%solution'):
-        lines = lines[1:]
-    return normalised('\n'.join(lines))
+    return normalised(code_of_solution(cell.source))
 
 
-def groups(handed: Handed, students: Iterable[tuple[str, Answers]]) -> list[tuple[int, list[str]]]:
+def groups(handed: Handed, students: Iterable[tuple[str, Answers]]) -> list[tuple[str, list[str]]]:
     """Return the tasks and the names of students whose answers are the same."""
-    found: dict[tuple[int, str], list[str]] = defaultdict(list)
+    found: dict[tuple[str, str], list[str]] = defaultdict(list)
     for name, answers in students:
-        for number, task in handed.tasks.items():
+        for known, task in handed.tasks.items():
             if text := own(task, answers):
-                found[number, text].append(name)
-    return sorted((number, names) for (number, _), names in found.items() if len(names) > 1)
+                found[known, text].append(name)
+    return sorted((task, names) for (task, _), names in found.items() if len(names) > 1)

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
 from nbformat import NotebookNode
 
-from tools.lessons.lesson import FOLDER, Lesson, lessons, tags
+from helpers.lesson import (
+    FOLDER,
+    Lesson,
+    Node,
+    Task,
+    chosen_tasks,
+    is_check,
+    is_solution,
+    lessons,
+    tags,
+)
 
 CHECKS = re.compile(r'^from helpers\.checks\.lessons\.(\w+) import ', re.MULTILINE)
-CHECK = re.compile(r'check\((\d+)')
-HEADING = re.compile(r'^### ✎ Task (\d+)( ★)?', re.MULTILINE)
 SEED = re.compile(r'^SEED *= *(\d{1,9})\b.*$', re.MULTILINE)
 # The lesson whose tasks ask for what a cell of the student's own has printed.
 LOOKS_FIRST = 'find_the_fault'
@@ -28,25 +35,15 @@ MACHINERY = re.compile(
 )
 
 
-@dataclass
-class Task:
-    """A task of a lesson: its exercise cells, in their order, and the cells of its checks."""
-
-    number: int
-    exercises: list[NotebookNode] = field(default_factory=list)
-    checks: list[NotebookNode] = field(default_factory=list)
-    solutions: list[NotebookNode] = field(default_factory=list)
-
-
 class Handed:
     """A lesson as it was handed out, with its tasks.
 
-    `stars`: those with ★ count, too. `only`: no other ones count.
+    `stars`: those with ★ count, too. `only`: no other ones count, by their numbers or names.
     """
 
-    def __init__(self, lesson: Lesson, *, stars: bool = True, only: Collection[int] = ()) -> None:
+    def __init__(self, lesson: Lesson, *, stars: bool = True, only: str = '') -> None:
         self.lesson = lesson
-        self.cells = lesson.notebook.cells
+        self.cells: list[NotebookNode] = lesson.cells
         self._stars, self._only = stars, only
 
     @cached_property
@@ -56,96 +53,30 @@ class Handed:
         return found[0] if found else self.lesson.name
 
     @cached_property
-    def tasks(self) -> dict[int, Task]:
-        """The tasks, by their numbers."""
-        tasks: dict[int, Task] = {}
-        waiting: list[NotebookNode] = []
-        for cell in self.cells:
-            if 'exercise' in tags(cell):
-                waiting.append(cell)
-            elif 'check' in tags(cell) and (match := CHECK.search(cell.source)):
-                task = tasks.setdefault(int(match[1]), Task(int(match[1])))
-                task.checks.append(cell)
-                task.exercises += waiting
-                waiting = []
-            elif 'solution' in tags(cell):
-                number = int(cell.source.split(maxsplit=2)[1])
-                tasks.setdefault(number, Task(number)).solutions.append(cell)
-        return tasks
+    def tasks(self) -> dict[str, Task]:
+        """The tasks, by their names."""
+        return {task.name: task for task in self.lesson.tasks if task.checks}
 
     @cached_property
-    def counted(self) -> list[int]:
-        """The numbers of the tasks that give a point."""
-        headings = [heading for cell in self.cells for heading in HEADING.findall(cell.source)]
-        starred = set() if self._stars else {int(number) for number, star in headings if star}
-        wanted = {*(self._only or self.tasks)} - starred
-        return [number for number in self.tasks if number in wanted]
+    def counted(self) -> list[str]:
+        """The names of the tasks that give a point. Raises ValueError if `only` names none."""
+        wanted = chosen_tasks(self._only, self.lesson) if self._only else self.lesson.tasks
+        names = {task.name for task in wanted if self._stars or not task.star}
+        return [name for name in self.tasks if name in names]
 
     @cached_property
     def ids(self) -> set[str]:
         """The ids of the cells of tasks."""
-        return {
-            cell.id
-            for task in self.tasks.values()
-            for cell in (*task.exercises, *task.checks, *task.solutions)
-        }
+        return {cell.id for task in self.tasks.values() for cell in task.cells}
 
 
-def handed_out(
-    folder: Path = FOLDER, *, stars: bool = True, only: Collection[int] = ()
-) -> list[Handed]:
+def handed_out(folder: Path = FOLDER, *, stars: bool = True, only: str = '') -> list[Handed]:
     """Return the lessons that have tasks."""
     handed = [Handed(lesson, stars=stars, only=only) for lesson in lessons(folder)]
     return [one for one in handed if one.tasks]
 
 
-@dataclass
-class Cell:
-    """A cell of a student's notebook, whatever else it has."""
-
-    kind: str
-    source: str
-    id: str
-    tags: set[str]
-
-
-def cells_of(data: bytes) -> list[Cell]:
-    """Return the cells of a notebook. Raises ValueError with the end of a sentence."""
-    if not data.strip():
-        raise ValueError('it is empty')
-    try:
-        notebook = json.loads(data)
-    except (ValueError, RecursionError):
-        raise ValueError(_why_no_json(data)) from None
-    cells = notebook.get('cells') if isinstance(notebook, dict) else None
-    if not isinstance(cells, list):
-        raise ValueError('it is no notebook: it has no cells')
-    return [_cell(cell) for cell in cells if isinstance(cell, dict)]
-
-
-def _why_no_json(data: bytes) -> str:
-    start = data.lstrip()[:1000].lower()
-    if start.startswith((b'<!doctype', b'<html')):
-        return 'it is a web page, no notebook'
-    if re.search(rb'^(<{7}|>{7}) ', data, re.MULTILINE):
-        return 'it is broken: git has left its marks of a conflict in it'
-    return 'it is broken: it is no JSON'
-
-
-def _cell(cell: dict) -> Cell:
-    source = cell.get('source', '')
-    if isinstance(source, list):
-        source = ''.join(line for line in source if isinstance(line, str))
-    source = source if isinstance(source, str) else ''
-    # Half of a pair of UTF-16, which JSON may name, is no text.
-    source = source.encode('utf-8', 'replace').decode()
-    metadata = cell.get('metadata')
-    named = metadata.get('tags') if isinstance(metadata, dict) else None
-    found = {tag for tag in named if isinstance(tag, str)} if isinstance(named, list) else set()
-    return Cell(str(cell.get('cell_type')), source, str(cell.get('id', '')), found)
-
-
-def lesson_of(cells: Iterable[Cell], known: Iterable[Handed]) -> Handed | None:
+def lesson_of(cells: Iterable[Node], known: Iterable[Handed]) -> Handed | None:
     """Return the lesson of a notebook, or None: by the ids of its tasks, else by its import."""
     cells = list(cells)
     ids = {cell.id for cell in cells}
@@ -179,16 +110,17 @@ def _plain(source: str) -> str:
     return '\n'.join(line.rstrip() for line in source.strip().splitlines())
 
 
-def answers_of(cells: list[Cell], handed: Handed) -> Answers:
+def answers_of(cells: list[Node], handed: Handed) -> Answers:
     """Return what a student has written in the exercise cells of a lesson."""
     answers = Answers()
     doubled, missing, looked_at, beside = [], [], [], []
-    by_id: dict[str, list[Cell]] = {}
+    by_id: dict[str, list[Node]] = {}
     for cell in cells:
-        if cell.kind == 'code':
+        if cell.cell_type == 'code':
             by_id.setdefault(cell.id, []).append(cell)
     for task in handed.tasks.values():
-        in_order = _below_heading(cells, task.number)
+        inside = _same_task(cells, task)
+        in_order = _exercises(inside)
         for place, exercise in enumerate(task.exercises):
             same = by_id.get(exercise.id, [])
             if len(same) > 1:
@@ -209,7 +141,7 @@ def answers_of(cells: list[Cell], handed: Handed) -> Answers:
             if set(MACHINERY.findall(source)) - set(MACHINERY.findall(taught)):
                 looked_at.append(str(task.number))
         known = {cell.id for cell in handed.cells}
-        added = [cell for cell in _inside(cells, task.number) if cell.id not in known]
+        added = [cell for cell in inside if cell.id not in known]
         has_ids = any(cell.id in known for cell in cells)
         if has_ids and not answers.changed(task) and any(cell.source.strip() for cell in added):
             beside.append(str(task.number))
@@ -223,7 +155,7 @@ def answers_of(cells: list[Cell], handed: Handed) -> Answers:
             answers.said.append(f'task {", ".join(dict.fromkeys(numbers))} {what}')
     # A number decides which robots the lesson has.
     if any(SEED.search(cell.source) for cell in handed.cells):
-        found = [SEED.search(cell.source) for cell in cells if cell.kind == 'code']
+        found = [SEED.search(cell.source) for cell in cells if cell.cell_type == 'code']
         answers.seed = next((match[1] for match in found if match), '')
         answers.said.append(f'SEED {answers.seed or "is not there"}')
     if handed.lesson.name == LOOKS_FIRST:
@@ -233,40 +165,36 @@ def answers_of(cells: list[Cell], handed: Handed) -> Answers:
     return answers
 
 
-def _looks(cells: list[Cell], known: set[str]) -> dict[str, list[str]]:
+def _looks(cells: list[Node], known: set[str]) -> dict[str, list[str]]:
     looks, waiting = {}, []
     for cell in cells:
         if cell.id in known:
             if waiting:
                 looks[cell.id], waiting = waiting, []
-        elif cell.kind == 'code' and cell.source.startswith(LOOK):
+        elif cell.cell_type == 'code' and cell.source.startswith(LOOK):
             waiting.append(cell.source[:LARGEST_SOURCE])
     return looks
 
 
-def _below_heading(cells: list[Cell], task: int) -> list[Cell]:
-    """Return the exercise cells below the heading of a task, by their tag, else by their place."""
-    found = _inside(cells, task)
-    tagged = [cell for cell in found if 'exercise' in cell.tags]
+def _same_task(cells: list[Node], task: Task) -> list[Node]:
+    """Return the code cells below the heading of a task, in a student's notebook.
+
+    The heading is that with the same id; else, in a notebook without ids, that with the same title.
+    """
+    own = Lesson('', Node(cells=cells)).tasks
+    ids = [one for one in own if task.heading and one.heading.id == task.heading.id]
+    same = ids or [one for one in own if (one.title, one.star) == (task.title, task.star)]
+    return [cell for one in same[:1] for cell in one.code]
+
+
+def _exercises(inside: list[Node]) -> list[Node]:
+    """Return the exercise cells among those of a task, by their tag, else by their place."""
+    tagged = [cell for cell in inside if 'exercise' in tags(cell)]
     if tagged:
         return tagged
     above = []
-    for cell in found:
-        if CHECK.match(cell.source) or cell.source.startswith('%%solution'):
+    for cell in inside:
+        if is_check(cell) or is_solution(cell):
             break
         above.append(cell)
     return above
-
-
-def _inside(cells: list[Cell], task: int) -> list[Cell]:
-    """Return the code cells between the heading of a task and the next heading."""
-    inside, found = False, []
-    for cell in cells:
-        heading = HEADING.search(cell.source) if cell.kind == 'markdown' else None
-        if heading:
-            inside = int(heading[1]) == task
-        elif inside and cell.kind == 'markdown' and cell.source.startswith('#'):
-            inside = False
-        elif inside and cell.kind == 'code':
-            found.append(cell)
-    return found

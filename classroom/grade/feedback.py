@@ -10,8 +10,8 @@ from nbformat.v4 import new_markdown_cell
 
 from classroom.grade.answers import Answers, Handed
 from classroom.grade.results import Result
+from helpers.lesson import tags
 from tools.lessons.clean import text_of
-from tools.lessons.lesson import tags
 
 LEFT_OUT = {'notes', 'solution'}
 
@@ -32,9 +32,10 @@ def feedback(handed: Handed, answers: Answers, result: Result) -> str:
 def _summary(handed: Handed, result: Result) -> str:
     lines = [f'# {result.points} of {len(result.tasks)} tasks are solved', '']
     lines += ['| task | | points of its check | |', '|---|---|---|---|']
-    for number, task in result.tasks.items():
+    for name, task in result.tasks.items():
         met = f'{task.met} of {task.of}' if task.of else ''
         why = ''.join(' ' if letter in '|\n<>`' else letter for letter in task.why)
+        number = handed.tasks[name].number
         lines.append(f'| {number} | {"✔" if task.solved else "○"} | {met} | {why} |')
     lines += ['', 'Only the cells of the tasks were judged, in the lesson as it was handed out.']
     return '\n'.join(lines)

@@ -5,7 +5,7 @@ lost if this is ended:
 
     {"begin": true}                                  before any code of the student
     {"cell": "check-02-1", "outputs": [...]}         for each cell of a task
-    {"given_up": 3, "why": "its code ended ..."}     a task hung, or ended the kernel
+    {"given_up": "a_driver", "why": "its code ended ..."}     a task hung, or ended the kernel
     {"end": true}
 
 After a task was given up, the lesson runs again, with the starter of that task.
@@ -133,14 +133,15 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(base64.b64decode(content))
     yield {'begin': True}
-    given_up: set[int] = set()
+    given_up: set[str] = set()
+    tasks = [*dict.fromkeys(cell['task'] for cell in job['cells'] if cell['task'])]  # in order
     exercises = [cell for cell in job['cells'] if cell['kind'] == 'exercise']
     answered = {cell['task'] for cell in exercises if cell['source'] != cell['starter']}
     answered |= {*job['overlay']}
     for attempt in range(len(answered) + 1):
         here = folder / f'run_{attempt}'
         here.mkdir()
-        task = 0  # the last one that was reached
+        task = ''  # the last one that was reached
         kernel = Kernel(here)
         try:
             for cell in job['cells']:
@@ -158,10 +159,12 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
                     yield {'cell': cell['id'], 'outputs': outputs}
         except HungError as why:
             # The code that hangs may be that of a task above: its class is used in a later cell.
-            blamed = max((n for n in answered - given_up if n <= task), default=None)
-            if blamed is None:
-                yield {'given_up': 0, 'why': str(why)}
+            reached = tasks[: tasks.index(task) + 1] if task else []
+            suspects = [one for one in reached if one in answered - given_up]
+            if not suspects:
+                yield {'given_up': '', 'why': str(why)}
                 return
+            blamed = suspects[-1]
             given_up.add(blamed)
             yield {'given_up': blamed, 'why': str(why)}
             if answered == given_up:

@@ -10,12 +10,12 @@ from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 
-from classroom.grade.answers import SEED, Answers, Handed, Task
+from classroom.grade.answers import SEED, Answers, Handed
 from classroom.grade.runner import LATE, Said
 from helpers.checks.verdict import KEY
-from tools.lessons.lesson import ROOT, tags
+from helpers.lesson import ROOT, Task, tags
 
-FORM = 2  # of the files
+FORM = 3  # of the files
 LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # copies, by Python and JupyterLab
 INTERRUPTED = re.compile(r'Interrupted after (\d+) s\.')  # as judge.py says it
 UNKNOWN = re.compile(r"NameError: name '(\w+)' is not defined")
@@ -35,10 +35,10 @@ class Outcome:
 
 @dataclass
 class Result:
-    """A lesson of a student, judged: its tasks, and the outputs of their cells."""
+    """A lesson of a student, judged: its tasks by their names, and the outputs of their cells."""
 
     digest: str
-    tasks: dict[int, Outcome] = field(default_factory=dict)
+    tasks: dict[str, Outcome] = field(default_factory=dict)
     outputs: dict[str, list[dict]] = field(default_factory=dict)
     minutes: float = 0.0
     trouble: str = ''
@@ -89,7 +89,7 @@ def job_of(
     of_cell = {}
     for task in handed.tasks.values():
         for kind in ('exercises', 'checks', 'solutions'):
-            of_cell |= {cell.id: (kind[:-1], task.number) for cell in getattr(task, kind)}
+            of_cell |= {cell.id: (kind[:-1], task.name) for cell in getattr(task, kind)}
     wanted = [task for task in handed.tasks.values() if files or answers.changed(task)]
     if not wanted:
         return None
@@ -97,23 +97,25 @@ def job_of(
     for cell in handed.cells:
         if cell.cell_type != 'code':
             continue
-        kind, number = of_cell.get(cell.id, ('', 0))
+        kind, task = of_cell.get(cell.id, ('', ''))
         for count, look in enumerate(answers.looks.get(cell.id, ())):
-            cells.append({'id': f'{cell.id}-look-{count}', 'source': look, 'kind': '', 'task': 0})
-        one = {'id': cell.id, 'source': cell.source, 'kind': kind, 'task': number}
+            cells.append({'id': f'{cell.id}-look-{count}', 'source': look, 'kind': '', 'task': ''})
+        one = {'id': cell.id, 'source': cell.source, 'kind': kind, 'task': task}
         if kind == 'exercise':
             one |= {'source': answers.sources.get(cell.id, cell.source), 'starter': cell.source}
         elif answers.seed:
             one['source'] = SEED.sub(f'SEED = {answers.seed}', cell.source)
         cells.append(one)
-        if number == wanted[-1].number and 'check' in tags(cell):
+        if task == wanted[-1].name and 'check' in tags(cell):
             last = len(cells)
     encoded = {name: base64.b64encode(data).decode() for name, data in files.items()}
     return {
         'cells': cells[:last],
         'module': handed.module,
         'files': encoded,
-        'overlay': [n for n, task in handed.tasks.items() if files and not answers.changed(task)],
+        'overlay': [
+            name for name, task in handed.tasks.items() if files and not answers.changed(task)
+        ],
         'cell_s': cell_s,
     }
 
@@ -125,14 +127,14 @@ def result_of(
     cells = {cell.id for task in handed.tasks.values() for cell in (*task.exercises, *task.checks)}
     outputs = {id: found for id, found in said.outputs.items() if id in cells}
     result = Result(digest, outputs=outputs, minutes=said.seconds / 60, trouble=said.trouble)
-    for number, task in handed.tasks.items():
+    for name, task in handed.tasks.items():
         outcome = Outcome()
         if not files and not answers.changed(task):
             outcome.why = 'not answered'
-        elif number in said.given_up:
-            outcome.why = said.given_up[number]
+        elif name in said.given_up:
+            outcome.why = said.given_up[name]
         else:
-            found = [_verdict(number, outputs.get(cell.id, [])) for cell in task.checks]
+            found = [_verdict(name, outputs.get(cell.id, [])) for cell in task.checks]
             if found and all(found):
                 outcome.solved = all(one['solved'] is True for one in found)
                 points = [point for one in found for point in one['points']]
@@ -140,11 +142,11 @@ def result_of(
                 outcome.why = next((str(one['note'])[:200] for one in found if 'note' in one), '')
             else:
                 outcome.why = _error(task, outputs) or said.trouble or 'no verdict'
-        result.tasks[number] = outcome
+        result.tasks[name] = outcome
     return result
 
 
-def _verdict(task: int, outputs: list[dict]) -> dict | None:
+def _verdict(task: str, outputs: list[dict]) -> dict | None:
     """Return the one verdict of a check's outputs. If there are two, one is forged: none counts."""
     found = []
     for output in outputs:
@@ -194,7 +196,7 @@ class Kept:
             data = json.loads((self._folder / f'{key}.json').read_text(encoding='utf-8'))
             if (data['form'], data['digest']) != (FORM, digest):
                 return None
-            tasks = {int(number): Outcome(**task) for number, task in data['tasks'].items()}
+            tasks = {name: Outcome(**task) for name, task in data['tasks'].items()}
             result = Result(**(data | {'tasks': tasks}))
             too_short = result.trouble.startswith(LATE) and result.minutes < limit_min * 0.99
             return None if too_short else result

@@ -16,7 +16,7 @@ from uuid import uuid4
 
 import psutil
 
-from tools.lessons.lesson import ROOT
+from helpers.lesson import ROOT
 
 SCRIPT = ROOT / 'classroom/container/run.sh'
 MOST_SAID = 30_000_000  # bytes that are read of what it says
@@ -30,7 +30,7 @@ class Said:
     """What `judge` said: the outputs of cells, and the tasks that it gave up, with the reason."""
 
     outputs: dict[str, list[dict]] = field(default_factory=dict)
-    given_up: dict[int, str] = field(default_factory=dict)
+    given_up: dict[str, str] = field(default_factory=dict)
     begun: bool = False  # before any code of a student
     ended: bool = False
     trouble: str = ''  # why it did not end by itself
@@ -162,7 +162,7 @@ def _read(line: bytes, said: Said) -> None:
     outputs, given_up = event.get('outputs'), event.get('given_up')
     if isinstance(event.get('cell'), str) and isinstance(outputs, list):
         said.outputs[event['cell']] = [one for one in outputs if isinstance(one, dict)]
-    elif isinstance(given_up, int):
+    elif isinstance(given_up, str):
         said.given_up[given_up] = str(event.get('why', ''))[:200]
     said.begun |= event.get('begin') is True
-    said.ended |= event.get('end') is True or given_up == 0
+    said.ended |= event.get('end') is True or given_up == ''

@@ -18,7 +18,7 @@ import re
 import tarfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -173,13 +173,14 @@ def workspace_files(file: File) -> dict[str, bytes]:
     """
     data = file.read()
     try:
-        members = _zip_members(data) if file.name.lower().endswith('.zip') else _tar_members(data)
+        members = _zip_members if file.name.lower().endswith('.zip') else _tar_members
+        workspaces = _workspaces(PurePosixPath(name).parts for name, _ in members(data))
         files, size = {}, 0
-        for name, read in members:
+        for name, read in members(data):
             path = PurePosixPath(name)
             if path.is_absolute() or '..' in path.parts:
                 raise ValueError(f'{name!r} in it leads out of it')
-            below = _below_src(path.parts)
+            below = _below_src(path.parts, workspaces)
             if below is None or _is_hidden(name):
                 continue
             content = read()
@@ -195,15 +196,30 @@ def workspace_files(file: File) -> dict[str, bytes]:
     return files
 
 
-def _below_src(parts: tuple[str, ...]) -> str | None:
+def _workspaces(paths: Iterable[tuple[str, ...]]) -> set[str]:
+    """Return the folders at the top of an archive that are workspaces.
+
+    A workspace has folders in its `src`. A package has files there, or a package.xml beside it.
+    """
+    with_folders, packages = set(), set()
+    for top, *below in filter(None, paths):
+        if below[:1] == ['src'] and len(below) > 2:
+            with_folders.add(top)
+        elif below == ['package.xml'] or below[:1] == ['src']:
+            packages.add(top)
+    return with_folders - packages
+
+
+def _below_src(parts: tuple[str, ...], workspaces: set[str]) -> str | None:
     """Return the path below the workspace's `src`, or None for a file of a build.
 
     The archive may begin with `scratch`, the workspace, `src` or the packages.
     """
     rest = list(parts)
-    for known in (r'scratch', r'lesson_\w+'):
-        if len(rest) > 1 and re.fullmatch(known, rest[0]):
-            rest.pop(0)
+    if rest[0] == 'scratch' and len(rest) > 2:
+        rest = rest[2:]
+    elif rest[0] in workspaces:
+        rest = rest[1:]
     if len(rest) > 1 and rest[0] == 'src':
         return '/'.join(rest[1:])
     return None if rest[0] in ('build', 'install', 'log') else '/'.join(rest)

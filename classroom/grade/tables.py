@@ -30,7 +30,7 @@ POINTS_POSSIBLE = '    Points Possible'  # as Canvas writes it
 
 @dataclass
 class Row:
-    """A student, and the results of the lessons, by their numbers. `said` are the sentences.
+    """A student, and the results of the lessons, by their names. `said` are the sentences.
 
     `points` is how many tasks that count are solved.
     """
@@ -76,16 +76,16 @@ def is_canvas(sheet: Sheet) -> bool:
 
 def grades(rows: list[Row], lessons: list[Handed]) -> str:
     """Return grades.csv: a row for each student, a column for each task."""
-    columns = [(one.lesson.number, number) for one in lessons for number in one.tasks]
-    header = ['name', 'id', 'late', *(f'{lesson} task {number}' for lesson, number in columns)]
+    columns = [(one.lesson.name, task) for one in lessons for task in one.tasks]
+    header = ['name', 'id', 'late', *(f'{lesson} {task}' for lesson, task in columns)]
     most = sum(len(one.counted) for one in lessons)
     table = [[*header, 'points', 'of', 'minutes to judge', 'said']]
     for row in rows:
         values = []
-        for lesson, number in columns:
+        for lesson, task in columns:
             result = row.results.get(lesson)
-            task = result.tasks.get(number) if result else None
-            values.append(int(task.solved) if task else '')
+            outcome = result.tasks.get(task) if result else None
+            values.append(int(outcome.solved) if outcome else '')
         minutes = sum(result.minutes for result in row.results.values())
         student = row.student
         said = '; '.join(row.said)

@@ -8,8 +8,9 @@ from support.processes import running
 from support.students import student
 
 from classroom.tests.support.deck_page import DeckPage
+from helpers.lesson import path_of
 
-LESSON = '02_lose_messages.ipynb'
+LESSON = path_of('lose_messages').name
 NAMES = {'ada': 41, 'bob': 14, 'cyd': 14}
 CELLS = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4).cells
 [GUESS] = [i for i, cell in enumerate(CELLS) if 'my_guess = guess(' in cell.source]
@@ -22,8 +23,8 @@ TASK = """
 from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
-tasks.add(1)(lambda: [('it is so', lambda: True, '')])
-tasks.check(1)
+tasks.add(lambda: [('it is so', lambda: True, '')], name='publish_numbers')
+tasks.check('publish_numbers')
 raise_hand()
 """
 
@@ -96,12 +97,13 @@ def test_from_join_to_the_end(lab_page, tabs, student_server, artefacts):
 
 def test_a_slide_shows_the_guesses_of_the_class(lab_page, tmp_path):
     with (
-        server(tmp_path, 'present', 'LESSON=02') as presenter,
+        server(tmp_path, 'present', 'LESSON=lose_messages') as presenter,
         made(tmp_path, STARTED, 'class') as (_, started),
     ):
         tell = f"""
 import sys
 from helpers.checks import *
+from helpers.lesson import path_of
 {started[1]}
 guess({QUESTION!r}, 14)
 sys.stdin.read()

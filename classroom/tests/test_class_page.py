@@ -22,13 +22,14 @@ from classroom.tests.support.classes import (
     OTHER,
     QUESTION,
     STEP,
+    TASK,
     WEB,
     event,
     running_class,
     write_lesson,
 )
 from helpers.checks.classroom import BATCH
-from tools.lessons.lesson import lessons
+from helpers.lesson import lessons, outline, path_of
 
 CLASS = [sys.executable, '-m', 'classroom.class_page']
 
@@ -60,7 +61,7 @@ def test_only_what_the_lesson_has_is_counted(opened):
     ada = opened.join()
     unknown = {
         'question': event(question='What is your name?'),
-        'task': event('task', task=2, solved=True),
+        'task': event('task', task='take_it', solved=True),
         'cell': event('cell', cell='my own'),
         'lesson': event() | {'lesson': 'lose_keys'},
     }
@@ -86,9 +87,9 @@ def test_steps_tasks_hands_and_notes(opened):
     for seat in seats:
         opened.tell(seat, event('cell', 1, cell=STEP), event('hand', 2, up=True))
     opened.tell(seats[0], event('cell', 3, cell=LATER))
-    opened.tell(seats[0], event('task', 4, task=1, solved=False))
-    opened.tell(seats[1], event('task', 4, task=1, solved=True))
-    opened.tell(seats[1], event('task', 5, task=1, solved=False))
+    opened.tell(seats[0], event('task', 4, task=TASK, solved=False))
+    opened.tell(seats[1], event('task', 4, task=TASK, solved=True))
+    opened.tell(seats[1], event('task', 5, task=TASK, solved=False))
     view = opened.view()
     assert [step['here'] for step in view['steps']] == [0, 1, 1]
     assert view['tasks'] == [{'number': 1, 'solved': 1, 'tried': 1, 'open': before - 2}]
@@ -101,14 +102,32 @@ def test_steps_tasks_hands_and_notes(opened):
 def test_who_has_solved_which_of_a_task_that_differs(opened):
     ada, other = opened.join(name='Ada'), opened.join()
     for number in (1, 2):
-        opened.tell(ada, event('about', number, about='plain_twist', task=1))
-    opened.tell(other, event('about', 3, about='slow_look', task=1))
+        opened.tell(ada, event('about', number, about='plain_twist', task=TASK))
+    opened.tell(other, event('about', 3, about='slow_look', task=TASK))
     seat = opened.view()['about'][1]['tasks'][0]['who'][0]
     assert opened.view()['about'] == [
         {'about': 'plain_twist', 'tasks': [{'number': 1, 'who': ['Ada']}]},
         {'about': 'slow_look', 'tasks': [{'number': 1, 'who': [seat]}]},
     ]
     assert seat.startswith('seat ')
+
+
+def test_a_task_of_version_0_3_is_known_by_its_number(tmp_path):
+    """A student's computer, or a class that was broken off, may still have 0.3."""
+    lesson = outline(path_of('lose_messages'))
+    file = tmp_path / 'class.sqlite'
+    store = ClassStore(file, [Known(lesson)])
+    seat = store.join('ada', '')
+    told = event('task', 1, task=4, solved=True) | {'lesson': lesson.name}
+    assert store.take(seat, [told]) == ''
+    with store._db as db:
+        db.execute("UPDATE events SET what = '4'")
+    store.close()
+    store = ClassStore(file, [Known(lesson)])
+    solved = [task['number'] for task in store.view('lose_messages', 0)['tasks'] if task['solved']]
+    assert solved == [lesson.tasks[3].number]
+    assert lesson.tasks[3].name == 'be_the_queue'
+    store.close()
 
 
 def test_a_guess_is_shown_until_it_is_compared(opened):
@@ -220,8 +239,8 @@ ATTACKS = [
     *(event() | {extra: 1} for extra in ['seat', 'at_s', '__proto__']),
     *({k: v for k, v in event().items() if k != missing} for missing in event()),
     *(event('task', task=n, solved=True) for n in [-1, 1.5, '1', 2**70, True]),
-    event('task', task=1, solved=1),
-    event('about', about=3, task=1),
+    event('task', task=TASK, solved=1),
+    event('about', about=3, task=TASK),
     event('hand', up='yes'),
     event('cell', cell='../..'),
     event() | {'lesson': '../02'},

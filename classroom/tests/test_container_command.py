@@ -6,7 +6,7 @@ import subprocess
 import pytest
 from support.processes import put
 
-from tools.lessons.lesson import ROOT
+from helpers.lesson import ROOT
 
 USED = ('chown', 'cksum', 'cut', 'dirname', 'find', 'id', 'mkdir', 'sh', 'sort', 'tr', 'uname')
 

@@ -13,27 +13,27 @@ import pytest
 
 from classroom.grade import alike, results, runner, tables
 from classroom.grade.__main__ import main
-from classroom.grade.answers import answers_of, cells_of, handed_out, lesson_of
+from classroom.grade.answers import answers_of, handed_out, lesson_of
 from classroom.grade.results import Kept, digest_of, job_of, result_of
 from classroom.grade.submissions import submissions_of, workspace_files
 from helpers.checks.verdict import KEY
-from tools.lessons.lesson import ROOT, tags
-from tools.lessons.lesson import lessons as lessons_of_course
+from helpers.lesson import cells_of, path_of, tags
+from helpers.lesson import lessons as lessons_of_course
 
 RIGHT, WRONG = 'speed = 1.75 / 3.5\nshow(speed)', 'speed = 1.75\nshow(speed)'
 STARTER = 'task-00-1-starter'
+NUMBER = {lesson.name: lesson.number for lesson in lessons_of_course()}
 OF = len(lessons_of_course()[0].tasks)  # of lesson 00
 
 
 @pytest.fixture(scope='module')
 def lessons():
-    return {one.lesson.number: one for one in handed_out()}
+    return {one.lesson.name: one for one in handed_out()}
 
 
-def notebook(number='00', **sources):
+def notebook(name='start_here', **sources):
     """Return a lesson as a student saves it, with other sources of some cells."""
-    [path] = (ROOT / 'notebooks').glob(f'{number}_*.ipynb')
-    content = json.loads(path.read_text(encoding='utf-8'))
+    content = json.loads(path_of(name).read_text(encoding='utf-8'))
     for cell in content['cells']:
         cell['source'] = sources.get(cell['id'], cell['source'])
     return content
@@ -151,17 +151,20 @@ def archive_of(files, kind='tar'):
 
 
 @pytest.mark.parametrize('kind', ['zip', 'tar'])
-@pytest.mark.parametrize('above', ['', 'src/', 'lesson_09/src/', 'scratch/lesson_09/src/'])
+@pytest.mark.parametrize(
+    'above',
+    ['', 'src/', 'make_a_package/src/', 'scratch/make_a_package/src/', 'scratch/lesson_09/src/'],
+)
 def test_the_files_of_a_workspace(submit, kind, above):
     files = {f'{above}pkg/src/a.cpp': b'//', f'{above}pkg/package.xml': b'<'}
-    if above.startswith(('lesson', 'scratch')):
+    if above.startswith(('make_a_package', 'scratch')):
         files[above.replace('src/', 'build/x')] = b'built'
     ending = 'zip' if kind == 'zip' else 'tar.gz'
     folder = submit(**{f'Ada/work.{ending}': archive_of(files, kind)})
     [[file]] = (one.files for one in submissions_of(folder)[0])
     found = workspace_files(file)
     found.pop('link', None)
-    assert {*found} - {'lesson_09/build/x', 'build/x'} == {'pkg/src/a.cpp', 'pkg/package.xml'}
+    assert {*found} == {'pkg/src/a.cpp', 'pkg/package.xml'}
     assert 'link' not in found
 
 
@@ -185,11 +188,11 @@ def read(content, lessons):
 
 
 def test_a_lesson_is_found_by_what_is_in_it(lessons):
-    content = notebook('02')
-    assert read(content, lessons)[0] is lessons['02']
+    content = notebook('lose_messages')
+    assert read(content, lessons)[0] is lessons['lose_messages']
     for cell in content['cells']:
         cell.pop('id')  # as another program may save it
-    assert read(content, lessons)[0] is lessons['02']
+    assert read(content, lessons)[0] is lessons['lose_messages']
     assert lesson_of(cells_of(b'{"cells": [{"cell_type": "code", "source": "1"}]}'), ()) is None
 
 
@@ -204,15 +207,17 @@ def test_a_lesson_is_found_by_what_is_in_it(lessons):
 )
 def test_answers_go_into_the_cells_of_the_lesson(lessons, change):
     """By the id of a cell, else by the heading of its task and the tag, else by the place."""
-    first = next(iter(lessons['02'].tasks.values())).exercises[0].id
-    content = notebook('02', **{first: 'mine = 1\n'})
+    first = next(iter(lessons['lose_messages'].tasks.values())).exercises[0].id
+    content = notebook('lose_messages', **{first: 'mine = 1\n'})
     for cell in content['cells']:
         if isinstance(cell['source'], list):
             cell['source'] = ''.join(cell['source'])
         change(cell)
     _, answers = read(content, lessons)
     assert answers.sources[first] == 'mine = 1\n'
-    assert [n for n, task in lessons['02'].tasks.items() if answers.changed(task)] == [1]
+    assert [n for n, task in lessons['lose_messages'].tasks.items() if answers.changed(task)] == [
+        'publish_numbers'
+    ]
     assert not answers.said
 
 
@@ -226,7 +231,7 @@ def test_missing_and_doubled_cells_are_named(lessons):
     content['cells'] = [one for one in content['cells'] if one['id'] != STARTER]
     _, answers = read(content, lessons)
     assert answers.said == ['task 1 has no cell']
-    assert job_of(lessons['00'], answers, {}) is None
+    assert job_of(lessons['start_here'], answers, {}) is None
 
 
 def test_an_answer_beside_its_cell_is_named(lessons):
@@ -265,7 +270,9 @@ def test_a_notebook_in_an_archive_or_with_another_ending_is_read(submit, capsys)
 def test_why_there_is_no_verdict_is_said_in_words(lessons, output, why):
     _, answers = read(notebook(**{STARTER: 'x = 1'}), lessons)
     said = runner.Said({STARTER: [output]}, begun=True, ended=True)
-    assert result_of(lessons['00'], answers, {}, said, '').tasks[1].why == why
+    assert (
+        result_of(lessons['start_here'], answers, {}, said, '').tasks['through_the_door'].why == why
+    )
 
 
 def test_only_exercise_cells_are_taken(lessons):
@@ -312,7 +319,12 @@ def said_of(*verdicts):
     return runner.Said({'check-00-1': outputs}, ended=True)
 
 
-GOOD = {'task': 1, 'of': 'answer', 'solved': True, 'points': [{'what': 'x', 'ok': True}]}
+GOOD = {
+    'task': 'through_the_door',
+    'of': 'answer',
+    'solved': True,
+    'points': [{'what': 'x', 'ok': True}],
+}
 
 
 @pytest.mark.parametrize(
@@ -320,7 +332,7 @@ GOOD = {'task': 1, 'of': 'answer', 'solved': True, 'points': [{'what': 'x', 'ok'
     [
         ([GOOD], True),
         ([GOOD, GOOD], False),  # one of them is forged
-        ([GOOD | {'task': 2}], False),
+        ([GOOD | {'task': 'a_first_node'}], False),
         ([GOOD | {'of': 'solution'}], False),
         ([GOOD | {'points': []}], False),
         ([GOOD | {'points': [{'ok': False}]}], False),
@@ -331,8 +343,8 @@ GOOD = {'task': 1, 'of': 'answer', 'solved': True, 'points': [{'what': 'x', 'ok'
 )
 def test_a_verdict_counts_if_it_is_one(lessons, verdicts, solved):
     _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
-    result = result_of(lessons['00'], answers, {}, said_of(*verdicts), 'digest')
-    assert result.tasks[1].solved == solved
+    result = result_of(lessons['start_here'], answers, {}, said_of(*verdicts), 'digest')
+    assert result.tasks['through_the_door'].solved == solved
     assert result.points == solved
 
 
@@ -340,11 +352,11 @@ def test_without_a_verdict_the_error_is_said(lessons):
     _, answers = read(notebook(**{STARTER: 'speed = input()'}), lessons)
     error = {'output_type': 'error', 'ename': 'NameError', 'evalue': 'speed', 'traceback': []}
     said = runner.Said({STARTER: [error | {'ename': 'KeyboardInterrupt', 'evalue': ''}]})
-    result = result_of(lessons['00'], answers, {}, said, 'digest')
-    assert result.tasks[1].why == 'its cell ended with KeyboardInterrupt'
+    result = result_of(lessons['start_here'], answers, {}, said, 'digest')
+    assert result.tasks['through_the_door'].why == 'its cell ended with KeyboardInterrupt'
     said = runner.Said({'check-00-1': [error]})
-    result = result_of(lessons['00'], answers, {}, said, 'digest')
-    assert result.tasks[1].why == 'its check ended with NameError: speed'
+    result = result_of(lessons['start_here'], answers, {}, said, 'digest')
+    assert result.tasks['through_the_door'].why == 'its check ended with NameError: speed'
 
 
 def test_hostile_lines_are_left_out():
@@ -426,7 +438,7 @@ def test_two_hundred_students(submit, capsys):
     assert sum(line.startswith('Student') for line in lines) == 200
     assert 'Student 007: lesson.ipynb cannot be read: it is broken: it is no JSON' in lines
     rows = rows_of(submit())
-    assert sum(row['00 task 1'] == '1' for row in rows) == 99
+    assert sum(row['start_here through_the_door'] == '1' for row in rows) == 99
     assert [row['points'] for row in rows if row['name'] == 'Student 007'] == ['']
 
 
@@ -434,7 +446,7 @@ def test_a_line_for_each_strange_submission(submit, capsys):
     folder = submit(
         **{
             'Ada/x.ipynb': with_answer(RIGHT),
-            'Bob/02.ipynb': json.dumps(notebook('02')).encode(),
+            'Bob/02.ipynb': json.dumps(notebook('lose_messages')).encode(),
             'Cy/notes.txt': b'I was ill',
             'Di/00.ipynb': json.dumps(notebook()).encode(),
             'Eve/a.ipynb': with_answer(WRONG),
@@ -448,7 +460,7 @@ def test_a_line_for_each_strange_submission(submit, capsys):
     assert lines[:8] == [
         f'=cmd(): lesson 00: 0 of {OF}',
         f'Ada: lesson 00: 1 of {OF}',
-        'Bob: 02.ipynb is lesson 02, not asked for; lesson 00 is not there',
+        f'Bob: 02.ipynb is lesson {NUMBER["lose_messages"]}, not asked for; lesson 00 is not there',
         'Cy: no notebook, but notes.txt',
         f'Di: lesson 00: 0 of {OF}; nothing is written in lesson 00',
         f'Eve: lesson 00: 0 of {OF}; lesson 00 is there twice: a.ipynb counts',
@@ -492,18 +504,21 @@ def test_moodle_takes_its_worksheet_back(submit, capsys):
 
 @pytest.mark.parametrize('options', [[], ['--no-stars']])
 def test_tasks_with_a_star_count_or_not(submit, capsys, lessons, options):
-    headings = lessons['01'].lesson.tasks
-    starred = [n for n, heading in enumerate(headings, 1) if '★' in heading]
-    of = len(headings) - (len(starred) if options else 0)
+    tasks = lessons['publish_and_subscribe'].lesson.tasks
+    starred = [task for task in tasks if task.star]
+    of = len(tasks) - (len(starred) if options else 0)
     points = 1 if options else 2
-    core = next(n for n in range(2, len(headings)) if n not in starred)
-    solved = (lessons['01'].tasks[n].exercises[0].id for n in (core, starred[0]))
-    data = json.dumps(notebook('01', **dict.fromkeys(solved, RIGHT))).encode()
+    core = next(task for task in tasks[1:] if not task.star)
+    solved = (task.exercises[0].id for task in (core, starred[0]))
+    data = json.dumps(notebook('publish_and_subscribe', **dict.fromkeys(solved, RIGHT))).encode()
     folder = submit(**{'Student_500_assignsubmission_file/lesson.ipynb': data})
     assert main([str(folder), *options], Stand()) == 0
-    assert f'Student: lesson 01: {points} of {of}\n' in capsys.readouterr().out
+    assert (
+        f'Student: lesson {NUMBER["publish_and_subscribe"]}: {points} of {of}\n'
+        in capsys.readouterr().out
+    )
     [row] = rows_of(folder)
-    counts = row['points'], row['of'], row[f'01 task {starred[0]}']
+    counts = row['points'], row['of'], row[f'publish_and_subscribe {starred[0].name}']
     assert counts == (str(points), str(of), '1')
     [row] = rows_of(folder, 'moodle.csv')
     assert float(row['Grade']) == points
@@ -511,7 +526,9 @@ def test_tasks_with_a_star_count_or_not(submit, capsys, lessons, options):
 
 def test_an_exam_of_two_tasks(submit, capsys):
     """What a student has run to look at the robot is run again; two tasks are all points."""
-    data = notebook('19', **{'find-next': RIGHT, 'mend-next': RIGHT, 'next': 'SEED = 7  # mine'})
+    data = notebook(
+        'find_the_fault', **{'find-next': RIGHT, 'mend-next': RIGHT, 'next': 'SEED = 7  # mine'}
+    )
     at = next(i for i, cell in enumerate(data['cells']) if cell['id'] == 'find-next')
     look = {
         'cell_type': 'code',
@@ -523,14 +540,16 @@ def test_an_exam_of_two_tasks(submit, capsys):
     path = 'Student_500_assignsubmission_file/19_first.ipynb'
     folder = submit(**{path: json.dumps(data).encode()})
     assert main([str(folder), '--tasks', '9 10'], Stand()) == 0
-    assert 'Student: lesson 19: 2 of 2; SEED 7\n' in capsys.readouterr().out
-    [handed] = [one for one in handed_out() if one.lesson.number == '19']
+    assert (
+        f'Student: lesson {NUMBER["find_the_fault"]}: 2 of 2; SEED 7\n' in capsys.readouterr().out
+    )
+    [handed] = [one for one in handed_out() if one.lesson.name == 'find_the_fault']
     cells = job_of(handed, answers_of(cells_of(json.dumps(data).encode()), handed), {})['cells']
     ids = [cell['id'] for cell in cells]
     assert ids[ids.index('find-next') - 1] == 'find-next-look-0'
     assert 'SEED = 7' in next(cell['source'] for cell in cells if cell['id'] == 'next')
     assert main([str(folder), '--tasks', '99'], Stand()) == 1
-    assert 'No task of lesson 19 would count' in capsys.readouterr().err
+    assert "_find_the_fault.ipynb has no task '99'" in capsys.readouterr().err
 
 
 def test_two_assignments_in_one_folder_are_refused(submit, capsys):
@@ -592,7 +611,7 @@ def test_feedback_has_verdicts_and_no_solution(submit):
 
 
 def test_equal_answers_are_named(lessons):
-    task = next(iter(lessons['02'].tasks.values()))
+    task = next(iter(lessons['lose_messages'].tasks.values()))
     [cell] = task.exercises
     own = 'for my_own_number in range(100, 10_000, 7):\n    print("What I think", my_own_number)\n'
     own += 'my_second_thought = [my_own_number for _ in range(12)]\n'
@@ -610,18 +629,18 @@ def test_equal_answers_are_named(lessons):
     }
     students = []
     for name, source in written.items():
-        students.append((name, read(notebook('02', **{cell.id: source}), lessons)[1]))
-    assert alike.groups(lessons['02'], students) == [(task.number, ['Ada', 'Bob'])]
+        students.append((name, read(notebook('lose_messages', **{cell.id: source}), lessons)[1]))
+    assert alike.groups(lessons['lose_messages'], students) == [(task.name, ['Ada', 'Bob'])]
 
 
 def test_what_is_kept_is_that_of_the_same_answers_and_lesson(lessons, tmp_path):
     _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
-    digest = digest_of(lessons['00'], answers, {})
-    result = result_of(lessons['00'], answers, {}, said_of(GOOD), digest)
+    digest = digest_of(lessons['start_here'], answers, {})
+    result = result_of(lessons['start_here'], answers, {}, said_of(GOOD), digest)
     kept = Kept(tmp_path / 'judged')
     kept.put('ada', result)
     assert kept.get('ada', digest, 20) == result
-    assert kept.get('ada', digest_of(lessons['00'], answers, {'a': b''}), 20) is None
+    assert kept.get('ada', digest_of(lessons['start_here'], answers, {'a': b''}), 20) is None
     result.trouble, result.minutes = 'it was ended after 5 min', 5.0
     kept.put('ada', result)
     assert kept.get('ada', digest, 5) == result
@@ -648,14 +667,14 @@ def test_what_is_kept_is_that_of_the_same_helpers(lessons, tmp_path, monkeypatch
         path.parent.mkdir(parents=True)
         path.write_text(text)
         monkeypatch.setattr(results, 'ROOT', tmp_path / text)
-        digests.append(digest_of(lessons['00'], answers, {}))
+        digests.append(digest_of(lessons['start_here'], answers, {}))
     assert (digests[0] != digests[1]) == is_new
 
 
 def test_the_number_of_a_lesson_that_draws_its_task(lessons):
-    lesson = lessons['02']
-    first = lesson.tasks[1].exercises[0].id
-    _, answers = read(notebook('02', **{first: 'mine = 1'}), lessons)
+    lesson = lessons['lose_messages']
+    first = lesson.tasks['publish_numbers'].exercises[0].id
+    _, answers = read(notebook('lose_messages', **{first: 'mine = 1'}), lessons)
     answers.seed = '7'
     cells = [cell.copy() for cell in lesson.cells]
     cells[[cell.cell_type for cell in cells].index('code')].source = 'SEED = 1\nother(SEED)'

@@ -14,7 +14,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from support.checkouts import git
 
 from classroom import handout, update
-from tools.lessons.lesson import PICTURES, ROOT
+from helpers.lesson import PICTURES, ROOT
 
 SOLVED = '%%solution 1\nsolved = 2'
 FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb', 'classroom/update.py'}
@@ -34,7 +34,8 @@ def checkout(tmp_path):
         new_markdown_cell('## 7. For instructors', id='instructors'),
     ]
     nbformat.write(new_notebook(cells=cells), root / 'notebooks/01_publish.ipynb')
-    for name in (*FILES, 'tests/test_a.py', 'classroom/hub/set_up.sh', handout.STUDENTS):
+    others = 'tests/test_a.py', 'classroom/hub/set_up.sh', handout.STUDENTS, handout.COMMANDS
+    for name in (*FILES, *others):
         if not name.endswith('.ipynb'):
             (root / name).parent.mkdir(parents=True, exist_ok=True)
             (root / name).write_text(name)
@@ -67,6 +68,7 @@ def test_a_handout_is_a_students(checkout, tmp_path, capsys):
     assert cells_of(course) == ['start = 1', SOLVED]
     assert '"output_type"' not in (course / 'notebooks/01_publish.ipynb').read_text()
     assert (course / 'README.md').read_text() == 'for students: | 01 |'
+    assert (course / 'Makefile').read_text() == handout.COMMANDS
 
 
 @pytest.fixture(scope='module')
@@ -91,7 +93,7 @@ def test_its_documents_name_only_what_it_has(archive):
                 slugs = {re.sub(r'[^\w -]', '', h).lower().replace(' ', '-') for h in headings}
                 assert heading in slugs, f'{name} links to #{heading}'
         commands = {*re.findall(r'`make ([a-z-]+)', text)}
-        assert commands <= {*handout.COMMANDS}, name
+        assert commands <= {'help', 'lab', 'update', 'set_up'}, name
     assert 'For instructors' not in (archive / 'notebooks/00_start_here.ipynb').read_text()
 
 
@@ -119,11 +121,11 @@ def test_its_commands_work(archive):
 
 
 def test_what_is_not_committed_is_named_and_left_out(checkout, tmp_path, capsys):
-    (checkout / 'Makefile').write_text('half done')
+    (checkout / handout.COMMANDS).write_text('half done')
     course = unpack(checkout, tmp_path / 'home')
-    assert (course / 'Makefile').read_text().startswith('Makefile\n')
+    assert (course / 'Makefile').read_text() == handout.COMMANDS
     said = capsys.readouterr().out
-    assert re.search(r'^Not committed, so not in it: Makefile, .*my draft', said, re.M)
+    assert re.search(r'^Not committed, so not in it: classroom/handout.mk, .*my draft', said, re.M)
 
 
 def test_solutions_may_come_later(checkout, tmp_path, capsys):

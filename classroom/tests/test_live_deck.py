@@ -9,9 +9,9 @@ from support.lab_server import ROOT
 from support.waits import wait_for
 
 from classroom.tests.support.deck_page import SLIDES_SHOWN
-from tools.lessons.lesson import lessons
+from helpers.lesson import lessons, path_of
 
-LESSON = '02_lose_messages.ipynb'
+LESSON = path_of('lose_messages').name
 START, NEXT = lessons()[:2]
 SAVED = f'() => !{PANEL}.context.model.dirty'
 SOURCE = f'() => {PANEL}.content.activeCell.model.sharedModel.getSource()'

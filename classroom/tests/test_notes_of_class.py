@@ -4,7 +4,7 @@ import pytest
 from nbconvert.filters import markdown2html
 
 from classroom.class_page.lessons import Known
-from tools.lessons.lesson import GLOSSARY, lessons, tags
+from helpers.lesson import GLOSSARY, lessons, tags
 
 LESSONS = [lesson for lesson in lessons() if lesson.number != GLOSSARY]
 

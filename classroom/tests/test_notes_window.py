@@ -9,9 +9,9 @@ from support.waits import wait_for
 
 from classroom.deck.slides import slide_types
 from classroom.tests.support.deck_page import DeckPage
-from tools.lessons.lesson import first_heading, minutes_of_note, read, tags
+from helpers.lesson import first_heading, minutes_of_note, path_of, read, tags
 
-LESSON = '02_lose_messages.ipynb'
+LESSON = path_of('lose_messages').name
 KNOWN = read((ROOT / 'notebooks' / LESSON).read_text(), LESSON)
 CELLS = KNOWN.notebook.cells
 # The third note of a step, below its heading, and the heading after this step.
@@ -85,7 +85,7 @@ def test_the_minutes_begin_after_the_first_slide(deck, window):
 
 def test_the_place_outlives_the_server(lab_page, tmp_path):
     """And what was typed: the deck says so, and R R makes it anew."""
-    arguments = (tmp_path, 'present', 'LESSON=2')
+    arguments = (tmp_path, 'present', 'LESSON=lose_messages')
     with server(*arguments) as running, lab_page(running, 'before', DeckPage) as deck:
         deck.present(LESSON)
         place = deck.press('ArrowRight')

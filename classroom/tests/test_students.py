@@ -34,8 +34,8 @@ def test_the_page_gets_guesses_tasks_and_hands(opened, tmp_path):
 guess({QUESTION!r}, 7)
 my_secret = guess({QUESTION!r}, 9)
 compare_prediction({QUESTION!r}, my_secret, 14)
-classroom.tell_task(1, True)
-classroom.tell_task(1, False)
+classroom.tell_task('try_it', True)
+classroom.tell_task('try_it', False)
 raise_hand()
 """
     with kernel(tmp_path, join(opened, 'Ada') + script) as said:
@@ -52,8 +52,8 @@ raise_hand()
         ('guess', QUESTION, 7),
         ('guess', QUESTION, 9),
         ('outcome', QUESTION, 14),
-        ('task', '1', True),
-        ('task', '1', False),
+        ('task', 'try_it', True),
+        ('task', 'try_it', False),
         ('hand', '', True),
     ]
 

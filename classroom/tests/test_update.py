@@ -184,133 +184,33 @@ def test_a_clone_follows_its_origin(tmp_path, capsys):
     assert read(clone / 'notebooks', '03_lose.ipynb') == before
 
 
-IMPORTS_OF_0_2 = """import math
-
-from helpers.checks import check, compare_prediction
-from helpers.classroom import guess
-from helpers.session import ros_session"""
-STARTER = """class MinimalSubscriber(Node):
-    def listener_callback(self, message):
-        # Your code: keep the text, and log it.
-        pass"""
-PART_1_OF_0_2 = """# ✔ Check of task 1, part 1 of 2
-def hear(*texts):
-    return ask(MinimalSubscriber, texts)"""
-PART_2_OF_0_2 = """# ✔ Check of task 1, part 2 of 2
-def keeps(*texts):
-    return hear(*texts) == [*texts] or 'self.heard is not that'
-
-
-check(1, ('it keeps one text', lambda: keeps('one'), 'A list has .append(...).'))"""
-CHECK_OF_TASK_2_OF_0_2 = """# ✔ Check of task 2
-check(2, ('nodes spin', lambda: all_tick(2), 'One executor.'))"""
-HARNESS_OF_0_2 = """# Ask nodes
-def ask(node, texts):
-    return ros_session(node, texts)"""
-
-
-def lesson_of_0_2():
-    """Return a piece of lesson 01 of version 0.2, which had the code of its checks in it."""
-    cells = [
-        tagged('lesson-01-03', IMPORTS_OF_0_2),
-        tagged('support', HARNESS_OF_0_2, 'harness'),
-        tagged('lesson-01-07', STARTER, 'exercise'),
-        tagged('check-01-1', PART_1_OF_0_2, 'check'),
-        tagged('check-01-1-b', PART_2_OF_0_2, 'check'),
-        tagged('check-01-2', CHECK_OF_TASK_2_OF_0_2, 'check'),
-    ]
-    return new_notebook(cells=cells, metadata={MARK: AS_SAVED})
-
-
-def newer_lesson():
-    """Return the same piece with checks of one line."""
-    imports = 'from helpers.checks.lessons.publish_and_subscribe import check'
-    cells = [
-        tagged('lesson-01-03', imports),
-        tagged('lesson-01-07', STARTER, 'exercise'),
-        tagged('check-01-1', 'check(1, MinimalSubscriber)', 'check'),
-        tagged('check-01-2', 'check(2, spin_together)', 'check'),
-    ]
-    return new_notebook(cells=cells, metadata={MARK: AS_SAVED})
-
-
-def tagged(id_, source, *tags):
-    output = new_output('stream', text=f'what {id_} printed for the repository')
-    return new_code_cell(source, id=id_, metadata={'tags': [*tags]}, outputs=[output])
-
-
-def by_student(lesson, **written):
-    """Return a lesson as JupyterLab saves it, with text that a student has written into cells."""
-    lesson = nbformat.from_dict(lesson)
-    del lesson.metadata[MARK]
+def shown(cells):
+    """Return a lesson of the repository, whose cells printed something there."""
+    lesson = notebook(cells)
+    lesson.metadata[MARK] = AS_SAVED
     for cell in lesson.cells:
-        cell.source += written.get(cell.id.replace('-', '_'), '')
-        cell.outputs = [new_output('stream', text='what I saw')]
-    lesson.cells.insert(3, new_code_cell('print("my own")', id='own'))
+        cell.outputs = [new_output('stream', text='what the repository saw')]
     return lesson
 
 
-def put(folder, lesson):
-    folder.mkdir(parents=True, exist_ok=True)
-    nbformat.write(lesson, folder / '01_publish_and_subscribe.ipynb')
-
-
-def bring_over(tmp_path, mine, base):
-    """Update a student's lesson, of which `base` was handed out, and return what it then is."""
-    put(tmp_path / 'mine', mine)
-    put(tmp_path / 'mine' / update.BASE, base)
-    put(tmp_path / 'newer', newer_lesson())
-    assert update.main([str(tmp_path / 'newer'), '--to', str(tmp_path / 'mine')]) == 0
-    return nbformat.read(tmp_path / 'mine/01_publish_and_subscribe.ipynb', as_version=4)
-
-
-ANSWERED = {'lesson_01_07': '\n        self.heard.append(message.data)'}
-CHANGED = {
-    'lesson_01_03': '\nimport numpy  # mine',
-    'support': '\n# a slip in what supports',
-    'check_01_1': '\n# a slip in part 1',
-    'check_01_1_b': '\n# a slip in part 2',
-}
-
-
-def test_a_lesson_of_version_0_2_gets_checks_of_one_line(tmp_path, capsys):
-    lesson = bring_over(tmp_path, by_student(lesson_of_0_2(), **ANSWERED), lesson_of_0_2())
-    answer = STARTER + ANSWERED['lesson_01_07']
-    newer = sources(newer_lesson().cells)
-    assert sources(lesson.cells) == [newer[0], answer, 'print("my own")', *newer[2:]]
-    assert 'kept as text' not in capsys.readouterr().out
-    # JupyterLab shows no outputs of a lesson that is marked as the repository's.
-    assert MARK not in lesson.metadata
-    outputs = [cell.outputs[0].text if cell.get('outputs') else '' for cell in lesson.cells]
-    assert outputs == ['', 'what I saw', '', '', '']
-
-
-@pytest.mark.parametrize('after_program_of_0_2', [False, True])
-def test_changed_checks_of_version_0_2_are_kept_as_text(tmp_path, capsys, after_program_of_0_2):
-    mine = by_student(lesson_of_0_2(), **ANSWERED, **CHANGED)
-    base = lesson_of_0_2()
-    if after_program_of_0_2:  # it has merged, and left as code what no longer runs
-        mine, base = update.merge(base, mine, newer_lesson()), newer_lesson()
-    lesson = bring_over(tmp_path, mine, base)
-    assert 'now kept as text: 4.' in capsys.readouterr().out
-    code = sources(cell for cell in lesson.cells if cell.cell_type == 'code')
-    newer = sources(newer_lesson().cells)
-    own = 'print("my own")'
-    assert code == [newer[0], STARTER + ANSWERED['lesson_01_07'], own, *newer[2:]]
-    text = sources(cell for cell in lesson.cells if cell.cell_type == 'markdown')
-    assert all(update.NO_LONGER_RUNS in cell for cell in text)
-    kept = (IMPORTS_OF_0_2, HARNESS_OF_0_2, PART_1_OF_0_2, PART_2_OF_0_2)
-    for cell, source, slip in zip(text, kept, CHANGED.values(), strict=True):
-        assert f'```python\n{source}{slip}\n```' in cell
-    # The next update changes nothing, and has nothing to say.
-    assert bring_over(tmp_path, lesson, newer_lesson()) == lesson
-    assert 'kept as text' not in capsys.readouterr().out
-
-
-def test_a_copy_of_a_check_stays_code(tmp_path):
-    mine = by_student(newer_lesson())
-    mine.cells.append(tagged('copy', 'check(1, Another)', 'check'))
-    assert bring_over(tmp_path, mine, newer_lesson()) == mine
+def test_outputs_are_those_that_the_student_saw(tmp_path):
+    """As JupyterLab shows no outputs of a lesson that is marked as the repository's."""
+    mine = notebook(WRITTEN)
+    for cell in mine.cells:
+        cell.outputs = [new_output('stream', text='what I saw')]
+    for folder, lesson in (('mine', mine), (f'mine/{update.BASE}', shown(OLD))):
+        (tmp_path / folder).mkdir(exist_ok=True)
+        nbformat.write(lesson, tmp_path / folder / LESSON)
+    (tmp_path / 'newer').mkdir()
+    nbformat.write(shown(NEWER), tmp_path / 'newer' / LESSON)
+    for _ in range(2):  # the next update changes nothing
+        assert update.main([str(tmp_path / 'newer'), '--to', str(tmp_path / 'mine')]) == 0
+        lesson = nbformat.read(tmp_path / 'mine' / LESSON, as_version=4)
+        assert sources(lesson.cells) == BOTH
+        assert MARK not in lesson.metadata
+        saw = {c.source for c in lesson.cells if c.cell_type == 'code' and c.outputs}
+        assert saw == {'first', 'mine', 'own'}
+        assert 'what the repository saw' not in str(lesson)
 
 
 @pytest.mark.parametrize('name', ['../mine/helper.py', '/tmp/helper.py', 'link/helper.py', 'pipe'])

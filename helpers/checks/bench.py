@@ -4,30 +4,50 @@
         speeds = bench.hear('cmd_vel', Twist)
         bench.spin(Driver(0.5, 0.0))
         bench.wait(lambda: len(speeds) >= 3)
-    return [twist.linear.x for twist in speeds[:3]] == [0.5] * 3 or f'it published {speeds}'
+    return expect([twist.linear.x for twist in speeds[:3]], [0.5] * 3, 'it published')
 
-A bench is a `ros_session` with a tester in it. It belongs into the test of a point (see tasks.py),
-which runs in a process apart. What the student's callbacks raise is raised by `wait`, `quiet`,
-`call` and at the end of the `with` block. Waiting itself raises nothing: `wait` says whether it
-came.
+A bench is a `ros_session` with a tester in it. It belongs into the test of a point (see points.py),
+which runs in a sandbox. What the student's callbacks raise is raised by `wait`, `quiet`, `call` and
+at the end of the `with` block. Waiting itself raises nothing: `wait` says whether it came.
+
+The words of a judge for nodes:
+
+    bench.spin(node), spin_each            the student's nodes: together, or each in an executor
+    bench.say, hear                        publish messages; a list of those that come
+    bench.call, ask, send_goal             services and actions, as a client
+    bench.wait, quiet, advance             until something holds, until all is handled, of the clock
+    bench.log(), line_of_callback()        what was logged; where a callback is now
+    gate = bench.gate()                    holds callbacks until `gate.open()`, see `Gate`
+    scan(0.5), scan(ranges, age_s=3)       a scan of the laser
+    must_have(node, 'timer')               an attribute is not there yet
+    must_define(Driver, '__init__')        a method is not there yet
+    override(Driver, PERIOD_S=0.1)         another value for a constant of the notebook
+
+Those for what a test returns are in points.py: expect, needs, cached, rows.
 """
 
 from __future__ import annotations
 
+import math
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
+import numpy as np
 import rclpy
+from builtin_interfaces.msg import Time as TimeMessage
 from rclpy.action import ActionClient
+from rclpy.clock import Clock as SystemClock
 from rclpy.clock import ClockType
+from rclpy.duration import Duration
 from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import LaserScan
 
 from helpers.checks.errors import Failed, NeverEnds
 from helpers.notebook import frames, own_line, places
@@ -36,6 +56,7 @@ from helpers.ros import STATUS, ros_session
 WAIT_S = 2.0  # for what a right answer does at once
 QUIET_S = 6.0
 CALLBACK_S = 3.0  # for a callback to end
+HOLD_S = 30.0  # at a gate that nobody opens
 POLL_S = 0.005
 ALL = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)  # hears every publisher
 # As the base of a robot subscribes: a program that ends can wait until its last message is here.
@@ -52,6 +73,7 @@ class Bench:
         self._publishers: dict[tuple[str, type, object], object] = {}
         self._clients: dict[tuple[str, type], object] = {}
         self._clock_s = 0.0
+        self._gates: list[Gate] = []
 
     def __enter__(self) -> Bench:
         self.session = self._exit.enter_context(ros_session())
@@ -63,6 +85,8 @@ class Bench:
         return self
 
     def __exit__(self, kind, error, traceback) -> bool | None:
+        for gate in self._gates:
+            gate.open()
         if isinstance(error, NeverEnds):
             return None  # to close would wait for that callback; the worker of the check ends it
         if error is None:
@@ -165,6 +189,11 @@ class Bench:
         return Goal(self, client, goal, limit_s)
 
     # --- Time
+
+    def gate(self) -> Gate:
+        """Return a gate that holds callbacks until it is opened, or until the bench ends."""
+        self._gates.append(Gate(self.wait))
+        return self._gates[-1]
 
     def advance(self, seconds: float, step_s: float = 0.1) -> None:
         """Let simulated time go on, for nodes with `use_sim_time`, and wait after each step."""
@@ -275,6 +304,65 @@ class Goal:
         return STATUS.get(answer.status, str(answer.status)), answer.result
 
 
+class Gate:
+    """Holds callbacks, so that a check can look at what goes on meanwhile.
+
+        gate = bench.gate()
+        node.create_subscription(Int32, 'number', gate.hold, 10)
+        bench.say('number', Int32(data=1), at_once=True)
+        gate.wait_until_entered()
+        ...
+        gate.open()
+
+    `entered` has what each callback was called with, in their order: a message, or None.
+    """
+
+    def __init__(self, wait: Callable[[Callable[[], object], float], bool]) -> None:
+        self.entered: list = []
+        self._wait = wait  # until a condition holds, so many seconds: whether it does
+        self._opened = threading.Event()
+
+    def hold(self, came: object = None) -> bool:
+        """Wait until the gate is open. Return whether it is: after `HOLD_S` seconds it is not.
+
+        It is a callback, or what a callback calls.
+        """
+        self.entered.append(came)
+        return self._opened.wait(HOLD_S)
+
+    def wait_until_entered(self, count: int = 1, limit_s: float = WAIT_S) -> bool:
+        """Wait until so many callbacks have come to the gate. Return whether they have."""
+        return self._wait(lambda: len(self.entered) >= count, limit_s)
+
+    def open(self) -> None:
+        """Let all callbacks pass, those that come later, too."""
+        self._opened.set()
+
+
+def scan(
+    ranges: float | Sequence[float],
+    *,
+    first: float = -math.pi / 2,
+    step: float = math.pi / 180,
+    limits: tuple[float, float] = (0.12, 8.0),
+    age_s: float = 0.0,
+    stamp: TimeMessage | None = None,
+) -> LaserScan:
+    """Return a scan of the laser, by default as that of the simulated robot: 181 beams, 1 degree.
+
+    `ranges` (m) begin at the angle `first` (rad, to the left) and are `step` apart. One number is
+    what all 181 beams see; NaN is a beam that sees nothing. `limits` are range_min and range_max.
+    Its stamp is that of now, `age_s` seconds ago, or another `stamp`.
+    """
+    seen = [float(metres) for metres in (ranges if np.ndim(ranges) else [ranges] * 181)]
+    message = LaserScan(angle_min=first, angle_increment=step, ranges=seen)
+    message.angle_max = first + step * max(0, len(seen) - 1)
+    message.range_min, message.range_max = limits
+    now = SystemClock(clock_type=ClockType.ROS_TIME).now()
+    message.header.stamp = stamp or (now - Duration(nanoseconds=round(age_s * 1e9))).to_msg()
+    return message
+
+
 def must_have(thing: object, *names: str) -> None:
     """Raise Failed if an object of the student lacks one of these attributes."""
     for name in names:
@@ -289,11 +377,11 @@ def must_define(a_class: type, *methods: str) -> None:
             raise Failed(f'the class has no {method} yet')
 
 
-def let(written: type | Callable, **constants: object) -> None:
-    """Give constants that the student's code reads another value: `override(Driver, PERIOD_S=0.1)`.
+def override(written: type | Callable, **constants: object) -> None:
+    """Give constants that the student's code reads another value.
 
-    They are those of the notebook in which the class or function was written. The process ends with
-    the check, and with it what was changed.
+    `override(Driver, PERIOD_S=0.1)`. They are those of the notebook in which the class or function
+    was written. The process ends with the check, and with it what was changed.
     """
     vars(sys.modules[written.__module__]).update(constants)
 

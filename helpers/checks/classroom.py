@@ -23,8 +23,8 @@ Another status than 200 comes with {"error": "one sentence"}, which the student 
 name of its `lesson`, a `kind`, and what belongs to it:
 
     guess, outcome   "question", "value": what was guessed, and what was measured
-    task             "task": 2, "solved": true
-    about            "about": "plain_twist", "task": 2: which one it was that is solved
+    task             "task": "be_the_queue", "solved": true
+    about            "about": "plain_twist", "task": "mend_ada": which one it was that is solved
     cell             "cell": the id of the cell that runs
     hand             "up": true
 """
@@ -170,12 +170,12 @@ def tell_outcome(question: str, value: object) -> None:
     _tell('outcome', question=question, value=value)
 
 
-def tell_task(task: int, solved: bool) -> None:
+def tell_task(task: str, solved: bool) -> None:
     """Tell the class that a task was tried."""
     _tell('task', task=task, solved=solved)
 
 
-def tell_about(task: int, about: str) -> None:
+def tell_about(task: str, about: str) -> None:
     """Tell the class about what a task was that is solved, if each student has another one."""
     _tell('about', about=about, task=task)
 
@@ -309,7 +309,7 @@ def _tell(kind: str, **what: object) -> None:
         return
     with suppress(Exception):  # a value that no class can show; no lesson may fail because of it
         if 'value' in what:
-            what['value'] = small(what['value'])
+            what['value'] = to_json(what['value'])
         _outbox.put({'id': secrets.token_hex(8), 'kind': kind, 'lesson': lesson, **what})
 
 
@@ -410,7 +410,7 @@ def _ask(known: Class, what: str, body: object) -> dict:
         raise OSError(str(problem)) from None
 
 
-def small(value: object, inside: bool = False) -> object:
+def to_json(value: object, inside: bool = False) -> object:
     """Return a value as JSON holds it. Raises TypeError for one that a page could not show."""
     value = value.tolist() if hasattr(value, 'tolist') else value
     if isinstance(value, Set):
@@ -422,7 +422,7 @@ def small(value: object, inside: bool = False) -> object:
     ):
         return value
     if not inside and isinstance(value, list | tuple | range) and len(value) <= ITEMS:
-        return [small(item, inside=True) for item in value]
+        return [to_json(item, inside=True) for item in value]
     raise TypeError
 
 

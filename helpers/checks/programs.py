@@ -1,16 +1,40 @@
-"""What the checks of programs share: run them, and raise what exactly went wrong."""
+"""What the checks of packages, programs and launches share: read them, run them, and end them.
+
+The words of a judge for a program:
+
+    with run_python(workspace, 'talker.py', 'red') as talker:   or Program(workspace.start(...))
+        talker.wait(lambda: len(heard) >= 2)    whether; raises Failed if the program ends meanwhile
+        talker.says('red talks')                whether a line has this text
+        talker.end(signal.SIGTERM)              whether the signal ends it
+    talker.failed, talker.error                 whether it printed a traceback; its first error
+
+`launch` runs a launch file, and `started` are its programs. `manifest` and `needed` read a
+package.xml. helpers/workspace/first_error.py finds the first error in what all of these print.
+"""
 
 from __future__ import annotations
 
+import os
 import re
+import shlex
+import signal
+import sys
 from collections.abc import Callable
 
 from catkin_pkg.package import InvalidPackage, Package, parse_package
 
 from helpers.checks.errors import Failed
-from helpers.workspace import DIED, Process, Workspace, error_in, wait_until, without_folders
+from helpers.workspace import (
+    DIED,
+    TRACEBACK,
+    Process,
+    Workspace,
+    error_in,
+    wait_until,
+    without_folders,
+)
 
-POLL_S = 0.02
+PROGRAM_S = 8.0  # for a program to start, to say something, to end
 
 
 # --- Packages
@@ -66,6 +90,79 @@ def line_of(process: Process, text: str, limit_s: float = 20.0) -> str:
         raise Failed(f'{process.name} has ended: {error_in(process.lines)}') from None
     except TimeoutError as error:
         raise Failed(str(error)) from None
+
+
+class Program:
+    """A program of the student that runs. It ends with its `with` block at the latest."""
+
+    def __init__(self, process: Process) -> None:
+        self._process = process
+
+    def __enter__(self) -> Program:
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self._process.stop()
+
+    @property
+    def running(self) -> bool:
+        """Whether it has not ended yet."""
+        return self._process.running
+
+    @property
+    def lines(self) -> list[str]:
+        """What it has printed so far."""
+        return self._process.lines
+
+    @property
+    def failed(self) -> bool:
+        """Whether it has printed a traceback."""
+        return self.says(TRACEBACK)
+
+    @property
+    def error(self) -> str:
+        """Its first error, with the student's line; without an error, the last line printed."""
+        return error_in(self.lines)
+
+    def says(self, text: str) -> bool:
+        """Return whether it has printed a line with this text."""
+        return any(text in line for line in self.lines)
+
+    def wait(self, condition: Callable[[], object], limit_s: float = PROGRAM_S) -> bool:
+        """Wait until a condition holds, at most `limit_s` seconds. Return whether it holds.
+
+        Raises Failed, with its first error, if the program has ended by then.
+        """
+        holds = wait_until(lambda: condition() or not self.running, limit_s)
+        if not self.running:
+            raise Failed(f'the program ended by itself: {self.error}')
+        return holds
+
+    def has_ended(self, limit_s: float = PROGRAM_S) -> bool:
+        """Wait until it ends by itself, at most `limit_s` seconds. Return whether it has ended."""
+        return wait_until(lambda: not self.running, limit_s)
+
+    def end(self, sent: signal.Signals = signal.SIGINT, limit_s: float = PROGRAM_S) -> bool:
+        """Send it a signal, by default that of Ctrl+C. Return whether it has ended in time."""
+        if self.running:
+            os.kill(self._process.pid, sent)
+        return self.has_ended(limit_s)
+
+    def exit_code(self) -> int:
+        """Return the exit code of a program that has ended, -N if signal N ended it."""
+        return self._process.wait()
+
+
+def run_python(workspace: Workspace, *words: str, name: str = 'the program') -> Program:
+    """Run a file of the workspace with Python: `run_python(workspace, 'talker.py', 'red')`.
+
+    Code runs as in a terminal: `run_python(workspace, '-c', 'import talker')`. The log of a file's
+    nodes has no lines of the libraries below ROS, which would come between its own.
+    """
+    command = shlex.join([sys.executable, *words])
+    if words[0] != '-c':
+        command += ' --ros-args --disable-external-lib-logs'
+    return Program(workspace.start(f'exec {command}', name))
 
 
 def launch(

@@ -1,42 +1,28 @@
 """The student's own progress: which tasks are solved, kept on this computer only.
 
-`checks.check` records each task that passes, and lesson 00 shows the table. The file has one line
-for each task, such as `lose_messages 1`: the lesson's name and not its number, which changes when
-a lesson is added before it. What `checks.remember` keeps are lines that begin with `memory`. Lines
-are only ever added, so kernels that write at once lose nothing. Titles and tasks are read from the
-notebooks, as text: also from one that a student has broken.
+`checks.check` records each task that passes, and `show` prints the table. The file has one line for
+each task, such as `lose_messages be_the_queue`: the names of the lesson and of the task, and no
+numbers, which change when a lesson or a task is added before them. Lines of version 0.3 had a
+number, and are read as the task that had it then. What `checks.remember` keeps are lines that begin
+with `memory`. Lines are only ever added, so kernels that write at once lose nothing.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Collection, Iterable
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
 
 from IPython import get_ipython
 from jupyter_core.paths import jupyter_data_dir
 
 from helpers import notebook as text
+from helpers.lesson import FOLDER, Lesson, earlier_name, outlines, paths
 
 FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progress is kept
 LESSON = re.compile(r'(?:^|/)\d\d_(\w+)\.ipynb$')
-
-
-class Lesson(NamedTuple):
-    """What the table says of a notebook: '02', 'lose_messages', 'Lose messages', 2."""
-
-    number: str
-    name: str
-    title: str
-    tasks: int
-
-    def lines(self) -> list[str]:
-        """Return the lines of the progress file that this lesson may have."""
-        return [f'{self.name} {count}' for count in range(1, self.tasks + 1)]
 
 
 def this_lesson() -> str:
@@ -51,18 +37,9 @@ def this_lesson() -> str:
 def with_tasks() -> list[Lesson]:
     """Return the notebooks that have tasks, in teaching order.
 
-    They are those in the folder of the running notebook, or else those of this checkout. A title
-    that cannot be read is taken from the file name.
+    They are those in the folder of the running notebook, or else those of this checkout.
     """
-    found = []
-    for path in _notebooks():
-        source = path.read_text(encoding='utf-8', errors='replace')
-        title = re.search(r'^\s*"# \d\d (.*?)(?:\\n)?",?$', source, re.MULTILINE)
-        words = path.stem[3:].replace('_', ' ').capitalize()
-        words = json.loads(f'"{title[1]}"') if title else words
-        numbers = re.findall(r'^\s*"### ✎ Task (\d+)', source, re.MULTILINE)
-        found.append(Lesson(path.name[:2], path.stem[3:], words, len(set(numbers))))
-    return [lesson for lesson in found if lesson.tasks]
+    return [lesson for lesson in outlines(_folder()) if lesson.tasks]
 
 
 def file() -> Path | None:
@@ -77,8 +54,8 @@ def file() -> Path | None:
     return Path(named) if named else None
 
 
-def record(task: int, about: str = '') -> None:
-    """Keep that this task of the running lesson is solved, and about what it was, in one word.
+def record(task: str, about: str = '') -> None:
+    """Keep that a task of the running lesson is solved, and about what it was, in one word.
 
     What it was about is kept each time that it differs from the time before: `about` returns it.
     If the file cannot be written nothing happens, since no lesson may fail because of it. `show`
@@ -89,7 +66,7 @@ def record(task: int, about: str = '') -> None:
         return
     with suppress(OSError):
         key = f'{lesson} {task}'
-        lines = _read(path).splitlines()
+        lines = _lines(path)
         if key not in lines:
             add(key)
         earlier = [line for line in lines if line.startswith(f'{key} ')]
@@ -117,10 +94,10 @@ def lines_of(first_word: str) -> list[str]:
 
 def number_of(lesson: str) -> str:
     """Return the number of a lesson by its name, such as '02'; empty if there is no notebook."""
-    return next((path.name[:2] for path in _notebooks() if path.stem[3:] == lesson), '')
+    return next((path.name[:2] for path in paths(_folder()) if path.stem[3:] == lesson), '')
 
 
-def about(task: int) -> list[str]:
+def about(task: str) -> list[str]:
     """Return what this task of the running lesson was about whenever it was solved, in order.
 
     It is never the same twice in a row: to check an answer again is not to solve another task.
@@ -129,7 +106,7 @@ def about(task: int) -> list[str]:
     if path is None:
         return []
     with suppress(OSError):
-        return [line[len(start) :] for line in _read(path).splitlines() if line.startswith(start)]
+        return [line[len(start) :] for line in _lines(path) if line.startswith(start)]
     return []
 
 
@@ -138,7 +115,7 @@ def show() -> None:
     path, lines, known = file(), [], with_tasks()
     if path is not None:
         try:
-            lines = _read(path).splitlines()
+            lines = _lines(path)
         except OSError as error:
             why = f'Your progress is not kept, because {path} cannot be used: {error.strerror}.'
             print(*text.wrap(why), sep='\n')
@@ -150,9 +127,9 @@ def total() -> str:
     path = file()
     if path is None or not this_lesson():
         return ''
-    known = {line for lesson in with_tasks() for line in lesson.lines()}
+    known = {line for lesson in with_tasks() for line in _lines_of(lesson)}
     with suppress(OSError):
-        return f'{len(known.intersection(_read(path).splitlines()))} of {len(known)} tasks'
+        return f'{len(known.intersection(_lines(path)))} of {len(known)} tasks'
     return ''
 
 
@@ -169,13 +146,26 @@ def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
     """Return a row for each lesson, and a line with the sum; `solved` holds lines of the file."""
     rows, sums = [['lesson', 'solved', 'open']], [0, 0]
     for lesson in known:
-        tasks = enumerate(lesson.lines(), 1)
-        left = [count for count, line in tasks if line not in solved]
-        done = lesson.tasks - len(left)
-        sums = [sums[0] + done, sums[1] + lesson.tasks]
+        lines = zip(lesson.tasks, _lines_of(lesson), strict=True)
+        left = [task.number for task, line in lines if line not in solved]
+        done = len(lesson.tasks) - len(left)
+        sums = [sums[0] + done, sums[1] + len(lesson.tasks)]
         words = f'task{"s" * (len(left) > 1)} {_runs(left)}' if left else ''
-        rows.append([f'{lesson.number} {lesson.title}', f'{done} of {lesson.tasks}', words])
+        rows.append([f'{lesson.number} {_title(lesson)}', f'{done} of {len(lesson.tasks)}', words])
     return f'{text.table(rows)}\n{sums[0]} of {sums[1]} tasks are solved.'
+
+
+def _title(lesson: Lesson) -> str:
+    """Return the title of a lesson, or its name if a student has changed the title."""
+    try:
+        return lesson.title
+    except ValueError:
+        return lesson.name.replace('_', ' ').capitalize()
+
+
+def _lines_of(lesson: Lesson) -> list[str]:
+    """Return the lines of the progress file that a lesson may have, one for each task."""
+    return [f'{lesson.name} {task.name}' for task in lesson.tasks]
 
 
 def _runs(numbers: list[int]) -> str:
@@ -191,17 +181,23 @@ def _runs(numbers: list[int]) -> str:
     )
 
 
-def _notebooks(number: str = '[0-9][0-9]') -> list[Path]:
-    """Return the notebooks with this number: a student of a JupyterHub has a copy of their own."""
+def _folder() -> Path:
+    """Return the folder of the notebooks: a student of a JupyterHub has a copy of their own."""
     here = Path.cwd()
-    own = any(here.glob('00_*.ipynb'))
-    folder = here if own else Path(__file__).resolve().parents[2] / 'notebooks'
-    return sorted(folder.glob(f'{number}_*.ipynb'))
+    return here if any(here.glob('00_*.ipynb')) else FOLDER
 
 
-def _read(path: Path) -> str:
-    """Return the text of the file, which is made if it does not exist."""
+def _lines(path: Path) -> list[str]:
+    """Return the lines of the file, which is made if it does not exist; numbers of 0.3 as names."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open('a+b') as lines:
         lines.seek(0)
-        return lines.read().decode(errors='replace')
+        return [_with_name(line) for line in lines.read().decode(errors='replace').splitlines()]
+
+
+def _with_name(line: str) -> str:
+    """Return a line of version 0.3, `lose_messages 4`, with the name of the task."""
+    words = line.split(' ')
+    if len(words) > 1 and words[1].isdecimal():
+        words[1] = earlier_name(words[0], int(words[1])) or words[1]
+    return ' '.join(words)

@@ -5,7 +5,7 @@ A lesson's tasks are in a module of their own, `helpers/checks/lessons/NAME.py`:
     tasks = Tasks()
     check = tasks.check
 
-    @tasks.add(1)
+    @tasks.add
     def hear_the_text(MinimalSubscriber):
         def keeps(*texts):
             with Bench() as bench:
@@ -19,37 +19,35 @@ A lesson's tasks are in a module of their own, `helpers/checks/lessons/NAME.py`:
         ]
 
 and the notebook imports its check: `from helpers.checks.lessons.NAME import check`. Below the cell
-of the task stands `check(1, MinimalSubscriber)`.
+of the task stands `check('hear_the_text', MinimalSubscriber)`. The name of the function is that of
+the task, for ever: progress, classes and grades keep it. Its number is its place in the lesson,
+which is also that in the module.
 
 The function of a task gets what the student wrote, and returns its points: what is right, a test,
-and a hint, which appears at the second wrong try. A test is a function without arguments. It
-returns True, or a text that says what was found instead; whatever it raises is what was found. The
-points are judged in their order, in a process apart (see apart.py), so what a check does to the
-notebook's objects is undone when it ends. What the function itself raises is a mistake of the
-check: the task cannot be judged, and the verdict says in which line.
+and a hint, which appears at the second wrong try. points.py says what a test is, and has the words
+with which judges are written. The points are judged in their order, in a sandbox (see sandbox.py),
+so what a check does to the notebook's objects is undone when it ends. What the function itself
+raises is a mistake of the check: the task cannot be judged, and the verdict says in which line.
 """
 
 from __future__ import annotations
 
-import inspect
-import os
 import re
-import threading
 import time
-import traceback
+from collections import defaultdict
 from collections.abc import Callable, Sequence
-from functools import wraps
-from types import CodeType, FrameType
+from dataclasses import dataclass, field
 
 from IPython import get_ipython
 from IPython.core.error import UsageError
 from IPython.display import display
 
 from helpers.checks import classroom, progress
-from helpers.checks.apart import Apart, Ending
-from helpers.checks.errors import Failed, NeverEnds, place_of, sentence
+from helpers.checks.points import Test, judge_points
+from helpers.checks.sandbox import Ending, Sandbox
 from helpers.checks.verdict import Point, Verdict, bundle
-from helpers.notebook import frames, names_of, own_line, places, somebody_watches
+from helpers.lesson import check_call
+from helpers.notebook import names_of, own_line, somebody_watches
 
 CPU_LIMIT_S = 5.0  # of one point: an endless loop uses it up
 LIMIT_S = 30.0  # of one point by the clock
@@ -59,133 +57,148 @@ NOT_TRIED = 'not tried, because the one above did not end'
 # Magics that run the lines below them in the notebook:
 RUNS_PYTHON = re.compile(r'\A(\s*%%(time|capture)\b.*\n)+')
 
-Test = tuple[str, Callable[[], object], str]
 
-# By the numbers of the tasks of this notebook:
-_checks: dict[int, CodeType] = {}  # the statement `check(2, ...)` of its cell
-_solved: dict[int, bool] = {}
-_failed_tries: dict[int, int] = {}  # since the last try that passed
-_given: dict[int, dict[str, object]] = {}  # names and values that `%%solution` has given
-_judges_solution = False
+@dataclass
+class Attempt:
+    """What this notebook knows of a task."""
+
+    arguments: list[str] | None = None  # of its check, as its cell has them; None: it has not run
+    solved: bool = False
+    failed: int = 0  # tries since the last one that passed
+    given: dict[str, object] = field(default_factory=dict)  # names and values of its solution
+
+
+@dataclass(frozen=True)
+class Judge:
+    """The function that judges a task, the task's place in the lesson, and its limits."""
+
+    function: Callable
+    number: int
+    limit_s: float
+    cpu_s: float
+    about: Callable[..., str] | None
 
 
 class Tasks:
-    """The tasks of one lesson, by their numbers."""
+    """The tasks of one lesson, by their names, in their order."""
 
     def __init__(self) -> None:
-        self._tasks: dict[int, tuple[Callable, float, float]] = {}
-        self._about: dict[int, Callable[..., str]] = {}
+        global _of_this_notebook
+        self.judges: dict[str, Judge] = {}
+        self.attempts: defaultdict[str, Attempt] = defaultdict(Attempt)
+        _of_this_notebook = self
 
     def add(
         self,
-        number: int,
+        function: Callable | None = None,
+        *,
+        name: str = '',
         limit_s: float = LIMIT_S,
         cpu_s: float = CPU_LIMIT_S,
         about: Callable[..., str] | None = None,
-    ) -> Callable[[Callable], Callable]:
-        """Register a function as the judge of a task.
+    ) -> Callable:
+        """Register a function as the judge of the next task: `@tasks.add`.
 
-        Each of its points may use `cpu_s` seconds of CPU and `limit_s` seconds of the clock. If one
-        needs more, those after it are not tried. A build is none of its CPU, but takes its time.
-        If a task is another one for each student, `about` gets the answer and says which.
+        The task has the name of the function, or `name` if one function judges several tasks. Each
+        of its points may use `cpu_s` seconds of CPU and `limit_s` seconds of the clock:
+        `@tasks.add(limit_s=90)`. If one needs more, those after it are not tried. A build is none
+        of its CPU, but takes its time. If a task is another one for each student, `about` gets the
+        answer and says which.
+
+        Raises ValueError if the lesson has a task of this name.
         """
 
         def register(function: Callable) -> Callable:
-            self._tasks[number] = function, cpu_s, limit_s
-            if about is not None:
-                self._about[number] = about
+            task = name or function.__name__
+            if task in self.judges:
+                raise ValueError(f'This lesson has two tasks that are called {task}.')
+            self.judges[task] = Judge(function, len(self.judges) + 1, limit_s, cpu_s, about)
             return function
 
-        return register
+        return register if function is None else register(function)
 
-    def check(self, number: int, *answer: object) -> None:
+    def check(self, task: str, *answer: object) -> None:
         """Judge what the student wrote for a task, and show the verdict.
 
         A task that passes is kept in the student's progress. Raises ValueError if the lesson has no
         such task.
         """
-        if number not in self._tasks:
-            raise ValueError(f'This lesson has no task {number}: the tasks are {[*self._tasks]}.')
-        caller = inspect.currentframe().f_back
-        names = _names_in(caller)
-        of = 'solution' if _judges_solution else 'answer'
-        verdict = Verdict(number, of=of)
-        if of == 'answer':
-            verdict.note = _reason_not_to_judge(number, names, answer)
+        judge = self._judge_of(task)
+        called = check_call(RUNS_PYTHON.sub('', _cells.running))
+        arguments = called[1] if called and called[0] == task else None
+        verdict = Verdict(task, judge.number)
+        attempt = self.attempts[task]
+        verdict.note = _reason_not_to_judge(attempt, arguments, answer)
         if not verdict.note:
-            if names:
-                _checks[number] = caller.f_code
-            function, cpu_s, limit_s = self._tasks[number]
-            _judge(verdict, lambda: function(*answer), cpu_s, limit_s)
-        if of == 'solution' or not verdict.points:
+            attempt.arguments = arguments
+            hints = _judge(verdict, lambda: judge.function(*answer), judge.cpu_s, judge.limit_s)
+            attempt.failed = 0 if verdict.solved else attempt.failed + 1
+            if attempt.failed > 1:
+                verdict.add_hints(hints)
+        if not verdict.points:
             _show(verdict)
             return
         about = ''
         if verdict.solved:
-            about = self._about[number](*answer) if number in self._about else ''
-            progress.record(number, about)
+            about = judge.about(*answer) if judge.about else ''
+            progress.record(task, about)
             verdict.total = progress.total()
         _show(verdict)
-        _solved[number] = verdict.solved
-        classroom.tell_task(number, verdict.solved)
+        attempt.solved = verdict.solved
+        classroom.tell_task(task, verdict.solved)
         if about:
-            classroom.tell_about(number, about)
+            classroom.tell_about(task, about)
+
+    def run_solution(self, task: str, cell: str) -> None:
+        """Run the solution of a task if the student has not solved it, and check it as well."""
+        judge, attempt = self._judge_of(task), self.attempts[task]
+        if attempt.solved:
+            print(f'Task {judge.number} is solved: the lesson goes on with your code.')
+            return
+        shell = get_ipython()
+        names = shell.user_ns
+        before = dict(names)
+        code = shell.transform_cell(cell)
+        exec(compile(code, shell.compile.cache(code), 'exec'), names)
+        attempt.given = {
+            name: value
+            for name, value in names.items()
+            if name not in before or before[name] is not value
+        }
+        _cells.failed.difference_update(attempt.given)
+        if attempt.arguments is None:
+            print(f'The solution of task {judge.number} has run, but its check has not.')
+            return
+        answer = [eval(argument, names) for argument in attempt.arguments]
+        verdict = Verdict(task, judge.number, of='solution')
+        _judge(verdict, lambda: judge.function(*answer), judge.cpu_s, judge.limit_s)
+        _show(verdict)
+
+    def _judge_of(self, task: str) -> Judge:
+        if task not in self.judges:
+            names = ', '.join(self.judges)
+            raise ValueError(f'This lesson has no task {task!r}. Its tasks are called: {names}.')
+        return self.judges[task]
+
+    def is_written(self, names: set[str]) -> None:
+        """Note that a cell of the student has given these names a value: no solution has."""
+        for attempt in self.attempts.values():
+            for name in names & attempt.given.keys():
+                del attempt.given[name]
 
 
-def cached(function: Callable[[], object]) -> Callable[[], object]:
-    """Return the function, but run at most once: later calls get its result, or its exception.
-
-    For what several points of a task look at: a build, a drive.
-    """
-    results: list[object] = []
-    errors: list[BaseException] = []
-
-    @wraps(function)
-    def run() -> object:
-        if not results and not errors:
-            try:
-                results.append(function())
-            except BaseException as error:
-                errors.append(error)
-        if errors:
-            raise errors[0]
-        return results[0]
-
-    return run
+_of_this_notebook: Tasks | None = None
 
 
 def solution(line: str, cell: str) -> None:
-    """Run a cell `%%solution 2` if the student has not solved task 2, and check it as well.
+    """Run a cell `%%solution hear_the_text` if the student has not solved this task; check it.
 
     So the lesson goes on with the student's code if its check has passed, and with the solution if
     it has not. The cell may begin with another magic, such as `%%write`.
     """
-    global _judges_solution
-    if not line.strip().isdecimal():
-        raise UsageError('Write the number of the task: %%solution 2')
-    task = int(line)
-    if _solved.get(task):
-        print(f'Task {task} is solved: the lesson goes on with your code.')
-        return
-    shell = get_ipython()
-    names = shell.user_ns
-    before = dict(names)
-    code = shell.transform_cell(cell)
-    exec(compile(code, shell.compile.cache(code), 'exec'), names)
-    _given[task] = {
-        name: value
-        for name, value in names.items()
-        if name not in before or before[name] is not value
-    }
-    _failed_names.difference_update(_given[task])
-    if task not in _checks:
-        print(f'The solution of task {task} has run, but its check has not.')
-        return
-    _judges_solution = True
-    try:
-        exec(_checks[task], names)
-    finally:
-        _judges_solution = False
+    if _of_this_notebook is None or line.strip() not in _of_this_notebook.judges:
+        raise UsageError('Write the name of a task of this lesson: %%solution hear_the_text')
+    _of_this_notebook.run_solution(line.strip(), cell)
 
 
 # --- Judging --------------------------------------------------------------------------------------
@@ -193,18 +206,19 @@ def solution(line: str, cell: str) -> None:
 
 def _judge(
     verdict: Verdict, points: Callable[[], Sequence[Test]], cpu_s: float, limit_s: float
-) -> None:
-    """Fill the verdict with the points of a task, judged in a process apart."""
+) -> list[str]:
+    """Fill the verdict with the points of a task, judged in a sandbox; return their hints."""
     started = time.monotonic()
     hints: list[str] = []
-    apart = Apart(lambda send: _worker(points, send), cpu_s, limit_s)
+    sandbox = Sandbox(lambda send: judge_points(points, send), cpu_s, limit_s)
     tried = 0
     with Running(verdict) as running:
-        for kind, content in apart:
+        for kind, content in sandbox:
             if kind == 'points':
                 verdict.points = [Point(what) for what, _ in content]
                 hints = [hint for _, hint in content]
             elif kind == 'mistake':
+                verdict.points = []  # those that were tried count for nothing
                 verdict.note = f'This task cannot be judged: {content}.'
             else:
                 verdict.points[tried].ok, verdict.points[tried].found, names_line = content
@@ -213,86 +227,10 @@ def _judge(
                 tried += 1
             running.update(time.monotonic() - started)
     verdict.seconds = time.monotonic() - started
-    _add_ending(verdict, tried, apart.ending)
-    if apart.ending.printed:
-        print(apart.ending.printed, end='' if apart.ending.printed.endswith('\n') else '\n')
-    if verdict.of == 'solution':
-        return
-    tries = 0 if verdict.solved else _failed_tries.get(verdict.task, 0) + 1
-    _failed_tries[verdict.task] = tries
-    if tries > 1:
-        for point, hint in zip(verdict.points, hints, strict=False):
-            point.hint = '' if point.ok else hint
-
-
-def _worker(points: Callable[[], Sequence[Test]], send: Callable) -> None:
-    """Judge the points one by one. This runs in the process apart."""
-    failures: list[str] = []
-    threading.excepthook = lambda error: failures.append(
-        f'A thread of yours ended with {sentence(error.exc_value or error.exc_type())}'
-    )
-    threads = set(threading.enumerate())
-    try:
-        tests = _tests_of(points())
-    except Exception as error:  # of the check, not of the student
-        send(('mistake', _mistake(error)))
-        return
-    send(('points', [(what, hint) for what, _, hint in tests]))
-    for number, (_, test, _) in enumerate(tests):
-        failures.clear()
-        never_ends = names_line = False
-        try:
-            result = test()
-            ok, found = (False, result) if isinstance(result, str) else (bool(result), '')
-        except BaseException as error:  # whatever a student's code raises is an answer, not right
-            ok, found = False, sentence(error)
-            never_ends = isinstance(error, NeverEnds)
-            names_line = bool(place_of(error)) and not isinstance(error, Failed)
-        if failures and not ok:
-            found = found if found[-1:] in ('', '.', '!', '?') else f'{found}.'
-            found = f'{found} {failures[0]}'.strip()
-        if number == len(tests) - 1:
-            left = [
-                thread
-                for thread in threading.enumerate()
-                if thread not in threads and not thread.daemon
-            ]
-            if left and ok:
-                ok, found = False, _still_runs(left[0])
-        send(('point', (ok, found, names_line)))
-        if never_ends:
-            break
-
-
-def _tests_of(points: object) -> list[Test]:
-    """Return the points that a check gave. Raises Failed if it cannot try them."""
-    tests = list(points) if points is not None else []
-    if not tests:
-        raise Failed('its check returns no points, as if a `return` were missing')
-    for point in tests:
-        if not (isinstance(point, tuple) and len(point) == 3 and callable(point[1])):
-            name = point[0] if isinstance(point, tuple) and point else point
-            raise Failed(
-                f'the point {name!r} of its check must be what is right, a test to call and a '
-                "hint, as in ('it keeps 7', lambda: keeps(7), 'Append it.')"
-            )
-    return tests
-
-
-def _mistake(error: Exception) -> str:
-    """Say what is wrong with a check that did not return its points, and in which line."""
-    if isinstance(error, Failed):
-        return str(error)
-    frame = traceback.extract_tb(error.__traceback__)[-1]
-    said = f'its check ended with {type(error).__name__}: {error}'
-    if frame.filename == __file__:  # what the notebook hands over is not what the check takes
-        return said
-    return f'{said}, in line {frame.lineno} of {os.path.basename(frame.filename)}'
-
-
-def _still_runs(thread: threading.Thread) -> str:
-    place = next((own_line(places(frame)) for _, frame in frames([thread])), '')
-    return f'the thread {thread.name} that your code has started does not end. {place}'.strip()
+    _add_ending(verdict, tried, sandbox.ending)
+    if sandbox.ending.printed:
+        print(sandbox.ending.printed, end='' if sandbox.ending.printed.endswith('\n') else '\n')
+    return hints
 
 
 def _add_ending(verdict: Verdict, tried: int, ending: Ending) -> None:
@@ -318,16 +256,21 @@ def _add_ending(verdict: Verdict, tried: int, ending: Ending) -> None:
             last.found = f'a program that your code has started still runs: {ending.left[0]}'
 
 
-def _reason_not_to_judge(task: int, names: set[str], answer: Sequence[object]) -> str:
-    """Return why the answer is not judged: it is the solution's, or the student's cell failed."""
+def _reason_not_to_judge(
+    attempt: Attempt, arguments: list[str] | None, answer: Sequence[object]
+) -> str:
+    """Return why the answer is not judged: it is the solution's, or the student's cell failed.
+
+    `arguments` are those of the check, as its cell has them.
+    """
     shell = get_ipython()
-    given = _given.get(task, {})
+    names = {name for argument in arguments or () for name in names_of(argument).taken}
     if shell and any(
         name in names and shell.user_ns.get(name) is value and any(value is x for x in answer)
-        for name, value in given.items()
+        for name, value in attempt.given.items()
     ):
         return 'This is the code of the solution. Run your own cell first, then this one again.'
-    failed = names & _failed_names
+    failed = names & _cells.failed
     if failed:
         return (
             f'The last cell that defines {sorted(failed)[0]} ended with an error. Mend it and run '
@@ -336,28 +279,35 @@ def _reason_not_to_judge(task: int, names: set[str], answer: Sequence[object]) -
     return ''
 
 
-def _names_in(caller: FrameType) -> set[str]:
-    """Return the names in the statement `check(...)` of a cell, or none if a function calls it."""
-    return set(caller.f_code.co_names) if caller.f_code.co_name == '<module>' else set()
+# --- The cells of the notebook --------------------------------------------------------------------
 
 
-# --- Cells that failed ----------------------------------------------------------------------------
+class Cells:
+    """The cell that runs, and names that are missing because their cells ended with an error."""
 
-_failed_names: set[str] = set()  # that a cell should have defined, which ended with an error
+    def __init__(self) -> None:
+        self.running = ''
+        self.failed: set[str] = set()
+
+    def begin(self, info: object) -> None:
+        """IPython calls this before it runs a cell."""
+        self.running = getattr(info, 'raw_cell', None) or ''
+
+    def end(self, result: object) -> None:
+        """IPython calls this after a cell; the result is None if the Interrupt came in its code."""
+        self.running = ''
+        if result is None:
+            return
+        names = names_of(RUNS_PYTHON.sub('', result.info.raw_cell or '')).given
+        if _of_this_notebook:
+            _of_this_notebook.is_written(names)
+        if result.success or isinstance(result.error_in_exec, KeyboardInterrupt):
+            self.failed.difference_update(names)
+        else:
+            self.failed.update(names)
 
 
-def _after_cell(result: object) -> None:
-    if result is None:  # the Interrupt came in IPython's own code
-        return
-    source = result.info.raw_cell or ''
-    names = names_of(RUNS_PYTHON.sub('', source)).given
-    for given in _given.values():
-        for name in names & given.keys():
-            del given[name]  # now it is the student's
-    if result.success or isinstance(result.error_in_exec, KeyboardInterrupt):
-        _failed_names.difference_update(names)
-    else:
-        _failed_names.update(names)
+_cells = Cells()
 
 
 # --- Showing --------------------------------------------------------------------------------------
@@ -400,4 +350,5 @@ def _show(verdict: Verdict) -> None:
 
 if shell := get_ipython():
     shell.register_magic_function(solution, 'cell')
-    shell.events.register('post_run_cell', _after_cell)
+    shell.events.register('pre_run_cell', _cells.begin)
+    shell.events.register('post_run_cell', _cells.end)

@@ -2,7 +2,7 @@
 
 The data stand in the metadata of the cell's output, under `ros2_notebooks`:
 
-    {'task': 3, 'of': 'answer', 'solved': False,
+    {'task': 'a_driver', 'of': 'answer', 'solved': False,
      'points': [{'what': 'it turns', 'ok': False, 'found': 'it published (0.5, 0.0)'}]}
 
 `of` is 'answer', or 'solution' if the lesson's own solution was judged. `found`, `hint` and `note`
@@ -41,10 +41,12 @@ class Point:
 class Verdict:
     """What a check says of a task.
 
-    `seconds` is how long the check took, and `total` how many tasks are solved now, in words.
+    `task` is its name, `number` its place in the lesson. `seconds` is how long the check took, and
+    `total` how many tasks are solved now, in words.
     """
 
-    task: int
+    task: str
+    number: int
     points: list[Point] = field(default_factory=list)
     of: str = 'answer'
     note: str = ''
@@ -56,6 +58,11 @@ class Verdict:
         """Whether every point is met."""
         return bool(self.points) and not self.note and all(point.ok for point in self.points)
 
+    def add_hints(self, hints: list[str]) -> None:
+        """Show the hints of the points that are not met."""
+        for point, hint in zip(self.points, hints, strict=False):
+            point.hint = '' if point.ok else hint
+
     def data(self) -> dict:
         """Return the verdict as data, for the output's metadata. Its time would move."""
         data = {'task': self.task, 'of': self.of, 'solved': self.solved, 'note': self.note}
@@ -64,7 +71,7 @@ class Verdict:
 
     def title(self) -> str:
         """Return the last line: how many points are met."""
-        name = f'Solution of task {self.task}' if self.of == 'solution' else f'Task {self.task}'
+        name = f'Solution of task {self.number}' if self.of == 'solution' else f'Task {self.number}'
         if not self.points:
             return f'{name}: not judged.'
         count = f'{name}: {sum(point.ok for point in self.points)} of {len(self.points)}.'

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from helpers.faults.cases import Case
-from helpers.robot import CORRIDOR, TURTLEBOT3, DriveRecord, Floor, Pose, Robot, watch
+from helpers.robot import CORRIDOR, TURTLEBOT3, DriveRecord, Floor, Pose, Robot
+from helpers.robot_view import watch
 from helpers.ros import Session, ros_session
 from helpers.workspace import DIED, Process, without_folders
 

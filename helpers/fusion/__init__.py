@@ -1,31 +1,25 @@
 """One pose from several imperfect sensors: an extended Kalman filter for a robot on a floor.
 
 `filter` has the filter, message by message, as a node uses it. `tables` lets it run over a table
-of what the sensors said. `drives` simulates such tables, together with the truth. `evaluation`
-compares an estimate with the truth, and with what the filter says of its own errors. `messages`
-reads the messages of a drive, and `nodes` has two nodes of robot_localization,
-which packages of that name start as programs.
+of what the sensors said. `drives` simulates such tables, together with the truth, and `recorded`
+has those of a robot that drives. `evaluation` compares an estimate with the truth, and with what
+the filter says of its own errors. `messages` reads the messages of a drive, and `nodes` has two
+nodes of robot_localization, which packages of that name start as programs.
+
+A name loads only what it needs: the programs make no tables, so they do without pandas.
 """
 
-from helpers.fusion.drives import simulate
-from helpers.fusion.evaluation import errors, rmse
-from helpers.fusion.filter import STATE, ExtendedKalmanFilter
-from helpers.fusion.messages import from_odometry
-from helpers.fusion.nodes import EkfNode, SensorLog, localize
-from helpers.fusion.tables import SENSORS, VARIANCES, fuse, fuse_with_innovations
+from helpers.notebook import load_on_demand
 
-__all__ = [
-    'SENSORS',
-    'STATE',
-    'VARIANCES',
-    'EkfNode',
-    'ExtendedKalmanFilter',
-    'SensorLog',
-    'errors',
-    'from_odometry',
-    'fuse',
-    'fuse_with_innovations',
-    'localize',
-    'rmse',
-    'simulate',
-]
+MODULES = {
+    'drives': ('simulate',),
+    'evaluation': ('errors', 'rmse'),
+    'filter': ('STATE', 'ExtendedKalmanFilter'),
+    'messages': ('from_odometry',),
+    'nodes': ('EkfNode',),
+    'recorded': ('SensorLog', 'localize'),
+    'tables': ('SENSORS', 'VARIANCES', 'fuse', 'fuse_with_innovations'),
+}
+
+__all__ = [name for names in MODULES.values() for name in names]
+__getattr__ = load_on_demand(__name__, MODULES)

@@ -1,8 +1,33 @@
-"""This machine: what it has, what is missing, and the tools with which a package is built.
+"""This machine: what it has, what is missing, the tools of a build, the folders of workspaces.
 
 `doctor` is a door of its own, `python -m helpers.machine.doctor`: it runs where nothing else does.
 """
 
 from helpers.machine.build_tools import Tool, build_environment, from_wheels, tools_of_a_build
+from helpers.machine.folders import (
+    BUILT,
+    OWNED,
+    Renamed,
+    claim_workspace,
+    files_of_person,
+    give_new_names,
+    locks_of_workspaces,
+    name_beside,
+    set_apart,
+)
 
-__all__ = ['Tool', 'build_environment', 'from_wheels', 'tools_of_a_build']
+__all__ = [
+    'BUILT',
+    'OWNED',
+    'Renamed',
+    'Tool',
+    'build_environment',
+    'claim_workspace',
+    'files_of_person',
+    'from_wheels',
+    'give_new_names',
+    'locks_of_workspaces',
+    'name_beside',
+    'set_apart',
+    'tools_of_a_build',
+]

@@ -58,6 +58,7 @@ def build_environment() -> dict[str, str]:
     here = Path(sys.executable).parent
     environment['PATH'] = f'{here}{os.pathsep}{os.environ.get("PATH", os.defpath)}'
     if ' ' in sys.executable:  # colcon's setup.bash does not quote it
+        # private: sys, Python 3.11.7
         environment['COLCON_PYTHON_EXECUTABLE'] = getattr(sys, '_base_executable', sys.executable)
     if sys.prefix != sys.base_prefix:
         environment['VIRTUAL_ENV'] = sys.prefix

@@ -1,41 +1,26 @@
 """What a cell of a notebook needs before ROS comes: interrupts, a bar, lines, letters, colours.
 
-Each kernel loads this room when it starts, and whatever comes through this door loads only its own
-module: pandas, which `values` needs, or Jupyter's server, which `fresh` needs, take a second.
+Each kernel and each program of ours loads this package when it starts, so a name loads only the
+module that defines it: pandas, which `tables` needs, IPython, which `names` needs, or Jupyter's
+server, which `fresh` needs, take up to a second.
 """
 
-from importlib import import_module
+from helpers.notebook.on_demand import load_on_demand
 
 MODULES = {
     'fresh': ('AS_SAVED', 'MARK'),
-    'interrupts': ('at_each_signal', 'uninterrupted'),
+    'interrupts': ('at_each_signal', 'run_command', 'uninterrupted'),
     'kernel': ('can_ask', 'hear_while_a_cell_runs'),
     'look': ('LOOK', 'LOOK_CSS', 'LOOK_FILE'),
     'names': ('names_of',),
+    'on_demand': ('load_on_demand',),
     'own_code': ('is_students', 'own_line', 'places'),
     'progress_bar': ('ProgressBar', 'somebody_watches'),
+    'tables': ('check_columns', 'column_of_numbers'),
     'text': ('table', 'wrap'),
     'threads': ('frames',),
-    'values': (
-        'RUN_COLUMNS',
-        'check_columns',
-        'check_count',
-        'check_table',
-        'chosen',
-        'column_of_numbers',
-        'natural',
-        'shown',
-    ),
+    'values': ('check_count', 'chosen', 'shown'),
 }
-MODULE_OF = {name: module for module, names in MODULES.items() for name in names}
 
-__all__ = list(MODULE_OF)
-
-
-def __getattr__(name: str) -> object:
-    """Return what a module of this room has, when it is asked for the first time (PEP 562)."""
-    if name not in MODULE_OF:
-        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
-    value = getattr(import_module(f'{__name__}.{MODULE_OF[name]}'), name)
-    globals()[name] = value
-    return value
+__all__ = [name for names in MODULES.values() for name in names]
+__getattr__ = load_on_demand(__name__, MODULES)

@@ -72,7 +72,8 @@ def run_command(run: Callable[[str], int], command: str) -> int:
     def handle(number: int, frame: FrameType | None) -> None:
         again = threading.Timer(MOMENT_S, os.kill, (os.getpid(), number))
         interrupts.append(again)
-        if _runs('_spawnpty', frame):  # pexpect would lose the process that it starts
+        # private: a process of pexpect, pexpect 4.9.0
+        if _runs('_spawnpty', frame):  # it would lose the process that it starts
             again.start()
         else:
             before(number, frame)

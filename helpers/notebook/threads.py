@@ -15,6 +15,7 @@ def frames(threads: list[threading.Thread]) -> list[tuple[threading.Thread, Fram
         # Before Python 3.11.9, a collection that frees a threading.local hangs in the next call:
         # https://github.com/python/cpython/issues/106883
         gc.disable()
+        # private: sys, Python 3.11.7
         current = sys._current_frames()  # noqa: SLF001 - documented, in spite of its name
     finally:
         if collects:

@@ -14,7 +14,8 @@ from rclpy.action import ActionClient
 from rclpy.node import Node
 
 from helpers.patrol.program import PACKAGE, action, route_of
-from helpers.robot import CORRIDOR, KIND, RATE_HZ, TURTLEBOT3, Driver, Floor, Robot, watch
+from helpers.robot import CORRIDOR, KIND, RATE_HZ, TURTLEBOT3, Driver, Floor, Robot
+from helpers.robot_view import watch
 from helpers.ros import STATUS, Session, ros_session, spun
 from helpers.workspace import (
     DIED,

@@ -20,7 +20,6 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
-from helpers.notebook import check_table, natural
 from helpers.plots.alt_text import describe
 from helpers.plots.style import (
     DPI,
@@ -36,6 +35,7 @@ from helpers.plots.style import (
     new_axes,
     say,
 )
+from helpers.recording import check_table, thread_order
 
 MAX_SEQ_LABELS, MAX_GAP_LABELS = 25, 15
 TIME_LABEL = 'time since the first publish (s)'
@@ -179,7 +179,7 @@ def timeline(
     bars = table[table.started_s.notna()].copy()
     # A callback that had not finished when the recording ended runs to the end of the picture.
     bars['finished_s'] = bars.finished_s.fillna(bars[['started_s', 'finished_s']].max().max())
-    threads = sorted(bars.thread.unique(), key=natural)
+    threads = sorted(bars.thread.unique(), key=thread_order)
     bars['lane'] = bars.thread.map({thread: lane for lane, thread in enumerate(threads)})
 
     ax = ax or new_axes()

@@ -8,14 +8,18 @@ from helpers.recording.recording import (
     Recording,
     most_at_once,
 )
+from helpers.recording.table import RUN_COLUMNS, check_table, thread_order
 
 __all__ = [
+    'RUN_COLUMNS',
     'Call',
     'CallbackRecording',
     'CallbackRun',
     'Recording',
+    'check_table',
     'explain',
     'most_at_once',
     'predict',
     'take_bounds',
+    'thread_order',
 ]

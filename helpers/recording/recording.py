@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import pandas as pd
 from rclpy.service import Service
 
-from helpers.notebook import RUN_COLUMNS
+from helpers.recording.table import RUN_COLUMNS
 
 
 def number_of(message) -> int:

@@ -106,7 +106,8 @@ def _save() -> Variant:
         },
         2,
         'You made no mistake: no order saves them all. Pictures come faster than one at a time '
-        'can be looked at, and only two can wait. Lesson 02 shows why, and lesson 03 what helps.',
+        'can be looked at, and only two can wait. The lesson "Lose messages" shows why, and the '
+        'next one what helps.',
         rclpy=2,
     )
 

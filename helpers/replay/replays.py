@@ -9,7 +9,8 @@ from urllib.parse import quote
 
 import pandas as pd
 
-from helpers.notebook import check_count, check_table, natural, shown
+from helpers.notebook import check_count, shown
+from helpers.recording import check_table, thread_order
 from helpers.replay.events import ARRIVE, END, TAKE, events
 from helpers.replay.script import attribute, javascript, script, style
 
@@ -187,4 +188,4 @@ def fill_up(seen: set[str], threads: int) -> list[str]:
         raise ValueError(f'Callbacks ran in {len(seen)} threads, more than threads={threads}.')
     more = (f'thread {number}' for number in range(1, 2 * threads + 1))
     free = [name for name in more if name not in seen]
-    return sorted([*seen, *free[: threads - len(seen)]], key=natural)
+    return sorted([*seen, *free[: threads - len(seen)]], key=thread_order)

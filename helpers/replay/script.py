@@ -1,6 +1,6 @@
 """The scripts and styles of this folder, as a page gets them, or Python runs them.
 
-A file of another room, such as the drive of the robot, is given as its path.
+A file of another package, such as the drive of the robot, is given as its path.
 """
 
 import json
@@ -10,7 +10,7 @@ from html import escape
 from pathlib import Path
 
 # Not from `quickjs`: importing that starts a thread, which stays in the kernel.
-from _quickjs import Context
+from _quickjs import Context  # private: quickjs-ng, quickjs-ng 0.17.0
 from rjsmin import jsmin
 
 from helpers.notebook import LOOK, LOOK_CSS

@@ -6,8 +6,8 @@
         robot.run(20, until=lambda: robot.stopped or robot.bumps)
 
 `floor` has the floors, `body` how it moves, `sensors` what it measures, `drivers` and `messages`
-how it says so, `robot` its node, `record` what it did, `trip` a drive for filters, and `view` how
-one sees it and drives it by hand.
+how it says so, `robot` its node, `record` what it did, and `trip` a drive for filters. How one sees
+it and drives it by hand is in `helpers.robot_view`.
 
 It is no physics engine. As on a TurtleBot 3 are topics, types, frames, units, the limits of
 acceleration, what each sensor can know, and that it goes on while your program thinks. Not so here:
@@ -21,18 +21,13 @@ from helpers.robot.body import MAX_ACCELERATION, MAX_TURN_ACCELERATION, RADIUS_M
 from helpers.robot.drivers import KIND, TURTLEBOT3, Driver
 from helpers.robot.floor import CORRIDOR, EMPTY, FLOORS, ROOMS, Floor, Pose
 from helpers.robot.messages import ON_THE_FLOOR, odometry_message
-from helpers.robot.record import DriveRecord
-from helpers.robot.robot import Robot
-from helpers.robot.sensors import SLIP_SPEED, VARIANCES, without_noise
+from helpers.robot.record import DriveRecord, Event, Scan
+from helpers.robot.robot import Robot, speeds_of
+from helpers.robot.sensors import RANGE_MAX, SLIP_SPEED, VARIANCES, without_noise
 from helpers.robot.trip import trip
-from helpers.robot.view.by_hand import drive_by_hand
-from helpers.robot.view.live import watch
-from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
-from helpers.robot.view.replay import replay_drive
 
 __all__ = [
     'CORRIDOR',
-    'DRIVE_CSS',
     'EMPTY',
     'FLOORS',
     'KIND',
@@ -40,6 +35,7 @@ __all__ = [
     'MAX_TURN_ACCELERATION',
     'ON_THE_FLOOR',
     'RADIUS_M',
+    'RANGE_MAX',
     'RATE_HZ',
     'ROOMS',
     'SLIP_SPEED',
@@ -47,15 +43,13 @@ __all__ = [
     'VARIANCES',
     'DriveRecord',
     'Driver',
+    'Event',
     'Floor',
     'Pose',
     'Robot',
-    'drive_by_hand',
-    'floor_in_words',
-    'floor_picture',
+    'Scan',
     'odometry_message',
-    'replay_drive',
+    'speeds_of',
     'trip',
-    'watch',
     'without_noise',
 ]

@@ -18,7 +18,11 @@ from helpers.robot.record import Scan
 from helpers.robot.sensors import RANGE_MAX, RANGE_MIN, VARIANCES
 from helpers.ros import quaternion, stamp_of
 
-DATUM = 10.7769, 106.7009, 0.0  # where x, y = 0, 0 is: degrees north and east, m. As in lesson 16
+DATUM = (
+    10.7769,
+    106.7009,
+    0.0,
+)  # where x, y = 0, 0 is: degrees north and east, m
 FULL_V, EMPTY_V, CAPACITY_AH, LASTS_S = 12.6, 11.0, 1.8, 2.5 * 3600  # as the battery of a Waffle
 ON_THE_FLOOR = np.ix_([0, 1, 5], [0, 1, 5])  # x, y and yaw of the six
 TINY = 1e-9  # the variance of what is zero on a floor: z, roll and pitch

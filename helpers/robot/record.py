@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from helpers.robot.floor import Floor
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Step(NamedTuple):
@@ -81,4 +83,6 @@ class DriveRecord:
 
     def table(self, name: str) -> pd.DataFrame:
         """Return one of the lists, such as 'poses', as a table with a row for each entry."""
+        import pandas as pd  # slow to load, and a robot that runs as a program makes no table
+
         return pd.DataFrame(getattr(self, name))

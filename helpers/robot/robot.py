@@ -379,6 +379,7 @@ def command_type(driver: Driver) -> type:
 
 
 def speeds_of(message: Twist | TwistStamped) -> Twist:
+    """Return the speeds (m/s, rad/s) of a command, with or without a stamp."""
     return message.twist if isinstance(message, TwistStamped) else message
 
 

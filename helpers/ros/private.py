@@ -1,6 +1,7 @@
 """What a session does inside of rclpy, and of the Python that it runs in.
 
-A new version may take away a private name: helpers/private_names.py lists them.
+A new version may take away a private name. So a comment beside each says what has it, and in which
+version that was read: tests/test_private.py looks whether it is still there.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import threading
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from concurrent.futures import thread as thread_pool
 from types import FrameType
 from typing import NamedTuple
@@ -22,18 +24,25 @@ from helpers.notebook import frames
 
 def end_spin(executor: Executor) -> None:
     """Let the spin of an executor end. Executor.shutdown() destroys what the spin still uses."""
-    executor._is_shutdown = True
+    executor._is_shutdown = True  # private: an executor, rclpy 7.1.6
     executor.wake()
 
 
+def _pool_of(executor: Executor) -> ThreadPoolExecutor | None:
+    """Return the pool that runs the callbacks of a MultiThreadedExecutor. Others have none."""
+    # private: a MultiThreadedExecutor, rclpy 7.1.6
+    return getattr(executor, '_executor', None)
+
+
 def pool_threads(executor: Executor) -> list[threading.Thread]:
-    pool = getattr(executor, '_executor', None)
+    pool = _pool_of(executor)
+    # private: a ThreadPoolExecutor, Python 3.11.7
     return [] if pool is None else list(pool._threads)
 
 
 def end_pool(executor: Executor) -> None:
     """Let the threads of the pool end. rclpy leaves that to the garbage collector."""
-    pool = getattr(executor, '_executor', None)
+    pool = _pool_of(executor)
     if pool is not None:
         pool.shutdown(wait=False, cancel_futures=True)
 
@@ -43,19 +52,22 @@ def failures_in_pool(executor: Executor) -> list[BaseException]:
 
     An exception that rclpy has raised itself is no longer among them.
     """
-    tasks = [task for task in list(getattr(executor, '_futures', ())) if task.done()]
+    # private: a MultiThreadedExecutor, rclpy 7.1.6
+    futures = list(getattr(executor, '_futures', ()))
+    tasks = [task for task in futures if task.done()]
     return [task.exception() for task in tasks if task.exception() is not None]
 
 
 def cancel_tasks(executor: Executor) -> None:
     """Cancel what never started: its coroutine would warn when it is collected."""
-    for task, *_ in list(executor._tasks):
+    for task, *_ in list(executor._tasks):  # private: an executor, rclpy 7.1.6
         if not task.executing():
             task.cancel()
 
 
 def fail_calls(client: Client, failure: Exception) -> None:
     """Let all calls of a client that wait for an answer raise this exception."""
+    # private: a client, rclpy 7.1.6
     for future in list(client._pending_requests.values()):
         with warnings.catch_warnings(action='ignore'):  # a done callback that fails
             future.set_exception(failure)
@@ -67,20 +79,21 @@ def end_lifecycle(node: Node) -> None:
 
     rclpy leaves that to the garbage collector.
     """
-    machine = getattr(node, '_state_machine', None)
+    machine = getattr(node, '_state_machine', None)  # private: a lifecycle node, rclpy 7.1.6
     if machine is not None:
         machine.destroy_when_not_in_use()
 
 
 def action_name(client: ActionClient) -> str:
-    return client._action_name
+    return client._action_name  # private: an action client, rclpy 7.1.6
 
 
 def states_of(executor: Executor, spin_thread: threading.Thread) -> set[str]:
     """Return what the threads that run an executor's callbacks do: 'working', 'waiting', 'free'."""
-    pool = getattr(executor, '_executor', None)
-    threads = [spin_thread] if pool is None else list(pool._threads)
+    pool = _pool_of(executor)
+    threads = [spin_thread] if pool is None else pool_threads(executor)
     states = {_state(frame) for _, frame in frames(threads)}
+    # private: a ThreadPoolExecutor, Python 3.11.7
     if pool is not None and len(threads) < pool._max_workers:
         states.add('free')  # the pool starts a thread when it needs one
     return states
@@ -90,8 +103,9 @@ def _state(frame: FrameType) -> str:
     code = frame.f_code
     if code.co_filename == threading.__file__:
         return 'waiting'
-    idle_in_pool = code.co_filename == thread_pool.__file__
-    if idle_in_pool or code is Executor._wait_for_ready_callbacks.__code__:
+    # private: an executor, rclpy 7.1.6
+    idle_in_spin = code is Executor._wait_for_ready_callbacks.__code__
+    if idle_in_spin or code.co_filename == thread_pool.__file__:
         return 'free'
     return 'working'
 

@@ -12,11 +12,11 @@ from __future__ import annotations
 import json
 import linecache
 import os
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from helpers.notebook import own_line
+from helpers.workspace import error_of_pytest
 
 RUNNER = Path(__file__).with_name('planted_runner.py')
 LONGEST = 160  # characters of a message
@@ -128,20 +128,9 @@ def _test_run(result: dict, folder: Path) -> TestRun:
     ]
     run = TestRun(result['passed'], failed)
     if result['problems']:
-        run.problem = f'a file cannot be read: {_reason(result["problems"][0])}'
+        run.problem = f'a file cannot be read: {error_of_pytest(result["problems"][0])}'
     elif result['code'] == 5:
         run.problem = 'there are no tests'
     elif not run.passed and not run.failed:
         run.problem = 'no test has run'
     return run
-
-
-def _reason(problem: str) -> str:
-    """Return the error in what pytest prints of a file that it cannot import."""
-    errors = re.findall(r'^(?:E +)?([A-Z]\w*(?:Error|Exception).*|E +.*)$', problem, re.MULTILINE)
-    place = re.search(r'^(\S+\.py):(\d+): in <module>', problem, re.MULTILINE)
-    place = place or re.search(r'^E +File "(.+?)", line (\d+)', problem, re.MULTILINE)
-    where = f' (line {place[2]} of {os.path.basename(place[1])})' if place else ''
-    lines = errors[-1:] or problem.strip().splitlines()[-1:]
-    error = re.sub(r'\S+::', '', lines[-1].removeprefix('E').strip())
-    return error[:LONGEST] + where

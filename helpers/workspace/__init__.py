@@ -5,14 +5,13 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
 `source install/setup.bash`, and an end for every process.
 
     workspace     what lessons import: `Workspace`, and `%%write`
-    folders       the folder of a workspace, which no two kernels share
     wheels        CMake files of the ROS 2 wheels, made to fit this machine
     processes     a process that prints lines, and ends
     tf2_msgs      the package of the message of /tf, which the wheels lack
     build_output  what a build says, and which of its lines matter
     first_error   the first error of a build, a program, a launch
-    small_rclcpp  a package in C++: the part of rclcpp that lesson 15 needs, over rcl
-    given         files of somebody else: the repository that lesson 10 brings in, a small program
+    small_rclcpp  a package in C++: the part of rclcpp that write_a_node_in_cpp needs, over rcl
+    given         files of somebody else: the repository that bring_in_a_package gets, a program
     rosdep        rosdep, with rules of a lesson
     sourcing      what `source install/setup.bash` gives, for a kernel that already runs
 """
@@ -24,6 +23,8 @@ from helpers.workspace.first_error import (
     error_in,
     error_of_build,
     error_of_launch,
+    error_of_pytest,
+    first_error,
     started,
     why_it_failed,
 )
@@ -45,6 +46,8 @@ __all__ = [
     'started',
     'error_of_build',
     'error_of_launch',
+    'error_of_pytest',
+    'first_error',
     'error_in',
     'compile_error',
     'BEGIN_EMPTY',

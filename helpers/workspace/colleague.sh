@@ -1,4 +1,4 @@
-# What the colleague of lesson 10 has done: three packages, in a repository on a server.
+# What the colleague of bring_in_a_package has done: three packages, in a repository on a server.
 # Run it in a workspace: it makes the folders `colleague` and `server`.
 set -e
 rm -rf colleague server

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import psutil
 
+from helpers.machine import locks_of_workspaces
 from helpers.notebook import uninterrupted
 from helpers.ros import NOT_OF_A_LESSON, nearly
-from helpers.workspace.folders import locks
 
 STOP_TIMEOUT_S = 5.0
 DIED = 'process has died'  # what a launch prints of a program
@@ -85,7 +85,7 @@ class Process:
                 stderr=subprocess.STDOUT,
                 # A process that outlives the kernel, such as a build, keeps its workspace
                 # locked.
-                pass_fds=locks(),
+                pass_fds=locks_of_workspaces(),
                 # Interrupting the kernel must not reach it: its owner ends it in order.
                 start_new_session=True,
             )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
 import json
 import os
 import re
@@ -15,11 +14,19 @@ from pathlib import Path, PurePosixPath
 
 from ros2_command.api import CommandError, command_of
 
-from helpers.machine import build_environment, from_wheels, tools_of_a_build
+from helpers.machine import (
+    BUILT,
+    OWNED,
+    build_environment,
+    claim_workspace,
+    files_of_person,
+    from_wheels,
+    name_beside,
+    tools_of_a_build,
+)
 from helpers.notebook import ProgressBar, somebody_watches, uninterrupted
 from helpers.ros import graph_environment
 from helpers.workspace.build_output import BuildResult, read_result, without_folders
-from helpers.workspace.folders import claim
 from helpers.workspace.processes import POLL_S, Process
 from helpers.workspace.sourcing import source, use
 from helpers.workspace.wheels import fix_wheels
@@ -36,10 +43,6 @@ CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has don
 
 # The parts of the files that several cells write, in a workspace.
 PARTS = '.parts.json'
-# Marks the workspace of a person: another run puts it aside, and removes nothing. tools/clean.sh
-# removes what was built.
-OWNED = '.owned'
-BUILT = ('build', 'install', 'log')  # by colcon
 # Set by a program that shows lessons from their start, such as slides: begin each workspace empty.
 BEGIN_EMPTY = 'ROS2_NOTEBOOKS_BEGIN_EMPTY'
 
@@ -51,7 +54,7 @@ _open_workspace: Workspace | None = None
 
 
 class Workspace:
-    """A colcon workspace of this notebook: `Workspace('lesson_09')`.
+    """A colcon workspace of this notebook: `Workspace('make_a_package')`.
 
     It is in the folder `scratch` of this checkout, which git ignores. A person finds it as it was
     left; `begin_anew` empties it. A run without a person, as in CI, begins with an empty one. If
@@ -72,7 +75,8 @@ class Workspace:
         global _open_workspace
         if not re.fullmatch(r'[A-Za-z0-9_-]+', name):
             raise ValueError(
-                f'Name a workspace with letters, digits, _ and -, such as lesson_09, not {name!r}.'
+                'Name a workspace with letters, digits, _ and -, such as make_a_package, '
+                f'not {name!r}.'
             )
         if underlay and name in ('src', 'build', 'install', 'log'):
             raise ValueError(f'{name!r} is a folder of the underlay: choose another name.')
@@ -83,7 +87,7 @@ class Workspace:
             underlay._overlays[name].close()
         self._underlay = underlay
         self._overlays: dict[str, Workspace] = {}
-        self.path = underlay.path / name if underlay else claim(name)
+        self.path = underlay.path / name if underlay else claim_workspace(name)
         self._processes: dict[tuple[str, ...], Process] = {}
         self.terminals: dict[str, Process] = {}
         self._ran: list[tuple[str, str | Process]] = []  # in terminals
@@ -104,7 +108,7 @@ class Workspace:
         if not is_left:
             self._put_aside()
             self._empty()
-        elif files := _files_below(self.path):
+        elif files := files_of_person(self.path):
             print(AS_LEFT.format(_count(files), f'{self.path.parent.name}/{self.path.name}'))
             with contextlib.suppress(OSError, ValueError):
                 self._parts = json.loads((self.path / PARTS).read_text(encoding='utf-8'))
@@ -115,7 +119,7 @@ class Workspace:
     def begin_anew(self) -> None:
         """End what runs in this workspace and empty it. What was in it is kept beside it."""
         self.close()
-        count = _count(_files_below(self.path))
+        count = _count(files_of_person(self.path))
         aside = self._put_aside()
         self._empty()
         (self.path / OWNED).touch()
@@ -124,13 +128,12 @@ class Workspace:
 
     def _put_aside(self) -> str | None:
         """Keep a person's files beside the workspace, and return where they are then."""
-        if not (self.path / OWNED).exists() or not _files_below(self.path):
+        if not (self.path / OWNED).exists() or not files_of_person(self.path):
             return None
         with uninterrupted():  # rmtree makes an OSError of an Interrupt
             for built in BUILT:
                 shutil.rmtree(self.path / built, ignore_errors=True)
-            names = (f'{self.path.name}.before_{number}' for number in itertools.count(1))
-            aside = next(path for path in map(self.path.with_name, names) if not path.exists())
+            aside = name_beside(self.path)
             self.path.rename(aside)
         return f'{aside.parent.name}/{aside.name}'
 
@@ -386,19 +389,6 @@ class Workspace:
             process.stop()
         self._processes.clear()
         self.terminals.clear()
-
-
-def _files_below(folder: Path) -> list[Path]:
-    """Return the files of a workspace that a person may have written, in cells or in an editor."""
-    return [
-        file
-        for file in folder.rglob('*')
-        if file.is_file() and not any(_is_made(part) for part in file.relative_to(folder).parts)
-    ]
-
-
-def _is_made(name: str) -> bool:
-    return name.startswith('.') or name in (*BUILT, '__pycache__')
 
 
 def _count(files: Sequence[Path]) -> str:

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from types import ModuleType
 from typing import Any, NamedTuple
+
+# What this package imports of ROS 2. The extra `ros` of its pyproject.toml installs it.
+ROS = {'lifecycle_msgs', 'rcl_interfaces', 'rclpy', 'rosgraph_msgs', 'rosidl_adapter'}
 
 
 class CommandError(Exception):
@@ -14,6 +19,21 @@ class CommandError(Exception):
     def __init__(self, sentence: object, status: int = 1) -> None:
         super().__init__(str(sentence))
         self.status = status
+
+
+def what_is_missing(error: ModuleNotFoundError) -> str:
+    """Return a sentence that says which package of ROS 2 is not installed, and what installs it.
+
+    Raises the error itself if it is about another module.
+    """
+    if error.name not in ROS:
+        raise error
+    # Without rclpy the others are missing, too, and each verb imports another one first.
+    name = error.name if importlib.util.find_spec('rclpy') else 'rclpy'
+    return (
+        f'ros2 needs {name}, which the Python in {sys.prefix} does not have: install the wheels of '
+        "ROS 2 with `pip install 'ros2-command[ros]'`, or source a ROS 2 in this terminal."
+    )
 
 
 class Argument(NamedTuple):

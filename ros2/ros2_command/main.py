@@ -13,7 +13,7 @@ if os.path.basename(sys.argv[0]) == 'ros2':  # Ctrl+C while Python still imports
 import importlib  # noqa: E402
 from pathlib import Path  # noqa: E402
 
-from ros2_command.commands import CommandError, Parser, title  # noqa: E402
+from ros2_command.commands import CommandError, Parser, title, what_is_missing  # noqa: E402
 
 VERSION = (
     'ros2 of the ROS 2 notebooks, for an environment of wheels; it follows ros2cli 0.32.2 of '
@@ -35,6 +35,9 @@ def main(argv: list[str] | None = None) -> int:
     except CommandError as error:
         print(error, file=sys.stderr)
         status = error.status
+    except ModuleNotFoundError as error:
+        print(what_is_missing(error), file=sys.stderr)
+        status = 1
     except KeyboardInterrupt:
         status = int(signal.SIGINT)
     except BrokenPipeError:  # `ros2 topic list | head -1`

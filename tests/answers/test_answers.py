@@ -2,11 +2,11 @@
 
 A file `<lesson>.yaml` beside this one has the answers of a lesson's tasks:
 
-    3 wrong:
+    a_driver wrong:
     - self.publisher.publish(message): ''  # publishes nothing
     - x = self.speed: x = 0.5  # two edits are one answer
       z = self.turn: z = 1.0
-    3 right:
+    a_driver right:
     - message = ... (message): |-
         from geometry_msgs.msg import Vector3
         self.publisher.publish(Twist(linear=Vector3(x=self.speed), angular=Vector3(z=self.turn)))
@@ -21,24 +21,20 @@ that has a colon with a space behind it, or a # with a space before it.
 """
 
 import os
-import re
 import shutil
 import tempfile
 import time
-from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import nbformat
 import pytest
 from support.answers import LEAST, answers_of, source_of
 from support.kernel import NOTEBOOKS, Kernel
 
-from helpers.checks.progress import with_tasks
+from helpers.lesson import check_call, code_of_solution, path_of, read
 
 HERE = Path(__file__).parent
-BUILDS = re.compile(r'check\(\d+, workspace\b')  # or clones, or starts programs
 KEEP_NAMES = 'get_ipython().names_before = dict(get_ipython().user_ns)'
 PUT_NAMES_BACK = """
 def put_back(names, before):
@@ -53,34 +49,34 @@ Cells = dict[str, list[str]]  # of a task, by their tag
 FILES = sorted(HERE.glob('*.yaml'))
 
 
-def tasks_of(path: Path) -> set[int]:
-    """Return the numbers of the tasks that have answers."""
-    return {int(key.split()[0]) for key in answers_of(path)}
+def builds(check: str) -> bool:
+    """Return whether a check builds, clones or starts programs."""
+    _, arguments = check_call(check)
+    return arguments[:1] == ['workspace']
 
 
-def tag_of(cell: nbformat.NotebookNode) -> str:
-    """Return 'exercise', 'check' or 'solution', or nothing for another cell."""
-    tags = {'exercise', 'check', 'solution'}.intersection(cell.metadata.get('tags', []))
-    return tags.pop() if tags else ''
-
-
-def read_tasks(name: str) -> list[tuple[list[str], Cells]]:
-    """Return for each task of a lesson the cells above it, and its own."""
-    [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{name}.ipynb')
-    tasks, above, own = [], [], defaultdict(list)
-    for cell in nbformat.read(path, 4).cells:
-        if cell.cell_type != 'code':
-            continue
-        tag, source = tag_of(cell), cell.source
-        if not tag:
-            above.append(source)
-        elif tag != 'solution':
-            own[tag].append(source)
-        else:
-            own[tag].append(source.split('\n', 1)[1])
-            tasks.append((above, own))
-            above, own = [], defaultdict(list)
-    return tasks
+def read_tasks(name: str) -> dict[str, tuple[list[str], Cells]]:
+    """Return for each task of a lesson, by its name, the cells above it, and its own."""
+    path = path_of(name, NOTEBOOKS)
+    lesson = read(path.read_text(encoding='utf-8'), path.name)
+    of_tasks = {cell.id for task in lesson.tasks for cell in task.cells}
+    found, above = {}, []
+    tasks = iter(lesson.tasks)
+    task = next(tasks, None)
+    for cell in lesson.code_cells():
+        if cell.id not in of_tasks:
+            above.append(cell.source)
+        elif cell is task.cells[-1]:
+            found[task.name] = (
+                above,
+                {
+                    'exercise': [one.source for one in task.exercises],
+                    'check': [one.source for one in task.checks],
+                    'solution': [code_of_solution(one.source) for one in task.solutions],
+                },
+            )
+            above, task = [], next(tasks, None)
+    return found
 
 
 class Lesson:
@@ -93,18 +89,23 @@ class Lesson:
     def __init__(self, name: str) -> None:
         self.name, self.kernel = name, Kernel()
         self._tasks = read_tasks(name)
+        self._names = [*self._tasks]
         self._folder: Path | None = None  # of its workspace
-        self.reached = 0  # the task whose cells are `cells`
+        self.reached = -1  # the place of the task whose cells are `cells`
         self.cells: Cells = {}
 
-    def go_to(self, task: int) -> None:
+    def is_behind(self, task: str) -> bool:
+        """Return whether the lesson has reached a task, or a later one."""
+        return self.reached >= self._names.index(task)
+
+    def go_to(self, task: str) -> None:
         """Run the cells above a task."""
-        while self.reached < task:
-            if self.reached:
+        while not self.is_behind(task):
+            if self.cells:
                 # Some solutions change the files that their starters have written.
                 run_all(self.kernel, self.cells['exercise'], self.cells['solution'])
                 # What a check builds is used by the cells below it.
-                run_all(self.kernel, filter(BUILDS.match, self.cells['check']))
+                run_all(self.kernel, filter(builds, self.cells['check']))
             self._reach_next()
 
     @contextmanager
@@ -124,8 +125,8 @@ class Lesson:
 
     def _reach_next(self) -> None:
         """Run the cells above the next task."""
-        above, self.cells = self._tasks[self.reached]
         self.reached += 1
+        above, self.cells = self._tasks[self._names[self.reached]]
         run_all(self.kernel, above)
         path = self.kernel.run("print(globals()['workspace'].path)") if self._folder is None else ''
         if path.startswith('/'):
@@ -175,20 +176,20 @@ def open_lesson():
 
     The tasks of a lesson come in their order, so the next one goes on in the kernel of the last.
     """
-    lessons: list[Lesson] = []  # at most one
+    opened: list[Lesson] = []  # at most one
 
     def close() -> None:
-        while lessons:
-            lessons.pop().kernel.__exit__(None, None, None)
+        while opened:
+            opened.pop().kernel.__exit__(None, None, None)
 
     @contextmanager
-    def open_at(name: str, task: int) -> Iterator[Lesson]:
-        if not lessons or lessons[0].name != name or lessons[0].reached >= task:
+    def open_at(name: str, task: str) -> Iterator[Lesson]:
+        if not opened or opened[0].name != name or opened[0].is_behind(task):
             close()
             lesson = Lesson(name)
             lesson.kernel.__enter__()
-            lessons.append(lesson)
-        lesson = lessons[0]
+            opened.append(lesson)
+        lesson = opened[0]
         try:
             lesson.go_to(task)
             with lesson.undone():
@@ -202,17 +203,13 @@ def open_lesson():
 
 
 @pytest.mark.parametrize(
-    ('lesson', 'task'),
-    [(path.stem, task) for path in FILES for task in sorted(tasks_of(path))],
-    ids=lambda value: value if isinstance(value, str) else f'task_{value:02d}',
+    ('lesson', 'task'), [(path.stem, task) for path in FILES for task in read_tasks(path.stem)]
 )
 def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson):
     answers, tasks = answers_of(HERE / f'{lesson}.yaml'), read_tasks(lesson)
-    assert task <= len(tasks), f'The lesson {lesson} has no task {task}.'
     # Before the cells above the task have run: that takes a while.
     wrong, right = (
-        made(answers.get(f'{task} {kind}', []), f'{task} {kind}', tasks[task - 1][1])
-        for kind in LEAST
+        made(answers.get(f'{task} {kind}', []), f'{task} {kind}', tasks[task][1]) for kind in LEAST
     )
     with open_lesson(lesson, task) as opened:
         kernel, cells = opened.kernel, opened.cells
@@ -233,13 +230,3 @@ def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson):
             ('solution', True)
         ], said
         judge(kernel, right, f'{task} right', cells)
-
-
-def test_each_task_of_a_lesson_has_answers():
-    for tasks in with_tasks():
-        path = HERE / f'{tasks.name}.yaml'
-        known = tasks_of(path) if path.exists() else set()
-        missing = sorted(set(range(1, tasks.tasks + 1)) ^ known)
-        assert not missing, (
-            f'tests/answers/{tasks.name}.yaml lacks tasks, or has others: {missing}.'
-        )

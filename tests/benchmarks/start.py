@@ -1,6 +1,6 @@
 """From a fresh clone with empty caches to JupyterLab's answer, beside the packages asked for alone.
 
-    PYTHONPATH=tests python -m benchmarks.start [ROUNDS]        on an idle machine, with a network
+    make bench [ROUNDS=3]        on an idle machine, with a network
 
 No number fails: a reader judges the ratios. Neither side has uv in a cache. The reference is given
 uv; a course that must fetch it pays for that.

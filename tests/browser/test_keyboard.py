@@ -2,7 +2,7 @@
 
 from support.lab_page import HAS_FOCUS, PANEL, LabPage, printed
 
-from tools.lessons.lesson import lessons
+from helpers.lesson import lessons
 
 START, NEXT = lessons()[:2]
 FOCUSED = '() => document.activeElement.innerText'

@@ -6,7 +6,8 @@ from support.lab_page import complaints
 
 from tools.lessons.clean import NOTEBOOK_METADATA
 
-IMPORTS = """from helpers.robot import ROOMS, Robot, drive_by_hand, watch
+IMPORTS = """from helpers.robot import ROOMS, Robot
+from helpers.robot_view import drive_by_hand, watch
 from helpers.ros import ros_session"""
 BY_HAND = """with ros_session():
     robot = Robot(ROOMS)
@@ -51,6 +52,19 @@ def wait_for_another(page, what, before):
     )
 
 
+def wait_until_it_stands(page):
+    """Wait until the robot has been in one place for half a second."""
+    page.wait_for_function(
+        """robot => {
+            const [before, now] = [window.placeBefore, document.querySelector(robot)];
+            window.placeBefore = now?.getAttribute('transform');
+            return now && window.placeBefore === before;
+        }""",
+        arg=ROBOT,
+        polling=500,
+    )
+
+
 def test_watched_driven_and_replayed(lab):
     cells = [new_code_cell(source) for source in (IMPORTS, BY_HAND, ENDLESS)]
     path = lab.server.folder / 'notebooks' / '97_robot.ipynb'
@@ -72,10 +86,7 @@ def test_watched_driven_and_replayed(lab):
         press()
         wait_for_another(page, ROBOT, before)
         release()
-        page.wait_for_function(
-            """() => /robot0.00 m.s, 0.00 rad.s/.test(
-                document.querySelector('.robot-live').textContent)"""
-        )
+        wait_until_it_stands(page)
     lab.screenshot('robot_by_hand')
     width = page.evaluate(WIDTH)
     stopped = place(page)
@@ -88,22 +99,26 @@ def test_watched_driven_and_replayed(lab):
 
     # The replay stays where the robot stopped, as large as it was. Stepped through with keys.
     shown = page.locator('.replay-on')
-    assert page.evaluate(WIDTH) == width
-    assert shown.locator('.robot').get_attribute('transform') == stopped
+    robot = shown.locator('.robot')
+    assert abs(page.evaluate(WIDTH) - width) < 1  # pixel
+    assert robot.get_attribute('transform') == stopped
     assert shown.get_by_role('button', name='Watch again').is_visible()
     shown.focus()
     says = shown.locator('.replay-says')
-    assert says.inner_text() == 'Nothing was hit.'
     page.keyboard.press('Home')
+    start = robot.get_attribute('transform')
     page.keyboard.press('ArrowRight')
-    assert says.inner_text() == 'The robot is told to drive 0.50 m/s.'
+    assert 'drive' in says.inner_text()
     page.keyboard.press('ArrowRight')
-    assert says.inner_text() == 'The robot is told to stop.'
-    start = shown.locator('.robot').get_attribute('transform')
+    assert 'stop' in says.inner_text()
+    driven = robot.get_attribute('transform')
+    page.keyboard.press('End')
+    assert robot.get_attribute('transform') == stopped
+    assert len({start, driven, stopped}) == 3
     page.keyboard.press('Home')
-    assert shown.locator('.robot').get_attribute('transform') != start
+    assert robot.get_attribute('transform') == start
     shown.get_by_role('button', name='Play').click()
-    wait_for_another(page, '.replay-on .robot', shown.locator('.robot').get_attribute('transform'))
+    wait_for_another(page, '.replay-on .robot', start)
     lab.screenshot('robot_replay')
 
     # Pictures come, none is empty, and Interrupt ends the run and leaves its replay.

@@ -6,8 +6,10 @@ else reaches JupyterLab. Here is what only a browser shows.
 
 from support.lab_page import PANEL, complaints
 
+from helpers.lesson import path_of
+
 IS_OPEN = 'summary => summary.parentElement.open'
-WITH_A_SLIDER = '04_choose_the_number_of_threads.ipynb'
+WITH_A_SLIDER = path_of('choose_the_number_of_threads').name
 
 
 def test_run_all_and_move_a_slider(lab):
@@ -41,7 +43,7 @@ def test_run_all_and_move_a_slider(lab):
 
 
 def test_answers_of_a_quiz_open_and_stay_rendered(lab):
-    lab.open('01_publish_and_subscribe.ipynb')
+    lab.open(path_of('publish_and_subscribe').name)
     question = lab.find('### Question 1')
     first, _, third = lab.show(question).query_selector_all('summary')
     first.click()
@@ -51,7 +53,7 @@ def test_answers_of_a_quiz_open_and_stay_rendered(lab):
 
 
 def test_interrupt_an_experiment_and_run_it_again(lab):
-    lab.open('02_lose_messages.ipynb')
+    lab.open(path_of('lose_messages').name)
     experiment = lab.find('as first_session')
     for index in range(experiment):
         if lab.cells()[index]['cell_type'] == 'code':

@@ -432,6 +432,26 @@ def arguments_of(file: Path) -> list[str]:
 # --- What the test itself finds
 
 
+PUBLISHES = """import signal
+import rclpy
+from rclpy.signals import SignalHandlerOptions
+from {package}.msg import {names}
+
+def end(*_):
+    raise KeyboardInterrupt
+
+def main():
+    signal.signal(signal.SIGTERM, end)
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node('small')
+    message = {message}
+    publisher = node.create_publisher(type(message), '{topic}', 1)
+    node.create_timer(0.1, lambda: publisher.publish(message))  # it wakes spin
+    try:
+        rclpy.spin(node)
+    except KeyboardInterrupt:
+        rclpy.try_shutdown()
+"""
 PACKAGE = {
     'package.xml': """<?xml version="1.0"?>
 <package format="3">
@@ -459,51 +479,20 @@ install_scripts=$base/lib/small_pkg
 """,
     'resource/small_pkg': '',
     'small_pkg/__init__.py': '',
-    'small_pkg/small.py': """import signal
-import rclpy
-from rclpy.signals import SignalHandlerOptions
-from std_msgs.msg import String
-
-def end(*_):
-    raise KeyboardInterrupt
-
-def main():
-    signal.signal(signal.SIGTERM, end)
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node('small')
-    publisher = node.create_publisher(String, 'name', 1)
-    node.create_timer(0.1, lambda: publisher.publish(String(data='small')))  # it wakes spin
-    try:
-        rclpy.spin(node)
-    except KeyboardInterrupt:
-        rclpy.try_shutdown()
-""",
+    'small_pkg/small.py': PUBLISHES.format(
+        package='std_msgs', names='String', topic='name', message="String(data='small')"
+    ),
     'test/test_small.py': """from small_pkg import small
 def test_it():
     assert small.main
 """,
 }
-DRIVES = """from geometry_msgs.msg import Twist
-import signal
-import rclpy
-from rclpy.signals import SignalHandlerOptions
-
-def end(*_):
-    raise KeyboardInterrupt
-
-def main():
-    signal.signal(signal.SIGTERM, end)
-    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node('small')
-    publisher = node.create_publisher(Twist, 'cmd_vel', 1)
-    twist = Twist()
-    twist.linear.x = 0.5
-    node.create_timer(0.1, lambda: publisher.publish(twist))
-    try:
-        rclpy.spin(node)
-    except KeyboardInterrupt:
-        rclpy.try_shutdown()
-"""
+DRIVES = PUBLISHES.format(
+    package='geometry_msgs',
+    names='Twist, Vector3',
+    topic='cmd_vel',
+    message='Twist(linear=Vector3(x=0.5))',
+)
 
 
 def edit(file: str, old: str, new: str) -> dict[str, str]:

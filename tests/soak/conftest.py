@@ -34,8 +34,8 @@ import pytest
 from nbformat.v4 import new_code_cell
 from support.leftovers import processes_that_stay
 
+from helpers.lesson import ROOT
 from tools.lessons.comparison import IPyNbFile, NamedCell, RunningKernel
-from tools.lessons.lesson import ROOT
 
 CONDITIONS = ('idle', 'busy', 'twice', 'interrupt', 'kill')
 BUSY_LOOPS = 4

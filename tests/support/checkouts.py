@@ -4,7 +4,7 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from tools.lessons.lesson import ROOT
+from helpers.lesson import ROOT
 
 
 def git(folder: Path, *arguments: str) -> str:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, settings
 from hypothesis import strategies as st
 
-from helpers.notebook import RUN_COLUMNS
+from helpers.recording import RUN_COLUMNS
 
 CALLBACK = ['started_s', 'finished_s', 'thread']
 NOT_HEARD = math.nan, math.nan, None

@@ -7,12 +7,14 @@ import pytest
 
 from helpers.checks.classroom import HUB_VARIABLE
 from helpers.checks.progress import FILE_VARIABLE
+from helpers.lesson import path_of
 from support.processes import running
 
-LESSON = '02_lose_messages.ipynb'
+LESSON = path_of('lose_messages').name
 BEGIN = 'import sys\nfrom helpers.checks import classroom\nfrom helpers.checks import *\n'
 GUESSES = """
 import time
+from helpers.lesson import path_of
 for value in range({}, {}):
     guess({!r}, value)
     time.sleep(0.01)

@@ -1,18 +1,15 @@
 """A lesson or a task is added, or a lesson taken out, in a copy of this checkout: rules hold."""
 
 import os
-import re
-import shutil
 import subprocess
 import sys
 
-import nbformat
 import pytest
 import yaml
 from support.checkouts import copy_checkout, git
 
-from tools.lessons import new, run, task
-from tools.lessons.lesson import ROOT, lessons
+from helpers.lesson import ROOT, bare_mentions, lessons, links_to_tasks, read
+from tools.lessons import new, run, tables, task
 
 KNOWN = lessons()[12]
 MIDDLE = 'find_your_keys'  # no test may name its file: it could not be taken out
@@ -58,7 +55,7 @@ def test_added_in_the_middle_and_at_the_end_with_a_task(tmp_path, capsys):
     commit(copy)
     assert new.main([MIDDLE, '--after', '04'], copy) == 0
     printed = capsys.readouterr().out
-    assert 'Look at these lines' in printed
+    assert 'Look at' not in printed  # a person has nothing to do
     assert printed.endswith('Now run `make notebooks LESSON=05`.\n')
     assert run.main(['05', lessons(copy / 'notebooks')[-2].number], copy) == 0
     the_rules_hold(copy)
@@ -85,44 +82,32 @@ def test_added_in_the_middle_and_at_the_end_with_a_task(tmp_path, capsys):
     assert changed == ['notebooks/00_start_here.ipynb']
 
 
+@pytest.mark.parametrize('path', sorted(tables.documents()), ids=lambda path: path.name)
+def test_documents_mention_lessons_by_links(path):
+    assert [*bare_mentions(tables.BLOCK.sub('', path.read_text(encoding='utf-8')))] == []
+
+
 def test_later_tasks_follow_a_new_one():
-    texts, number, last = task.plan(KNOWN.name, '2', ROOT)
-    notebook, checks, answers = texts.values()
-    cells = nbformat.reads(notebook, as_version=4).cells
-    every = [str(count) for count in range(1, last + 1)]
+    """Numbers are places: names, ids, judges and answers of all other tasks stay as they are."""
+    texts, notebook, number = task.plan(KNOWN.name, '2', 'count_them', ROOT)
+    new = read(texts[notebook], KNOWN.file)
     assert number == 3
-    for pattern in (r'^### ✎ Task (\d+)', r'^check\((\d+)', r'^%%solution (\d+)'):
-        found = (re.search(pattern, cell.source, re.MULTILINE) for cell in cells)
-        assert [one[1] for one in found if one] == every
-    assert re.findall(r'^@tasks\.add\((\d+)', checks, re.MULTILINE) == every
-    assert [*yaml.safe_load(answers)] == [
-        f'{n} {kind}' for n in every for kind in ('wrong', 'right')
-    ]
+    assert [one.number for one in new.tasks] == [*range(1, len(KNOWN.tasks) + 2)]
+    names = [one.name for one in new.tasks]
+    assert names.pop(2) == 'count_them'
+    assert names == [one.name for one in KNOWN.tasks]
+    judges = texts[f'helpers/checks/lessons/{KNOWN.name}.py']
+    assert judges.index(f'def {names[1]}(') < judges.index('def count_them(')
+    assert judges.index('def count_them(') < judges.index(f'def {names[2]}(')
+    answers = yaml.load(texts[f'tests/answers/{KNOWN.name}.yaml'], yaml.BaseLoader)
+    kinds = ('wrong', 'right')
+    assert {*answers} == {f'{name} {kind}' for name in (*names, 'count_them') for kind in kinds}
     # `make update` finds what a student has written by the ids.
-    kept = [cell.id for cell in KNOWN.notebook.cells]
-    assert [cell.id for cell in cells if cell.id in kept] == kept
-
-
-def test_lines_that_may_name_a_task_by_its_old_number_are_printed(tmp_path, capsys):
-    number, name = KNOWN.number, KNOWN.name
-    for path in (f'notebooks/{KNOWN.file}', *(path.format(name=name) for path in new.BESIDE)):
-        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / path, tmp_path / path)
-    texts = {
-        'exam.md': f'# Lesson {number}\n\nTake a pen.\nIt is tasks 1 to 4.\n# Home\nTask 3\n',
-        'made.md': f'<!-- made by `make notebooks`: x -->\n\n| {number} | task 4 |\n<!-- end -->',
-        'grade.sh': f'LESSON={name} TASKS="1 4"\nLESSON={number} TASK=2\nTASK=4\n',
-    }
-    for path, text in texts.items():
-        (tmp_path / path).write_text(text, encoding='utf-8')
-    git(tmp_path, 'init', '-q')
-    commit(tmp_path)
-    assert task.main([number, '--after', '2'], tmp_path) == 0
-    printed = capsys.readouterr().out.partition('Look at these lines')[2].splitlines()
-    assert [line for line in printed if line.startswith(tuple(texts))] == [
-        'exam.md: It is tasks 1 to 4.',
-        f'grade.sh: LESSON={name} TASKS="1 4"',
-    ]
+    kept = [cell.id for cell in KNOWN.cells]
+    assert [cell.id for cell in new.cells if cell.id in kept] == kept
+    # What says "task 3" of an old task 3 says "task 4" now, and leads there.
+    for cell in new.cells:
+        assert {*links_to_tasks(cell.source)} <= {one.anchor for one in new.tasks}
 
 
 @pytest.mark.parametrize(
@@ -131,8 +116,10 @@ def test_lines_that_may_name_a_task_by_its_old_number_are_printed(tmp_path, caps
         ([''], 'Name the lesson: make task LESSON=01 AFTER=3'),
         (['77'], "There is no single lesson '77'."),
         (['99'], 'has no task yet'),
-        ([KNOWN.number, '--after', '77'], 'name one of them with AFTER'),
-        (['find_the_fault'], 'for each of the tasks 1 to 10: write the new task by hand'),
+        ([KNOWN.number, '--after', '77'], f"{KNOWN.file} has no task '77'. It has: 1 "),
+        ([KNOWN.number, '--name', 'Find'], 'Name the task in small letters'),
+        ([KNOWN.number, '--name', KNOWN.tasks[0].name], 'already: choose another NAME'),
+        (['find_the_fault'], 'is no function of its own: write the new task by hand'),
     ],
 )
 def test_a_task_of_no_lesson_gets_one_sentence(capsys, arguments, sentence):
@@ -172,7 +159,7 @@ def changed(tmp_path_factory):
         (['count_losses', '--after', '04'], 'Commit your changes first'),
         (['count_losses', '--remove'], "There is no single lesson 'count_losses'."),
         (['start_here', '--remove'], '00_start_here is no lesson'),
-        ([KNOWN.name, '--remove'], f'these files name {KNOWN.number}_{KNOWN.name}'),
+        ([KNOWN.name, '--remove'], f'these files name {KNOWN.name}'),
     ],
 )
 def test_bad_input_changes_nothing(changed, capsys, arguments, sentence):

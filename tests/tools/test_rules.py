@@ -4,8 +4,8 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_output
 
+from helpers.lesson import FOLDER, Lesson
 from tools.lessons import rules
-from tools.lessons.lesson import FOLDER, Lesson
 from tools.lessons.new import template
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from support.processes import put
 
-from helpers.workspace.workspace import OWNED
-from tools.lessons.lesson import ROOT
+from helpers.lesson import ROOT, path_of
+from helpers.machine import OWNED
 
 LOCKS = Path('tools/locks')
 BASE_PYTHON = Path(sys._base_executable)
@@ -240,10 +240,13 @@ def test_another_machine_is_sent_to_environment_md(tmp_path):
 # --- make ----------------------------------------------------------------------------------------
 
 
-def test_another_ros_and_other_settings_stay_out(tmp_path):
+@pytest.mark.parametrize('makefile', ['Makefile', 'classroom/handout.mk'])
+def test_another_ros_and_other_settings_stay_out(tmp_path, makefile):
     """What the recipes of the Makefile get from an environment in which ROS 2 is sourced."""
+    (tmp_path / 'tools').mkdir()
+    shutil.copy(ROOT / 'tools/environment.mk', tmp_path / 'tools')
     show = tmp_path / 'show.mk'
-    show.write_text(f'include {ROOT}/Makefile\nshow_environment:\n\t@env\n')
+    show.write_text(f'include {ROOT / makefile}\nshow_environment:\n\t@env\n')
     foreign = {
         'AMENT_PREFIX_PATH': '/opt/ros/humble',
         'LD_LIBRARY_PATH': '/opt/ros/humble/lib',
@@ -282,39 +285,40 @@ def test_what_somebody_wrote_is_not_cleaned(tmp_path):
         '.jupyter/lab/workspaces/tabs',
         '.jupyter/data/kernels/kernel.json',
         'helpers/__pycache__/one.pyc',
-        'scratch/.lesson_09.lock',
-        'scratch/.lesson_19.lock',
-        'scratch/lesson_09/src/of_a_run_without_a_person.py',
-        'scratch/lesson_19/build/ada/setup.py',
-        'scratch/lesson_19/install/setup.bash',
-        'scratch/lesson_19/log/COLCON_IGNORE',
-        'scratch/lesson_19/src/ada/__pycache__/brake.pyc',
+        'scratch/.make_a_package.lock',
+        'scratch/.find_the_fault.lock',
+        'scratch/make_a_package/src/of_a_run_without_a_person.py',
+        'scratch/find_the_fault/build/ada/setup.py',
+        'scratch/find_the_fault/install/setup.bash',
+        'scratch/find_the_fault/log/COLCON_IGNORE',
+        'scratch/find_the_fault/src/ada/__pycache__/brake.pyc',
     ]
     kept = [
-        'notebooks/02_lose_messages.ipynb',
+        f'notebooks/{path_of("lose_messages").name}',
         '.jupyter/hub/jupyterhub.sqlite',
         '.jupyter/class/class.sqlite',
         '.jupyter/data/ros2_notebooks_progress.txt',
         'scratch/by_hand/build/notes.txt',
-        f'scratch/lesson_09.before_1/{OWNED}',
-        'scratch/lesson_09.before_1/src/talker.py',
-        f'scratch/lesson_19/{OWNED}',
-        'scratch/lesson_19/src/ada/ada/brake.py',
-        'scratch/lesson_19/record.txt',
+        f'scratch/make_a_package.before_1/{OWNED}',
+        'scratch/make_a_package.before_1/src/talker.py',
+        f'scratch/find_the_fault/{OWNED}',
+        'scratch/find_the_fault/src/ada/ada/brake.py',
+        'scratch/find_the_fault/record.txt',
     ]
     root = tmp_path / 'élève one'
     for name in (*removed, *kept):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text('text')
     (root / 'tools').mkdir()
-    for name in ('Makefile', 'tools/clean.sh'):
+    tools = {'Makefile', 'tools/clean.sh', 'tools/environment.mk'}
+    for name in tools:
         shutil.copy(ROOT / name, root / name)
     for _ in range(2):  # the second time there is nothing to do
         command = ['make', '--silent', 'clean']
         answer = subprocess.run(command, cwd=root, capture_output=True, text=True)
         assert (answer.returncode, answer.stdout, answer.stderr) == (0, '', '')
         left = {str(path.relative_to(root)) for path in root.rglob('*') if path.is_file()}
-        assert left == {*kept, 'Makefile', 'tools/clean.sh'}
+        assert left == {*kept, *tools}
     shutil.rmtree(root / 'scratch')
     shutil.rmtree(root / '.jupyter')
     subprocess.run(command, cwd=root, check=True)  # as before the first lesson

@@ -8,9 +8,7 @@ import sys
 
 import nbformat
 
-from tools.lessons.lesson import FOLDER, tags
-
-WRITTEN = {'exercise', 'predict'}  # the tags of the cells in which a student writes
+from helpers.lesson import FOLDER, WRITTEN, tags
 
 
 def answered() -> list[str]:

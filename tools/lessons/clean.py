@@ -20,20 +20,22 @@ NOTEBOOK_METADATA = {
     'language_info': {'name': 'python'},
     MARK: AS_SAVED,
 }
+MADE_FROM = 'ros2_notebooks_made_from'  # what made the outputs: see outputs.py
 WIDGET = 'application/vnd.jupyter.widget-view+json'
 
 
 def clean(notebook: NotebookNode) -> NotebookNode:
     """Return a copy of a notebook without what changes by itself from run to run.
 
-    Kept are sources, tags, hidden sources, cell ids, execution counts and outputs. Made anew is
-    which cells JupyterLab does not let edit: answers that unfold.
+    Kept are sources, tags, hidden sources, cell ids, execution counts, outputs, and what made them.
+    Made anew is which cells JupyterLab does not let edit: answers that unfold.
     Neighbouring pieces of one stream become one, because where a stream is cut is chance. The
     model of a widget lives only as long as its kernel: of its view, the text is kept.
     """
     notebook = deepcopy(notebook)
     notebook.nbformat, notebook.nbformat_minor = 4, 5
-    notebook.metadata = nbformat.from_dict(NOTEBOOK_METADATA)
+    kept = {key: notebook.metadata[key] for key in [MADE_FROM] if key in notebook.metadata}
+    notebook.metadata = nbformat.from_dict(NOTEBOOK_METADATA | kept)
     ids: set[str] = set()
     for number, cell in enumerate(notebook.cells):
         if cell.get('id') is None or cell.id in ids:

@@ -1,50 +1,10 @@
-"""What the code of a cell says."""
+"""What the code of a cell gives away."""
 
 import ast
 import re
 from collections.abc import Iterator
 
 from IPython.core.inputtransformer2 import TransformerManager
-from nbformat import NotebookNode
-
-from tools.lessons.lesson import tags
-
-
-def guess_of(cell: NotebookNode) -> tuple[str, str, object] | None:
-    """Return the variable, the question and the value of a predict cell, None for other cells.
-
-    It ends in `my_guess = guess('How many are heard?', 41)`.
-    """
-    if 'predict' not in tags(cell):
-        return None
-    try:
-        plain = TransformerManager().transform_cell(cell.source)  # a magic becomes a call
-        match ast.parse(plain).body:
-            case [
-                *_,
-                ast.Assign(
-                    [ast.Name(variable)],
-                    ast.Call(ast.Name('guess'), [ast.Constant(str(question)), value]),
-                ),
-            ]:
-                return variable, question, ast.literal_eval(value)
-    except (SyntaxError, ValueError):  # of a lesson that is being written
-        pass
-    return None
-
-
-def recalled(source: str) -> set[str] | None:
-    """Return the questions that a cell asks from memory, None if it does not end in such a call."""
-    try:
-        body = ast.parse(source).body
-    except SyntaxError:
-        return None
-    match body:
-        case [*_, ast.Expr(ast.Call(ast.Name('remember'), [], words))]:
-            dots = all(isinstance(word.value, ast.Constant) for word in words)
-            if dots and all(word.value.value is ... for word in words):
-                return {word.arg for word in words if word.arg}
-    return None
 
 
 def given_away(source: str, question: str, answer: str) -> Iterator[str]:

@@ -4,9 +4,11 @@ pyproject.toml has its options, tests/nbval_sanitize.cfg what is masked before i
 """
 
 import re
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 
 from jupyter_client.manager import KernelManager
+from nbformat import NotebookNode
 from nbval import kernel
 from nbval.kernel import RunningKernel
 from nbval.plugin import (
@@ -15,13 +17,19 @@ from nbval.plugin import (
     comment_markers,
     get_sanitize_patterns,
     metadata_tags,
+    transform_streams_for_comparison,
 )
 
-from tools.lessons.lesson import ROOT, called
+from helpers.lesson import ROOT, called
 
 __all__ = ['IPyNbFile', 'NamedCell', 'RunningKernel', 'comment_markers', 'metadata_tags']
 
 MASKS = ROOT / 'tests' / 'nbval_sanitize.cfg'
+# What nbval 0.11.0 leaves out, without `metadata`, in which a check says what it has found.
+NOT_COMPARED = {
+    *('traceback', 'prompt_number', 'output_type', 'name', 'execution_count'),
+    *('image/png', 'image/jpeg', 'application/vnd.jupyter.widget-view+json'),
+}
 
 
 class NamedCell(IPyNbCell):
@@ -47,6 +55,18 @@ def masked(text: str) -> str:
     for pattern, replacement in get_sanitize_patterns(MASKS.read_text(encoding='utf-8')):
         text = re.sub(pattern, replacement, text)
     return text
+
+
+def compared(outputs: list[NotebookNode]) -> dict[str, list]:
+    """Return what nbval compares of the outputs of a cell, by its kind, and their metadata."""
+    found = defaultdict(list)
+    for output in transform_streams_for_comparison(outputs):
+        kinds = {**output, **output.get('data', {})}
+        kinds.pop('data', None)
+        for kind in kinds.keys() - NOT_COMPARED:
+            value = kinds[kind]
+            found[kind].append(masked(value) if isinstance(value, str) else value)
+    return dict(found)
 
 
 def change_nbval(start_kernel: Callable[..., KernelManager]) -> Callable[[], None]:

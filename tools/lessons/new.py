@@ -6,9 +6,8 @@
 
 The new lesson is a copy of a complete small lesson that keeps all rules: template.txt is its
 notebook, template.yaml the answers with which its checks are tested. A notebook that gets another
-number is renamed; its title, its workspace and the links to it follow. Its other files have no
-number, and stay. Where a text calls a lesson by its number, that is printed: a person must look at
-these lines. All texts are computed before the first file is touched.
+number is renamed; its title and all links to it follow. Its other files have no number, and stay.
+All texts are computed before the first file is touched.
 """
 
 import argparse
@@ -21,10 +20,9 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
+from helpers.lesson import FOLDED, GLOSSARY, ROOT, START, chosen, paths
 from tools.lessons import tables
 from tools.lessons.clean import clean, text_of, write
-from tools.lessons.lesson import GLOSSARY, ROOT, START, chosen, paths
-from tools.lessons.rules import FOLDED
 
 TEMPLATE = Path(__file__).with_name('template.txt')
 # What a lesson has besides its notebook, and the template of it, if there is one.
@@ -51,17 +49,6 @@ def template(stem: str = '90_write_a_lesson', part: str = 'nodes') -> NotebookNo
         new_cell = getattr(nbformat.v4, f'new_{kind}_cell')
         cells.append(new_cell(source.strip('\n'), metadata=metadata))
     return clean(nbformat.v4.new_notebook(cells=cells))
-
-
-def renumbered(texts: tables.Texts, old: str, new: str) -> tables.Texts:
-    """Return the texts after a notebook was renamed: its title, and the links that lead to it.
-
-    `old` and `new` are file names without their ending, such as 05_run_a_long_job.
-    """
-    text = texts.pop(_path(old)).replace(f'"# {old[:2]} ', f'"# {new[:2]} ', 1)
-    texts[_path(new)] = re.sub(rf'lesson_{old[:2]}\b', f'lesson_{new[:2]}', text)  # a workspace
-    link = re.compile(rf'\[{old[:2]}(?=[^\]\n]*\]\((?:notebooks/)?{old}\.)')
-    return {path: link.sub(f'[{new[:2]}', text).replace(old, new) for path, text in texts.items()}
 
 
 @dataclass
@@ -93,7 +80,7 @@ def plan_to_add(name: str, after: str, root: Path) -> Plan:
             raise ValueError('The glossary stays at the end: name another lesson with AFTER.')
         place = numbered.index(before.stem) + 1 if before.stem in numbered else 0
     numbered.insert(place, '')
-    texts, moved = _move(all_texts(root), numbered)
+    texts, moved = _move(tables.texts_of(root), numbered)
     new = f'{place + 1:02d}_{name}'
     before = tables.lessons_of(texts)[place]
     part = before.part if before.is_lesson else 'nodes'
@@ -112,11 +99,13 @@ def plan_to_remove(lesson: str, root: Path) -> Plan:
         raise ValueError(f'{old} is no lesson: it stays.')
     numbered.remove(old)
     removed = [_path(old), *_existing(old[3:], root)]
-    texts = {path: text for path, text in all_texts(root).items() if path not in removed}
+    texts = {path: text for path, text in tables.texts_of(root).items() if path not in removed}
     texts |= tables.updated(texts)
-    if named := sorted(path for path, text in texts.items() if old in text):
+    known = texts | {path: text for path, text in _code(root).items() if path not in removed}
+    named_as = re.compile(rf'\b(?:\d\d_)?{old[3:]}\b')
+    if named := sorted(path for path, text in known.items() if named_as.search(text)):
         raise ValueError(
-            f'{", ".join(named)}: these files name {old}. Take it out there, then try again.'
+            f'{", ".join(named)}: these files name {old[3:]}. Take it out there, then try again.'
         )
     texts, moved = _move(texts, numbered)
     return Plan(texts | tables.updated(texts), moved, removed)
@@ -129,15 +118,17 @@ def _numbered(root: Path) -> list[str]:
 
 
 def _move(texts: tables.Texts, stems: list[str]) -> tuple[tables.Texts, dict[str, str]]:
-    """Give each notebook the number of its place; return the texts, and the stems that change."""
+    """Give each notebook the number of its place; return the texts, and the stems that change.
+
+    What stands in them follows in tables.updated.
+    """
     moved = {
         stem: f'{number:02d}{stem[2:]}'
         for number, stem in enumerate(stems, 1)
         if stem and stem[:2] != f'{number:02d}'
     }
-    for old in _free_first(moved):
-        texts = renumbered(texts, old, moved[old])
-    return texts, moved
+    paths_of = {_path(old): _path(new) for old, new in moved.items()}
+    return {paths_of.get(path, path): text for path, text in texts.items()}, moved
 
 
 def _free_first(moved: dict[str, str]) -> list[str]:
@@ -154,29 +145,14 @@ def _existing(name: str, root: Path) -> list[str]:
     """Return the paths of what a lesson has besides its notebook."""
     answers = root / f'tests/answers/{name}.yaml'
     files = [answers] if answers.exists() else []
-    return [file.relative_to(root).as_posix() for file in [*files, *checks_of(name, root)]]
+    return [file.relative_to(root).as_posix() for file in [*files, *judges_of(name, root)]]
 
 
-def checks_of(name: str, root: Path) -> list[Path]:
-    """Return the files of a lesson's checks: a module, or those of a package."""
+def judges_of(name: str, root: Path) -> list[Path]:
+    """Return the files of a lesson's judges: a module, or those of a package."""
     folder = root / 'helpers/checks/lessons'
     module = folder / f'{name}.py'
     return [module] if module.exists() else sorted((folder / name).glob('*.py'))
-
-
-def to_look_at(texts: tables.Texts, numbers: set[str]) -> list[str]:
-    """Return the lines that call a lesson by one of these numbers: `path:line: text`."""
-    if not numbers:
-        return []
-    named = re.compile(
-        rf'(?:[Ll]essons? |LESSON=)(?:\d\d(?:,| and| or| to)* )*(?:{"|".join(sorted(numbers))})\b'
-    )
-    return [
-        f'{path}:{number}: {line.strip()[:100]}'
-        for path, text in sorted(texts.items())
-        for number, line in enumerate(text.splitlines(), 1)
-        if named.search(line)
-    ]
 
 
 def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
@@ -186,7 +162,7 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
     parser.add_argument('--remove', action='store_true', help='take the lesson out')
     options = parser.parse_args(arguments)
     try:
-        before = all_texts(root)
+        before = tables.texts_of(root)
         if options.remove:
             plan = plan_to_remove(options.name, root)
         else:
@@ -208,10 +184,6 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
             (root / path).parent.mkdir(parents=True, exist_ok=True)
             write(root / path, text)
             print(f'{path}: written')
-    old_numbers = {stem[:2] for stem in plan.moved}
-    old_numbers |= {Path(path).name[:2] for path in plan.removed if path.endswith('.ipynb')}
-    if lines := to_look_at(plan.texts, old_numbers):
-        print('Look at these lines, which name a lesson by its old number:', *lines, sep='\n')
     print(f'Now run `make notebooks LESSON={plan.run}`.')
     return 0
 
@@ -231,16 +203,15 @@ def _path(stem: str) -> str:
     return f'notebooks/{stem}.ipynb'
 
 
-def all_texts(root: Path) -> tables.Texts:
-    """Return all texts that git knows, but those of this tool, and all notebooks."""
+def _code(root: Path) -> tables.Texts:
+    """Return the texts of the code and the data that git knows, but those of this tool."""
     texts = {}
     for path in _git(root, 'ls-files', '-z').split('\0'):
-        if path and not path.startswith('tools/lessons/') and (root / path).is_file():
-            try:
-                texts[path] = (root / path).read_text(encoding='utf-8')
-            except UnicodeDecodeError:
-                continue
-    return texts | tables.texts_of(root)
+        is_code = Path(path).suffix in ('.py', '.yaml', '.sh', '.toml')
+        is_history = path == 'helpers/lesson/earlier.py' or path.startswith('tools/lessons/')
+        if is_code and not is_history and (root / path).is_file():
+            texts[path] = (root / path).read_text(encoding='utf-8')
+    return texts
 
 
 def _git(root: Path, *arguments: str) -> str:

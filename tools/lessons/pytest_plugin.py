@@ -14,9 +14,9 @@ import pytest
 from jupyter_client.manager import KernelManager
 
 from helpers.checks.progress import FILE_VARIABLE
+from helpers.lesson import chosen, chosen_tasks, outline
 from tools.lessons.answers import answered
 from tools.lessons.comparison import change_nbval
-from tools.lessons.lesson import chosen
 
 # No test reads or changes what the user of this checkout has solved. Kernels inherit it.
 os.environ[FILE_VARIABLE] = ''
@@ -32,6 +32,11 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         '--lesson', default='', help='only what tests these lessons, by number or name: "02 03"'
+    )
+    parser.addoption(
+        '--task',
+        default='',
+        help='of one lesson: only the answers of these tasks, by number or name',
     )
 
 
@@ -65,11 +70,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if not config.option.lesson:
         return
     try:
-        names = '|'.join(path.stem[3:] for path in chosen(config.option.lesson))
+        paths = chosen(config.option.lesson)
+        names = '|'.join(path.stem[3:] for path in paths)
+        wanted = rf'[/\[](\d\d_)?({names})(\.ipynb)?(::|\]|-)'
+        if config.option.task:
+            found = chosen_tasks(config.option.task, outline(paths[0]))
+            wanted = rf'\[{paths[0].stem[3:]}-({"|".join(task.name for task in found)})\]'
     except ValueError as error:
         raise pytest.UsageError(error) from None
-    of_lesson = re.compile(rf'[/\[](\d\d_)?({names})(\.ipynb)?(::|\]|-)')
-    kept = [item for item in items if of_lesson.search(item.nodeid)]
+    kept = [item for item in items if re.search(wanted, item.nodeid)]
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
     items[:] = kept
 

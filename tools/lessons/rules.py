@@ -14,17 +14,35 @@ from nbformat import NotebookNode
 
 from helpers.checks import questions
 from helpers.checks.verdict import KEY
+from helpers.lesson import (
+    FOLDED,
+    FOLDER,
+    GLOSSARY,
+    NOTE,
+    TAGS,
+    TASK,
+    Lesson,
+    Task,
+    bare_mentions,
+    called,
+    check_call,
+    code_of_solution,
+    has_heading,
+    is_question,
+    links_to_tasks,
+    name_of_solution,
+    names_of_memory,
+    starts_memory,
+    step_number,
+    tags,
+)
 from helpers.notebook import names_of
-from tools.lessons.code import given_away, guess_of, recalled
+from tools.lessons.code import given_away
 from tools.lessons.comparison import comment_markers, metadata_tags
-from tools.lessons.lesson import FOLDER, GLOSSARY, NOTE, Lesson, called, tags
 
 MAX_CODE_LINES = 24  # what a screen has room for
 PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 MIN_WORDS = 6  # of an alternative text
-TASK = ('exercise', 'check', 'solution')
-FOLDED = {'solution': '%%solution ', 'notes': NOTE}
-TAGS = {'predict', 'nbval-ignore-output', 'deck-break', *TASK, *FOLDED}
 REASON = '# Not compared: '
 THIS_MACHINE = {str(Path(__file__).resolve().parents[2]), str(Path.home()), sys.prefix} - {'/'}
 PATH = re.compile(
@@ -44,13 +62,9 @@ Rule = Callable[[Lesson], Iterator[str]]
 # What the rules look at
 
 
-def code_cells(lesson: Lesson) -> list[NotebookNode]:
-    return [cell for cell in lesson.notebook.cells if cell.cell_type == 'code']
-
-
 def prose(lesson: Lesson) -> str:
     """Return the Markdown of all cells, without fenced code."""
-    cells = (cell.source for cell in lesson.notebook.cells if cell.cell_type == 'markdown')
+    cells = (cell.source for cell in lesson.cells if cell.cell_type == 'markdown')
     return re.sub(r'^(```|~~~).*?^\1', '', '\n'.join(cells), flags=re.MULTILINE | re.DOTALL)
 
 
@@ -94,28 +108,11 @@ def alternative_texts(cell: NotebookNode) -> Iterator[str]:
         yield alt[1] if alt else ''
 
 
-def tasks(lesson: Lesson) -> dict[str, list[NotebookNode]]:
-    """Return the code cells of each task, up to its solution, by its heading."""
-    cells: dict[str, list[NotebookNode]] = {}
-    name, inside = '', False
-    for cell in lesson.notebook.cells:
-        heading = re.search(r'^### ✎ (Task \d.*)', cell.source, re.MULTILINE)
-        if heading and cell.cell_type == 'markdown':
-            name, inside = heading[1], True
-            cells[name] = []
-        if inside and cell.cell_type == 'code':
-            if 'solution' not in tags(cell) and any('solution' in tags(c) for c in cells[name]):
-                inside = False
-            else:
-                cells[name].append(cell)
-    return cells
-
-
 # Outputs
 
 
 def executed_in_order(lesson: Lesson) -> Iterator[str]:
-    for count, cell in enumerate(code_cells(lesson), 1):
+    for count, cell in enumerate(lesson.code_cells(), 1):
         if cell.execution_count != count:
             yield (
                 f'The cell {called(cell)} was run as number {cell.execution_count}, not {count}: '
@@ -124,7 +121,7 @@ def executed_in_order(lesson: Lesson) -> Iterator[str]:
 
 
 def prints_what_stays(lesson: Lesson) -> Iterator[str]:
-    for cell in code_cells(lesson):
+    for cell in lesson.code_cells():
         for output in cell.outputs:
             plain = output.get('data', {}).get('text/plain', '')
             if output.get('name') == 'stderr':
@@ -139,7 +136,7 @@ def prints_what_stays(lesson: Lesson) -> Iterator[str]:
 
 def compared(lesson: Lesson) -> Iterator[str]:
     """All outputs are compared, but for the tag nbval-ignore-output with its reason."""
-    for cell in code_cells(lesson):
+    for cell in lesson.code_cells():
         lines = [line.strip() for line in cell.source.splitlines()]
         comments = {line.lstrip('#').strip() for line in lines if line.startswith('#')}
         for marker in sorted(comments & set(comment_markers) | tags(cell) & set(metadata_tags)):
@@ -155,7 +152,7 @@ def compared(lesson: Lesson) -> Iterator[str]:
 def pictures_described(lesson: Lesson) -> Iterator[str]:
     """Every picture has a text of its own, for those who do not see it."""
     known: set[str] = set()
-    for cell in lesson.notebook.cells:
+    for cell in lesson.cells:
         for alt in alternative_texts(cell):
             if len(alt.split()) < MIN_WORDS:
                 yield (
@@ -172,7 +169,7 @@ def pictures_described(lesson: Lesson) -> Iterator[str]:
 
 
 def imports_from_apis(lesson: Lesson) -> Iterator[str]:
-    for cell in code_cells(lesson):
+    for cell in lesson.code_cells():
         if found := BEHIND_AN_API.search(cell.source):
             yield (
                 f'The cell {called(cell)} imports {found[1]}: a lesson imports from the API, '
@@ -189,7 +186,7 @@ def names_stay(lesson: Lesson) -> Iterator[str]:
     """A cell that is run again, after the last one, takes from others what it took before."""
     cells = [
         (called(cell), names_of(cell.source))
-        for cell in code_cells(lesson)
+        for cell in lesson.code_cells()
         if 'solution' not in tags(cell)
     ]
     for place, (reader, names) in enumerate(cells):
@@ -206,11 +203,11 @@ def names_stay(lesson: Lesson) -> Iterator[str]:
 def solutions_import_what_they_use(lesson: Lesson) -> Iterator[str]:
     """A cell that begins with a magic is one that ruff does not read."""
     known = {*dir(builtins), '__name__', 'get_ipython', 'display'}
-    for cell in code_cells(lesson):
+    for cell in lesson.code_cells():
         names = names_of(cell.source)
         known |= names.given | names.imported
-    for cell in code_cells(lesson):
-        _, _, source = cell.source.partition('\n')
+    for cell in lesson.code_cells():
+        source = code_of_solution(cell.source)
         if 'solution' in tags(cell) and not source.startswith('%%'):
             names = names_of(source)
             for name in sorted(names.taken - known):
@@ -219,14 +216,14 @@ def solutions_import_what_they_use(lesson: Lesson) -> Iterator[str]:
 
 def steps_begin_cells(lesson: Lesson) -> Iterator[str]:
     """The title of a step is the first line of its cell: there a slide begins."""
-    for cell in lesson.notebook.cells:
+    for cell in lesson.cells:
         if cell.cell_type == 'markdown' and (title := re.search(r'\n## (.*)', cell.source)):
             yield f'The step "{title[1]}" is inside a cell: let a cell of its own begin with it.'
 
 
 def tagged(lesson: Lesson) -> Iterator[str]:
     """JupyterLab shows the first line of a folded cell, and unfolds Markdown when it runs it."""
-    for cell in lesson.notebook.cells:
+    for cell in lesson.cells:
         name = f'The cell {called(cell)}'
         for tag in sorted(tags(cell) - TAGS):
             yield f'{name} has the unknown tag {tag!r}.'
@@ -248,7 +245,7 @@ def tagged(lesson: Lesson) -> Iterator[str]:
 
 
 def fits_a_screen(lesson: Lesson) -> Iterator[str]:
-    for cell in lesson.notebook.cells:
+    for cell in lesson.cells:
         lines = len(cell.source.splitlines())
         hidden = tags(cell) & FOLDED.keys()
         if cell.cell_type == 'code' and lines > MAX_CODE_LINES and not hidden:
@@ -272,7 +269,7 @@ def named(lesson: Lesson) -> Iterator[str]:
     except ValueError as error:
         yield str(error)
         return
-    if not lesson.notebook.cells[0].source.startswith(f'# {lesson.number} '):
+    if not lesson.cells[0].source.startswith(f'# {lesson.number} '):
         yield f'The title must begin with "# {lesson.number} ", as the file does.'
     if re.sub(r'[^a-z0-9]+', '_', words).strip('_') != lesson.name:
         yield f'The title {lesson.title!r} is not that of {lesson.file}.'
@@ -286,112 +283,138 @@ def links_lead_somewhere(lesson: Lesson) -> Iterator[str]:
             yield f'The link {target} leads nowhere.'
 
 
+def mentions_are_links(lesson: Lesson) -> Iterator[str]:
+    """A lesson or a task that a text calls by its number is a link: its number follows."""
+    anchors = {task.anchor for task in lesson.tasks}
+    for cell in lesson.cells:
+        source = cell.source if cell.cell_type != 'code' else _comments(cell.source)
+        for mention in bare_mentions(source):
+            yield (
+                f'The cell {called(cell)} says "{mention}", a number that no tool changes: write a '
+                'link, [lesson 05](05_keep_what_is_fresh.ipynb) or [task 3](#✎-Task-3:-A-driver), '
+                'or in code the name.'
+            )
+        for target in links_to_tasks(source):
+            if target not in anchors:
+                yield f'The link {target} leads to no task of this lesson.'
+
+
+def _comments(source: str) -> str:
+    return '\n'.join(line.partition('#')[2] for line in source.splitlines() if '#' in line)
+
+
 def guesses_are_compared(lesson: Lesson) -> Iterator[str]:
     """The class is asked the question with which the guess is compared: no two are the same."""
-    cells, asked = code_cells(lesson), set()
-    for count, cell in enumerate(cells, 1):
-        if 'predict' not in tags(cell):
-            continue
-        if (parts := guess_of(cell)) is None:
+    asked: set[str] = set()
+    known = {guess.cell.id for guess in lesson.guesses}
+    for cell in lesson.code_cells():
+        if 'predict' in tags(cell) and cell.id not in known:
             yield (
                 f'The cell {called(cell)} must end like this: '
                 "`my_guess = guess('How many are heard?', ...)`."
             )
-            continue
-        guess, question, answer = parts
-        if answer is not ...:
-            yield f'The cell {called(cell)} answers its question: write `...` for the student.'
-        if question in asked:
-            yield f'The cell {called(cell)} asks what another guess asks: {question!r}.'
-        asked.add(question)
-        compared = rf'compare_prediction\(\s*{re.escape(repr(question))},\s*{guess}\b'
-        if not any(re.search(compared, later.source) for later in cells[count:]):
-            yield f'No later cell has compare_prediction({question!r}, {guess}, ...).'
+    for guess in lesson.guesses:
+        if guess.value is not ...:
+            yield f'The cell {called(guess.cell)} answers its question: write `...` for a student.'
+        if guess.question in asked:
+            yield (
+                f'The cell {called(guess.cell)} asks what another guess asks: {guess.question!r}.'
+            )
+        asked.add(guess.question)
+        if lesson.comparison_of(guess) is None:
+            yield (
+                f'No later cell has compare_prediction({guess.question!r}, {guess.variable}, ...).'
+            )
 
 
 def answers_come_after_guesses(lesson: Lesson) -> Iterator[str]:
     """Between a question and its answer, no code and no heading says the answer: both are read."""
-    cells = lesson.notebook.cells
-    for place, cell in enumerate(cells):
-        if (parts := guess_of(cell)) is None:
-            continue
-        between: list[NotebookNode] = []
-        for later in cells[place + 1 :]:
-            between.append(later)
-            if later.cell_type == 'code' and f'({parts[1]!r},' in re.sub(
-                r'compare_prediction\(\s+', 'compare_prediction(', later.source
-            ):
-                break
-        else:
+    for guess in lesson.guesses:
+        compared = lesson.comparison_of(guess)
+        if compared is None:
             continue  # guesses_are_compared says it
-        said = re.search(r'^  The answer is (.+)\.$', '\n'.join(texts(later)), re.MULTILINE)
+        said = re.search(r'^  The answer is (.+)\.$', '\n'.join(texts(compared)), re.MULTILINE)
         answer = said[1] if said else ''
-        for other in between:
+        places = [place for place, c in enumerate(lesson.cells) if c is guess.cell or c is compared]
+        for other in lesson.cells[places[0] + 1 : places[-1] + 1]:
             if other.cell_type == 'code' and 'solution' not in tags(other):
-                for found in given_away(other.source, parts[1], answer):
+                for found in given_away(other.source, guess.question, answer):
                     yield (
-                        f'The cell {called(other)} gives the answer of {parts[1]!r} away before it '
-                        f'is guessed: {found}. Let the code compute it.'
+                        f'The cell {called(other)} gives the answer of {guess.question!r} away '
+                        f'before it is guessed: {found}. Let the code compute it.'
                     )
-            elif len(answer) > 3 and re.match(rf'#+ .*\b{re.escape(answer)}\b', other.source):
+            elif len(answer) > 3 and has_heading(other, rf'#+ .*\b{re.escape(answer)}\b'):
                 title = other.source.partition('\n')[0].lstrip('# ')
-                yield f'The heading {title!r} has the answer of {parts[1]!r}.'
+                yield f'The heading {title!r} has the answer of {guess.question!r}.'
 
 
 def asks_from_memory(lesson: Lesson) -> Iterator[str]:
     """The first two lessons have nothing to ask about; all others open with two questions."""
     if not lesson.is_lesson:
         return
-    cells = lesson.notebook.cells
-    sources = [cell.source for cell in cells]
-    place = next((i for i, text in enumerate(sources) if text.startswith('## From memory\n')), None)
-    step = next((i for i, text in enumerate(sources) if text.startswith('## 1. ')), len(cells))
+    cells = lesson.cells
+    place = next((i for i, cell in enumerate(cells) if starts_memory(cell)), None)
+    step = next((i for i, cell in enumerate(cells) if step_number(cell) == 1), len(cells))
     names = None
     if place is not None and place < step and place + 1 < len(cells):
-        names = recalled(sources[place + 1])
-    if names is None or len(names) != 2:
+        names = names_of_memory(cells[place + 1].source)
+    if names is None or len({*names}) != 2:
         if place is not None or lesson.number > '02':
             yield (
                 'Before step 1 the lesson needs a cell that begins with `## From memory`, and '
                 'below it one of code with two questions: `remember(one_name=..., other_name=...)`.'
             )
         return
-    for name in sorted(names - questions().keys()):
+    for name in sorted({*names} - questions().keys()):
         yield f'The question {name} is not in helpers/checks/questions.yaml.'
 
 
 def tasks_are_checked(lesson: Lesson) -> Iterator[str]:
     """The check finds the starter wanting and the solution right."""
-    inside = 0
-    for count, (name, cells) in enumerate(tasks(lesson).items(), 1):
-        if not re.match(rf'Task {count}( ★)?: \S', name):
+    inside, names = 0, set()
+    titles = [task.title for task in lesson.tasks]
+    for place, task in enumerate(lesson.tasks, 1):
+        said_by = f'"Task {task.number}"'
+        if task.number != place or not task.title:
             yield (
-                f'{name!r} must be called "### ✎ Task {count}: ...", or "Task {count} ★: ..." if '
+                f'{said_by} must be called "### ✎ Task {place}: ...", or "Task {place} ★: ..." if '
                 'it is beyond the core.'
             )
-        own = [cell for cell in cells if tags(cell) & set(TASK)]
-        inside += len(own)
-        kinds = ''.join(tag[0] for cell in own for tag in TASK if tag in tags(cell))
-        if not re.fullmatch('e+cs', kinds):
-            yield f'{name!r} needs cells with the tags {", ".join(TASK)}, in this order.'
+        if titles.count(task.title) > 1:
+            yield f'{said_by} has the title of another task, and links know it by its title.'
+        inside += len(task.cells)
+        if not _has_its_cells(lesson, task):
+            yield f'{said_by} needs cells with the tags {", ".join(TASK)}, in this order.'
             continue
-        *_, check, solution = own
-        if not re.fullmatch(rf'check\({count}(, [^\n]+)?\)', check.source):
-            yield f'{name!r}: its check must be one line, `check({count}, ...)`.'
-        if not solution.source.startswith(f'%%solution {count}\n'):
-            yield f'{name!r}: its solution must begin with `%%solution {count}`.'
+        [check], [solution] = task.checks, task.solutions
+        if check_call(check.source) is None or len(check.source.splitlines()) != 1:
+            yield f"{said_by}: its check must be one line, `check('its_name', ...)`."
+            continue
+        if task.name in names:
+            yield f'{said_by} is called {task.name}, as another task is.'
+        names.add(task.name)
+        if name_of_solution(solution.source) != task.name:
+            yield f'{said_by}: its solution must begin with `%%solution {task.name}`.'
         starters, solutions = verdicts(check), verdicts(solution)
         if [verdict['solved'] for verdict in starters] != [False]:
-            yield f'{name!r}: its check finds nothing missing in the starter.{said(starters)}'
+            yield f'{said_by}: its check finds nothing missing in the starter.{said(starters)}'
         if [verdict['solved'] for verdict in solutions] != [True]:
-            yield f'{name!r}: its solution does not pass its check.{said(solutions)}'
-    if sum(bool(tags(cell) & set(TASK)) for cell in lesson.notebook.cells) != inside:
+            yield f'{said_by}: its solution does not pass its check.{said(solutions)}'
+    if sum(bool(tags(cell) & set(TASK)) for cell in lesson.cells) != inside:
         yield 'A cell has the tag of a task, but is under no "### ✎ Task".'
 
 
+def _has_its_cells(lesson: Lesson, task: Task) -> bool:
+    """Return whether a task has starters, then one check, then one solution."""
+    ids = [cell.id for cell in task.cells]
+    in_order = [cell.id for cell in lesson.cells if cell.id in ids]
+    one_each = len(task.checks) == len(task.solutions) == 1
+    return bool(task.exercises) and one_each and in_order == ids
+
+
 def questions_have_one_right_answer(lesson: Lesson) -> Iterator[str]:
-    for cell in lesson.notebook.cells:
-        if cell.source.startswith('### Question ') and cell.source.count('**Right.**') != 1:
+    for cell in lesson.cells:
+        if is_question(cell) and cell.source.count('**Right.**') != 1:
             yield f'The cell {called(cell)}: a question needs exactly one right answer.'
 
 
@@ -408,6 +431,7 @@ RULES: list[Rule] = [
     fits_a_screen,
     named,
     links_lead_somewhere,
+    mentions_are_links,
     guesses_are_compared,
     answers_come_after_guesses,
     asks_from_memory,

@@ -1,17 +1,25 @@
 """Run lessons and save their outputs, and write what follows from the notebooks.
 
-    python -m tools.lessons.run                         all lessons
+    python -m tools.lessons.run                         all lessons whose code has changed
     python -m tools.lessons.run 02 set_parameters       some of them
+    python -m tools.lessons.run 02 --run yes            though only its text has changed
+    python -m tools.lessons.run 02 --run new            and save all outputs of this run
+    python -m tools.lessons.run --keep-outputs          run nothing: you vouch for the outputs
 
 Each notebook gets a fresh kernel of the interpreter that runs this tool, started as nbval starts
-it. What is saved is what this one run gave, pictures included. A picture kept from an earlier run
-would make smaller diffs, but it would also hide a change in `helpers`, and it could contradict
-the text beside it. To keep a diff small, run only the lessons that you changed.
+it. A cell keeps its saved outputs if nothing has changed that makes them: outputs.py says what that
+is, and how it is known. Of all others the new outputs are saved, and it is printed why. A lesson of
+which only text has changed is not run at all.
+
+`--keep-outputs` is for a change of code that changes no output, such as another name in all
+notebooks: the outputs stay as they are in the files, and count as made by the code of today. Nobody
+checks that here: `make test` does, but for replays and pictures.
 
 Before that, the tables and links of tools/lessons/tables.py are written, and all notebooks cleaned.
 Notebook 00, which shows the table of exercises, is run as well if that has changed.
 """
 
+import argparse
 import logging
 import os
 import subprocess
@@ -31,9 +39,9 @@ from nbclient.exceptions import CellExecutionError, CellTimeoutError, DeadKernel
 from nbformat import NotebookNode
 
 from helpers.checks.progress import FILE_VARIABLE
-from tools.lessons import tables
+from helpers.lesson import ROOT, START, Lesson, called, chosen
+from tools.lessons import outputs, tables
 from tools.lessons.clean import clean, text_of, write
-from tools.lessons.lesson import ROOT, START, Lesson, called, chosen
 from tools.lessons.rules import tasks_are_checked
 
 CELL_TIMEOUT_S = 100
@@ -117,41 +125,82 @@ def _client(notebook: NotebookNode, folder: Path, **hooks: Callable) -> Notebook
     return client
 
 
-def update(path: Path) -> bool:
-    """Execute and clean a notebook's file in place; return whether that changed it.
+def update(path: Path, run: str = '') -> tuple[bool, list[str]]:
+    """Execute and clean a notebook's file in place if its code has changed.
+
+    With `run` as `yes` it is executed in any case, and as `new` all its outputs are new. Returns
+    whether that changed the file, and sentences: what was not done, or which outputs are new.
 
     Raises RuntimeError as `execute` does, and if a check does not judge its starter and its
     solution as it should: the file is as it was before. Raises ValueError if it was saved
     meanwhile, and the file is as it was saved.
     """
     before = path.read_text(encoding='utf-8')
-    notebook = execute(nbformat.reads(before, as_version=4), path.parent)
+    notebook = nbformat.reads(before, as_version=4)
+    now = outputs.made_from(notebook, path.parent.parent)
+    old = outputs.saved(path, notebook, now)
+    if old and not run and outputs.is_made_from(old, now):
+        outputs.take_outputs(notebook, old)
+        notebook = clean(notebook)
+        sentences = ['only its text may have changed, so its outputs stay (RUN=yes runs it)']
+    else:
+        notebook = execute(notebook, path.parent)
+        if run == 'new':
+            sentences = ['all outputs are new, as you asked']
+        elif old:
+            sentences = [*outputs.keep(notebook, old, now)]
+        else:
+            sentences = ['all outputs are new: no earlier ones were saved by this tool']
+    outputs.stamp(notebook, now)
     if problems := [*tasks_are_checked(Lesson(path.name, notebook))]:
         raise RuntimeError(' '.join(problems))
     if path.read_text(encoding='utf-8') != before:
         raise ValueError(f'{path.name} was changed while it ran: save it, then run it again.')
+    return write(path, text_of(notebook), before), sentences
+
+
+def vouch(path: Path) -> bool:
+    """Let the outputs in a file count as made by the code of today; return whether it changed."""
+    before = path.read_text(encoding='utf-8')
+    notebook = clean(nbformat.reads(before, as_version=4))
+    outputs.stamp(notebook, outputs.made_from(notebook, path.parent.parent))
     return write(path, text_of(notebook), before)
 
 
+def options(arguments: list[str]) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog='python -m tools.lessons.run')
+    parser.add_argument('lessons', nargs='*', help='numbers or names; all, if none is given')
+    parser.add_argument('--run', choices=('yes', 'new'), default='')
+    parser.add_argument('--keep-outputs', action='store_true')
+    return parser.parse_args(arguments)
+
+
 def main(arguments: list[str], root: Path = ROOT) -> int:
+    asked = options(arguments)
     try:
-        paths = chosen(' '.join(arguments), root / 'notebooks')
+        paths = chosen(' '.join(asked.lessons), root / 'notebooks')
+        if asked.keep_outputs:
+            for path in paths:
+                print(f'{path.name}: {CHANGED if vouch(path) else "unchanged"}')
+            return 0
         texts = tables.texts_of(root)
         changed = tables.updated(texts)
         for name, text in changed.items():
             write(root / name, text)
             print(f'{name}: written from the notebooks')
         lessons = tables.lessons_of(texts | changed)
-        if tables.needs_run(lessons):
-            paths = sorted({*paths, *chosen(START, root / 'notebooks')})
-        for path in paths:
+        must_run = chosen(START, root / 'notebooks') if tables.needs_run(lessons) else []
+        for path in sorted({*paths, *must_run}):
+            run = asked.run or ('yes' if path in must_run else '')
             start = time.monotonic()
             try:
-                changed = update(path)
+                changed, sentences = update(path, run)
             except RuntimeError as error:
                 raise ValueError(f'{path.name}: {error} (the file is as it was)') from None
             seconds = time.monotonic() - start
             print(f'{path.name}: {seconds:.0f} s, {CHANGED if changed else "unchanged"}')
+            for sentence in sentences:
+                print(f'  {sentence}')
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1

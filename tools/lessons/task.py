@@ -1,44 +1,43 @@
-"""Add a task to a lesson. The tasks after it get new numbers.
+"""Add a task to a lesson. The tasks after it get new numbers, and keep their names.
 
-    python -m tools.lessons.task 01                 after the last task
-    python -m tools.lessons.task 01 --after 3       as task 4
+    python -m tools.lessons.task 01                                 after the last task
+    python -m tools.lessons.task 01 --after 3 --name count_them     as task 4, with this name
 
-The new task is complete and small: four cells, a check, and answers. What it is about is then
-yours to change. Headings, checks, solutions and answers of later tasks follow. Where a text calls
-a task by its number, that is printed: a person must look at these lines.
+The new task is complete and small: four cells, a judge, and answers. What it is about is then yours
+to change. Its name is for ever: by it progress, classes and grades know the task. Headings of later
+tasks follow, and all links to them.
 """
 
 import argparse
 import ast
 import re
 import sys
-from collections.abc import Collection
 from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
 
+from helpers.lesson import FOLDED, ROOT, Lesson, chosen, chosen_tasks, read
+from tools.lessons import tables
 from tools.lessons.clean import clean, text_of, write
-from tools.lessons.lesson import ROOT, Lesson, chosen, read, tags
-from tools.lessons.new import all_texts, checks_of
-from tools.lessons.rules import FOLDED
-from tools.lessons.tables import BLOCK, Texts
+from tools.lessons.new import judges_of
 
+NAME = 'find_the_largest'
 TEXT = (
-    '### ✎ Task {number} ★: Find the largest\n\n'
+    '### ✎ Task 0 ★: Find the largest\n\n'
     'Say exactly what the code must do: `largest(numbers)` returns the largest number of a list, '
     'and 0 for an empty list. A task beyond the core has a star. Without it, add its minutes to '
     'the note of the step and to the time of the opening.'
 )
 STARTER = """def largest(numbers):
     return 0  # Your code: the largest of the numbers."""
-SOLUTION = """%%solution {number}
+SOLUTION = """%%solution {name}
 def largest(numbers):
     return max(numbers, default=0)"""
-CHECK = """
+JUDGE = """
 
-@tasks.add({number})
-def find_the_largest(largest):
+@tasks.add
+def {name}(largest):
     def returns(right, *numbers):
         found = largest([*numbers])
         return found == right or f'for {{[*numbers]}} it returns {{found}}'
@@ -50,13 +49,13 @@ def find_the_largest(largest):
     ]
 """
 ANSWERS = """
-{number} wrong:
+{name} wrong:
 - 'max(numbers, default=0)': max(numbers)  # fails for an empty list
 - 'max(numbers, default=0)': min(numbers, default=0)  # the smallest
 - 'max(numbers, default=0)': numbers[-1] if numbers else 0  # the last one
 - 'max(numbers, default=0)': sum(numbers)  # all together
 - 'return max(numbers, default=0)': print(max(numbers, default=0))  # shows it, and returns None
-{number} right:
+{name} right:
 - 'max(numbers, default=0)': sorted(numbers)[-1] if numbers else 0
 - 'max(numbers, default=0)': max([0, *numbers])
 - 'return max(numbers, default=0)': |-
@@ -66,166 +65,104 @@ ANSWERS = """
     return found
 """
 CELLS = (('markdown', '', TEXT), ('code', 'exercise', STARTER),
-         ('code', 'check', 'check({number}, largest)'), ('code', 'solution', SOLUTION))  # fmt: skip
-# How a text calls tasks, but for their own headings: `task 3`, `tasks 9 and 10`, `TASKS="9 10"`.
-CALLED = re.compile(r'(?<!✎ )\b(?:[Tt]asks? |TASKS?="?)([\d, andto]+)')
+         ('code', 'check', "check('{name}', largest)"), ('code', 'solution', SOLUTION))  # fmt: skip
 
 
-def new_cells(number: int) -> list[NotebookNode]:
+def new_cells(name: str) -> list[NotebookNode]:
     cells = []
     for kind, tag, text in CELLS:
         metadata = {'tags': [tag]} if tag else {}
         if tag in FOLDED:
             metadata['jupyter'] = {'source_hidden': True}
         make = getattr(nbformat.v4, f'new_{kind}_cell')
-        cells.append(make(text.replace('{number}', f'{number}'), metadata=metadata))
+        cells.append(make(text.replace('{name}', name), metadata=metadata))
     return cells
 
 
-def grown(before: str, text: str, number: int, after: str = r'\b') -> str:
-    """Add one to each number from `number` on, at the start of a line, between two patterns."""
-
-    def write_number(found: re.Match) -> str:
-        old = int(found[2])
-        return f'{found[1]}{old + (old >= number)}'
-
-    return re.sub(rf'^({before})(\d+)(?={after})', write_number, text, flags=re.MULTILINE)
+def with_cells(lesson: Lesson, name: str, before: str) -> str:
+    """Return the text of the notebook with the new task below that with the name `before`."""
+    [task] = [task for task in lesson.tasks if task.name == before]
+    place = next(i for i, cell in enumerate(lesson.cells, 1) if cell is task.solutions[-1])
+    lesson.cells[place:place] = new_cells(name)
+    return text_of(clean(lesson.notebook))
 
 
-def notebook_with(notebook: NotebookNode, number: int) -> NotebookNode:
-    """Return the notebook with the new task, whose later tasks have new numbers."""
-    place = 0
-    for index, cell in enumerate(notebook.cells):
-        if 'solution' in tags(cell) and re.match(rf'%%solution {number - 1}\b', cell.source):
-            place = index + 1
-        if cell.cell_type == 'markdown':
-            cell.source = grown('### ✎ Task ', cell.source, number)
-        elif 'check' in tags(cell):
-            cell.source = grown(r'check\(', cell.source, number)
-        elif 'solution' in tags(cell):
-            cell.source = grown('%%solution ', cell.source, number)
-    notebook.cells[place:place] = new_cells(number)
-    return clean(notebook)
+def with_judge(source: str, name: str, before: str) -> str:
+    """Return a module of judges with that of the new task below that of the one before it.
 
-
-def checks_with(source: str, number: int) -> str:
-    """Return a module of checks, with one of the new task if it has that of the task before."""
-    source = grown(r'@tasks\.add\(', source, number)
+    Raises ValueError if the module has no function with the name `before`.
+    """
+    ends = [
+        node.end_lineno
+        for node in ast.parse(source).body
+        if isinstance(node, ast.FunctionDef) and node.name == before
+    ]
+    if not ends:
+        raise ValueError(
+            f'The judge of {before} is no function of its own: write the new task by hand, as '
+            'CONTRIBUTING.md says.'
+        )
     lines = source.splitlines(keepends=True)
-    if (end := ends_of_checks(source).get(number - 1)) is not None:
-        lines.insert(end, CHECK.format(number=number))
+    lines.insert(ends[0], JUDGE.format(name=name))
     return ''.join(lines)
 
 
-def ends_of_checks(source: str) -> dict[int, int]:
-    """Return the last line of the function of each task, where `@tasks.add(2)` stands above it."""
-    ends = {}
-    for node in ast.parse(source).body:
-        for decorator in getattr(node, 'decorator_list', []):
-            if found := re.match(r'tasks\.add\((\d+)', ast.unparse(decorator)):
-                ends[int(found[1])] = node.end_lineno
-    return ends
+def _judges_with(lesson: str, task: str, root: Path) -> Path:
+    """Return the file that has the judge of a task: a lesson of many tasks has several."""
+    files = judges_of(lesson, root)
+    having = [file for file in files if f'def {task}(' in file.read_text(encoding='utf-8')]
+    return (having or files)[0]
 
 
-def answers_with(text: str, number: int) -> str:
-    """Return the answers with those of the new task after those of the one before it."""
-    text = grown('["\']?', text, number, after=' (?:wrong|right)')
-    new = ANSWERS.format(number=number).lstrip('\n')
-    later = re.search(rf'^["\']?{number + 1} (?:wrong|right)', text, re.MULTILINE)
-    if later is None:
-        return f'{text.rstrip()}\n{new}'
-    return text[: later.start()] + new + text[later.start() :]
+def plan(lesson: str, after: str, name: str, root: Path) -> tuple[tables.Texts, str, int]:
+    """Return the new texts of files, by their paths, the file of the notebook, and the number.
 
-
-def plan(lesson: str, after: str, root: Path) -> tuple[dict[Path, str], int, int]:
-    """Return the new texts of the lesson's files, the task's number, and that of the last one.
-
-    The first of them is the notebook. Raises ValueError with one sentence if there is no such
-    lesson or task, or if its checks are written in another way.
+    Raises ValueError with one sentence if there is no such lesson or task, if a task has the name,
+    or if the judges are written in another way.
     """
+    name = name or NAME
+    if not re.fullmatch(r'[a-z]+(_[a-z0-9]+)+', name):
+        raise ValueError('Name the task in small letters, with _ between the words: NAME=' + NAME)
     path = chosen(lesson, root / 'notebooks')[0]
-    found = Lesson(path.name, nbformat.read(path, as_version=4))
-    last = len(found.tasks)
-    if not last:
+    notebook = str(path.relative_to(root))
+    texts = tables.texts_of(root)
+    found = read(texts[notebook], path.name)
+    if not found.tasks:
         raise ValueError(f'{path.name} has no task yet: CONTRIBUTING.md says how to write one.')
-    if after and not (after.isdecimal() and 1 <= int(after) <= last):
-        raise ValueError(f'{path.name} has the tasks 1 to {last}: name one of them with AFTER.')
-    number = int(after or last) + 1
-    checks = {file: file.read_text(encoding='utf-8') for file in checks_of(found.name, root)}
-    answers = root / f'tests/answers/{found.name}.yaml'
-    if {task for text in checks.values() for task in ends_of_checks(text)} != {*range(1, last + 1)}:
-        raise ValueError(
-            f'helpers/checks/lessons/{found.name} has no @tasks.add(...) above a function for each '
-            f'of the tasks 1 to {last}: write the new task by hand, as CONTRIBUTING.md says.'
-        )
-    texts = {
-        path: text_of(notebook_with(found.notebook, number)),
-        **{file: checks_with(text, number) for file, text in checks.items()},
-        answers: answers_with(answers.read_text(encoding='utf-8'), number),
+    if name in (task.name for task in found.tasks):
+        raise ValueError(f'{path.name} has a task {name} already: choose another NAME.')
+    before = chosen_tasks(after, found)[0] if after else found.tasks[-1]
+    judges = _judges_with(found.name, before.name, root)
+    source = judges.read_text(encoding='utf-8')
+    answers = f'tests/answers/{found.name}.yaml'
+    changed = {
+        notebook: with_cells(found, name, before.name),
+        str(judges.relative_to(root)): with_judge(source, name, before.name),
+        answers: (root / answers).read_text(encoding='utf-8').rstrip() + ANSWERS.format(name=name),
     }
-    return texts, number, last + 1
-
-
-def to_look_at(texts: Texts, own: Collection[str], stem: str, number: int) -> list[str]:
-    """Return the lines that may call a task of a lesson by its old number.
-
-    `stem` is the lesson's, such as 02_lose_messages, and `own` are the paths of its files. In those
-    of others a task counts if the lesson is named near it.
-    """
-    two_digits, name = stem[:2], stem[3:]
-    # `lessons 01 and 02`, `LESSON=02`, `[02 Lose messages](...)`, `| 02, step 3 |`, `02 task 3`.
-    lesson = re.compile(
-        rf'(?:[Ll]essons? (?:\d\d(?:,| and| or| to)* )*|LESSON="?|[|[] ?){two_digits}\b'
-        rf'|\b{two_digits},? task|{name}'
-    )
-    lines = []
-    for path, text in sorted(texts.items()):
-        for place, part in parts_of(path, text):
-            if path not in own and not lesson.search(part):
-                continue
-            for line in part.splitlines():
-                tasks = re.findall(r'\d+', ' '.join(CALLED.findall(line)))
-                if any(int(task) >= number for task in tasks):
-                    lines.append(f'{place}: {line.strip()}')
-    return lines
-
-
-def parts_of(path: str, text: str) -> list[tuple[str, str]]:
-    """Return where each cell of a notebook, section of a document or other line is, and its text.
-
-    What is written anew is left out: the outputs of notebooks, and the tables of documents.
-    """
-    if path.endswith('.ipynb'):
-        cells = read(text, Path(path).name).notebook.cells
-        return [(f'{path}#cell-id={cell.id}', cell.source) for cell in cells]
-    if path.endswith('.md'):
-        return [(path, part) for part in re.split('^(?=#)', BLOCK.sub('', text), flags=re.M)]
-    return [(path, line) for line in text.splitlines()]
+    texts |= {notebook: changed[notebook]}
+    return changed | tables.updated(texts), notebook, before.number + 1
 
 
 def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
     parser = argparse.ArgumentParser(description='Add a task to a lesson.')
     parser.add_argument('lesson', help='its number or name, such as 01')
     parser.add_argument('--after', default='', metavar='TASK', help='the task before it')
+    parser.add_argument('--name', default='', help=f'such as {NAME}: the task keeps it for ever')
     options = parser.parse_args(arguments)
     try:
         if not options.lesson:
-            raise ValueError('Name the lesson: make task LESSON=01 AFTER=3')
-        texts, number, last = plan(options.lesson, options.after, root)
-        lines = []
-        if number < last:
-            own = {str(path.relative_to(root)): text for path, text in texts.items()}
-            lines = to_look_at(all_texts(root) | own, own, next(iter(texts)).stem, number)
+            raise ValueError('Name the lesson: make task LESSON=01 AFTER=3 NAME=count_them')
+        texts, notebook, number = plan(options.lesson, options.after, options.name, root)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1
     for path, text in texts.items():
-        write(path, text)
-        print(f'{path.relative_to(root)}: task {number} is in it')
-    if lines:
-        print('Look at these lines, which may name a task by its old number:', *lines, sep='\n')
+        write(root / path, text)
+        print(f'{path}: written')
     print(
-        'In JupyterLab: File > Reload Notebook from Disk. Change the task in the three files. '
+        f'Task {number} of {notebook} is new. In JupyterLab: File > Reload Notebook from Disk. '
+        'Change the task in its notebook, its judge and its answers. '
         f'Then: make test-answers LESSON={options.lesson} TASK={number}'
     )
     return 0

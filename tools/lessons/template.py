@@ -3,19 +3,20 @@
 from std_msgs.msg import Int32
 
 from helpers.checks.bench import Bench
+from helpers.checks.points import expect
 from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
 check = tasks.check
 
 
-@tasks.add(1)
+@tasks.add
 def hear_the_numbers(Listener):
     def keeps(*numbers):
         with Bench() as bench:
             listener = bench.spin(Listener())
             bench.say('number', *(Int32(data=number) for number in numbers))
-        return listener.heard == [*numbers] or f'of {[*numbers]} it kept {listener.heard}'
+        return expect(listener.heard, [*numbers], f'of {[*numbers]} it kept')
 
     hint = 'A list has .append(...), and an Int32 has .data.'
     return [

@@ -14,9 +14,7 @@ from pathlib import Path
 import nbformat
 from sphinx.cmd.build import build_main
 
-from helpers.notebook import LOOK_CSS
-from helpers.replay import level
-from tools.lessons.lesson import (
+from helpers.lesson import (
     FOLDER,
     GLOSSARY,
     PARTS,
@@ -26,6 +24,8 @@ from tools.lessons.lesson import (
     Lesson,
     lessons,
 )
+from helpers.notebook import LOOK_CSS
+from helpers.replay import level
 from tools.site import free_drive
 from tools.site.page import PLAY_AGAIN, page_of
 
@@ -56,7 +56,7 @@ def prepare(pages: Path) -> None:
     """Write what Sphinx reads into a folder. Raises ValueError for a lesson that was not run."""
     known = lessons()
     for lesson in known:
-        if any(c.cell_type == 'code' and not c.execution_count for c in lesson.notebook.cells):
+        if any(c.cell_type == 'code' and not c.execution_count for c in lesson.cells):
             raise ValueError(
                 f'{lesson.file} has not been run: `make notebooks LESSON={lesson.number}`.'
             )
@@ -67,7 +67,7 @@ def prepare(pages: Path) -> None:
         folder.mkdir(parents=True)
     for lesson in known:
         shutil.copy(FOLDER / lesson.file, downloads)
-        page = page_of(lesson.notebook, lesson.file, figures)
+        page = page_of(lesson, figures)
         nbformat.write(page, notebooks / lesson.file)
     shutil.copytree(FOLDER / PICTURES, notebooks / PICTURES)
     for name in DOCUMENTS:

@@ -5,6 +5,7 @@ from pathlib import Path
 from helpers import robot
 from helpers.replay import attribute, source, style
 from helpers.robot import ROOMS
+from helpers.robot_view import DRIVE_CSS, floor_in_words, floor_picture
 
 SCRIPT = Path(__file__).with_suffix('.js')
 
@@ -23,10 +24,10 @@ def record() -> dict:
 
 
 def html() -> str:
-    words = robot.floor_in_words(ROOMS)
-    svg = robot.floor_picture(ROOMS, [ROOMS.start[:2]], ROOMS.start)
+    words = floor_in_words(ROOMS)
+    svg = floor_picture(ROOMS, [ROOMS.start[:2]], ROOMS.start)
     return (
-        f'<div class="replay free-drive" data-drive={attribute(record())}>{style(robot.DRIVE_CSS)}'
+        f'<div class="replay free-drive" data-drive={attribute(record())}>{style(DRIVE_CSS)}'
         '<p class="drive-hello">Come to A, B and C without a bump.</p>'
         f'<div class="replay-floor" role="img" aria-label="{words}">{svg}</div>'
         f'<script>(() => {{\n{source("element.js")}{SCRIPT.read_text("utf-8")}'

@@ -19,8 +19,16 @@ from nbformat import NotebookNode
 from PIL import Image
 
 from helpers.checks import questions
-from tools.lessons.code import guess_of
-from tools.lessons.lesson import tags
+from helpers.lesson import (
+    Lesson,
+    beside_time,
+    code_of_solution,
+    compares,
+    guess_of,
+    names_of_memory,
+    tags,
+    with_slugs,
+)
 
 IMPORTS = ast.Import, ast.ImportFrom
 FOLDED_IMPORTS = 3  # and more of them in a cell are folded
@@ -29,12 +37,9 @@ SCRIPT = re.compile(r'<script>(?P<text>\(\(\).*?)</script>', re.DOTALL)
 STYLE = re.compile(r'<style>(?P<text>.*?)</style>', re.DOTALL)
 FIRST_PICTURE = 'first-picture'  # the cell of a lesson that has it
 AT_START = '<div class="replay" ', '<div class="replay" data-opens="start" '  # see view.js
-TIME = re.compile(r'^(\*\*Time\*\*.*)(?:\n\n(Steps and tasks with ★.*)\.)?$', re.MULTILINE)
-REMEMBERED = re.compile(r'(\w+)=\.\.\.')
 SHOW_ANSWER = 'I have guessed: show the answer'
 # A paragraph, and none that leads to the next cell.
 EXPLAINS = re.compile(r'(?!#)(?!.*:$)', re.MULTILINE)
-SOLUTION = re.compile(r'^%%solution .*\n')
 # A first picture plays once when it is loaded: so it is loaded anew when it comes into view later.
 PLAY_AGAIN = """<p class="again"><button type="button">▶ Play again</button></p>
 <script>
@@ -52,12 +57,14 @@ PLAY_AGAIN = """<p class="again"><button type="button">▶ Play again</button></
 </script>"""
 
 
-def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
+def page_of(lesson: Lesson, figures: Path) -> NotebookNode:
     """Return a notebook as myst-nb shall read it, and write its figures into a folder."""
-    notebook, cells = deepcopy(notebook), []
+    notebook, cells = deepcopy(lesson.notebook), []
     for cell in _with_answers_hidden(notebook.cells):
         if cell.cell_type == 'raw':  # a note for the instructor
             continue
+        if cell.cell_type == 'markdown':
+            cell.source = with_slugs(cell.source)
         if cell.id == FIRST_PICTURE:
             cell.source += f'\n\n{PLAY_AGAIN}'
         if cell.cell_type == 'code':
@@ -67,10 +74,10 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
                 if 'text/html' in data:
                     data['text/html'] = _with_files(data['text/html'], figures)
         cells.append(cell)
-        if cell.cell_type == 'code' and 'remember(' in cell.source:
+        if cell.cell_type == 'code' and (names := names_of_memory(cell.source)):
             cell.outputs = []
-            cells.append(_quiz_of(cell))
-    cells[0].source = _with_download(cells[0].source, file)
+            cells.append(_quiz_of(cell, names))
+    cells[0].source = _with_download(cells[0].source, lesson.file)
     notebook.cells = cells
     notebook.metadata['language_info'] = {'name': 'python', 'pygments_lexer': 'cell'}
     return notebook
@@ -79,10 +86,8 @@ def page_of(notebook: NotebookNode, file: str, figures: Path) -> NotebookNode:
 def _with_download(opening: str, file: str) -> str:
     """Return the first cell with a link to the lesson as it is, on one line with its time."""
     link = f'<a href="{file}" download>Download the notebook</a>'
-    if not TIME.search(opening):
-        return f'{opening}\n\n<span class="lesson-file">{link}</span>'
-    link = f'<span class="lesson-file"> · {link}</span>'
-    return TIME.sub(lambda found: ' · '.join(filter(None, found.groups())) + link, opening)
+    beside = beside_time(opening, f'<span class="lesson-file"> · {link}</span>')
+    return beside or f'{opening}\n\n<span class="lesson-file">{link}</span>'
 
 
 def is_widget(output: NotebookNode) -> bool:
@@ -105,7 +110,7 @@ def _fold(cell: NotebookNode) -> None:
     if kind:
         cell.metadata['tags'] = ['hide-cell', kind]
         # It runs in JupyterLab. Here it would hide what the code below it is.
-        cell.source = SOLUTION.sub('', cell.source)
+        cell.source = code_of_solution(cell.source)
     elif _is_plumbing(cell):
         kind = 'imports'
         cell.metadata['tags'] = ['hide-input', kind]
@@ -122,31 +127,31 @@ def _with_answers_hidden(cells: list[NotebookNode]) -> list[NotebookNode]:
 
     Replays are open, at their start: one plays them, and sees.
     """
-    question, kept = '', []
+    guess, kept = None, []
     for cell in cells:
         after_answer = kept and 'answer' in tags(kept[-1])
         kept.append(cell)
-        if parts := guess_of(cell):
-            question = parts[1]
+        if asked := guess_of(cell):
+            guess = asked
         elif after_answer and cell.cell_type == 'markdown' and EXPLAINS.match(cell.source):
             cell.source = f'{{.explains}}\n{cell.source}'
-        elif cell.cell_type == 'code' and question:
+        elif cell.cell_type == 'code' and guess:
             for output in cell.outputs:
                 if is_replay(output):
                     output.data['text/html'] = output.data['text/html'].replace(*AT_START)
-            if repr(question) not in cell.source:
+            if not compares(cell, guess):
                 continue
-            question = ''
+            guess = None
             # One that moves from run to run is not saved: see compare_prediction.
             if any('The answer is' in output.get('text', '') for output in cell.outputs):
                 kept.append(_answer_of(cell))
     return kept
 
 
-def _quiz_of(cell: NotebookNode) -> NotebookNode:
+def _quiz_of(cell: NotebookNode, names: list[str]) -> NotebookNode:
     """Return the questions that a cell asks from memory as a quiz, which needs no kernel."""
     parts = []
-    for name in REMEMBERED.findall(cell.source):
+    for name in names:
         question = questions()[name]
         parts += [question.question, '']
         for letter, option in question.options.items():

@@ -13,7 +13,7 @@ import pytest
 from classroom.tests.support.containers import IMAGE, LIMITS
 from classroom.tests.support.hubs import free_ports
 from helpers.checks.verdict import KEY
-from tools.lessons.lesson import tags
+from helpers.lesson import tags
 
 # One that compiles, for the class in containers runs others.
 LESSON = 'use_a_message_in_your_own_interface'

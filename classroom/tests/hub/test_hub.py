@@ -25,7 +25,7 @@ from classroom.tests.support.hubs import (
     run_lessons,
     talk,
 )
-from tools.lessons.lesson import read
+from helpers.lesson import read
 
 pytestmark = needs_hub
 # The accounts are folders, and all run as the user of this test.

@@ -19,7 +19,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_
 from support.students import LESSON
 from support.waits import LIMIT_S, wait_for
 
-from tools.lessons.lesson import ROOT
+from helpers.lesson import ROOT
 
 NAME = 'lose_messages'
 QUESTION = 'How many are heard?'
@@ -28,6 +28,7 @@ OTHER = 'Which ones?'
 STARTED = r"join_class\('(.*)', '(.*)'\)[\s\S]*?(http://localhost:(\d+)/\w+/)[\s\S]*Ctrl\+C"
 STEP, LATER = 'step-1', 'step-2'  # ids of cells
 PREDICT = {'tags': ['predict']}
+TASK = 'try_it'
 WEB = requests.Session()
 WEB.trust_env = False  # no proxy
 
@@ -52,6 +53,7 @@ def write_lesson(root: Path) -> None:
         new_code_cell(f'compare_prediction({QUESTION!r}, my_guess, 14)', id=LATER),
         new_code_cell('this is no Python', id='broken', metadata=PREDICT),
         new_markdown_cell('### ✎ Task 1: Try', id='task'),
+        new_code_cell(f'check({TASK!r}, mine)', id='check', metadata={'tags': ['check']}),
     ]
     (root / 'notebooks').mkdir(parents=True, exist_ok=True)
     nbformat.write(new_notebook(cells=cells), root / 'notebooks' / LESSON)

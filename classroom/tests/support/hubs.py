@@ -28,7 +28,7 @@ from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HT
 from tornado.websocket import websocket_connect
 
 from classroom.class_page.lessons import Known
-from tools.lessons.lesson import read
+from helpers.lesson import read
 
 ROOT = Path(__file__).resolve().parents[3]
 STUDENTS = [f'student{number:02}' for number in range(1, 13)]

@@ -4,8 +4,9 @@ import math
 import re
 
 from helpers.checks.builds import builds
+from helpers.checks.points import cached
 from helpers.checks.programs import manifest, needed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 from helpers.trials import imports
 from helpers.workspace import error_in, run_rosdep
 
@@ -76,7 +77,9 @@ def name_the_dependencies(workspace):
 
 @tasks.add
 def write_the_rules(workspace, rules):
-    resolved = cached(lambda: resolve(workspace, rules, 'ubuntu:noble', 'opensuse:15.5', 'fedora:40'))
+    resolved = cached(
+        lambda: resolve(workspace, rules, 'ubuntu:noble', 'opensuse:15.5', 'fedora:40')
+    )
 
     def resolves(system, *wanted):
         lines = resolved()[system]
@@ -322,7 +325,7 @@ main()'
 
 
 def resolve(workspace, rules, *systems):
-    """Return what rosdep says of the two keys of task 3 on each system, as lines."""
+    """Return what rosdep says of the two keys of `write_the_rules` on each system, as lines."""
     resolve_keys = 'rosdep resolve python3-numpy python3-yaml'
     commands = '; echo -----; '.join(f'{resolve_keys} --os={system}' for system in systems)
     parts = run_rosdep(workspace, rules, commands).split('-----\n')

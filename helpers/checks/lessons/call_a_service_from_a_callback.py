@@ -13,7 +13,8 @@ from std_srvs.srv import Trigger
 
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.ros import ros_session
 from helpers.trials import Camera, scan
 

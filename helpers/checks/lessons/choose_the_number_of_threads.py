@@ -11,6 +11,7 @@ from rclpy.node import Node
 from std_msgs.msg import Int32
 
 from helpers.checks.bench import Bench, must_define, must_have
+from helpers.checks.points import all_of, expect, rows
 from helpers.checks.tasks import Tasks
 from helpers.recording import explain, predict
 from helpers.ros import ros_session
@@ -46,9 +47,9 @@ def a_gate(GatedSubscriber):
             return f'depth {depth} and its group were asked for, but not passed on'
         if bool(handlers) == (events is QUIET):
             return 'event_callbacks=events is not passed on'
-        if len(ended) < messages:
-            return f'of {messages} messages {len(ended)} were received after the gate was opened'
-        return held == messages or 'a callback ended before the gate was opened'
+        if held < messages:
+            return f'{messages - held} of {messages} callbacks ended before the gate was opened'
+        return expect(len(ended), messages, 'messages received after the gate was opened:')
 
     wait = 'self.gate.wait(timeout=60) in the callback.'
     call = 'create_subscription(type, topic, callback, depth, callback_group=, event_callbacks=)'
@@ -72,40 +73,36 @@ def the_law(heard_after_burst):
     def law_holds(threads, group, in_flight, depth, more):
         answer = heard_after_burst(in_flight, depth, more)
         heard = hear_burst(threads, group(), in_flight, depth, more)
-        case = f'in flight {in_flight}, depth {depth}, {more} more'
-        return answer == heard or f'{case}: {heard} were received, and your function says {answer}'
+        case = f'in flight {in_flight}, depth {depth}, {more} more: {heard} were received'
+        return expect(answer, heard, f'{case}, and your function returns')
 
     hint = 'The queue keeps at most depth messages, and not more than come.'
     exclusive, reentrant = MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-    return [
-        ('8 threads, reentrant, depth 10', lambda: law_holds(8, reentrant, 8, 10, 50), hint),
-        ('8 threads, reentrant, few more', lambda: law_holds(8, reentrant, 8, 10, 5), hint),
-        ('8 threads, exclusive, depth 20', lambda: law_holds(8, exclusive, 1, 20, 50), hint),
-        ('single-threaded, depth 3', lambda: law_holds(1, reentrant, 1, 3, 20), hint),
-    ]
+    return rows(
+        law_holds,
+        hint,
+        ('8 threads, reentrant, depth 10', 8, reentrant, 8, 10, 50),
+        ('8 threads, reentrant, few more', 8, reentrant, 8, 10, 5),
+        ('8 threads, exclusive, depth 20', 8, exclusive, 1, 20, 50),
+        ('single-threaded, depth 3', 1, reentrant, 1, 3, 20),
+    )
 
 
 def hear_burst(threads, group, in_flight, depth, more):
     """Fill the threads, publish `more` messages, open the gate. Return how many were received."""
-    gate, heard = threading.Event(), []
-
-    def hold(message):
-        heard.append(message.data)
-        gate.wait(timeout=30)
-
     with Bench() as bench:
-        node = Node('gated_subscriber')
+        node, gate = Node('gated_subscriber'), bench.gate()
         options = {'callback_group': group, 'event_callbacks': QUIET}
-        node.create_subscription(Int32, 'number', hold, depth, **options)
+        node.create_subscription(Int32, 'number', gate.hold, depth, **options)
         bench.spin(node, threads=threads)
         for number in range(in_flight):
             bench.say('number', Int32(data=number), at_once=True)
-            bench.wait(lambda number=number: len(heard) == number + 1)
+            gate.wait_until_entered(number + 1)
         if more:
             bench.say('number', *numbers(more), at_once=True)
-        gate.set()
+        gate.open()
         bench.quiet()
-    return len(heard)
+    return len(gate.entered)
 
 
 @tasks.add
@@ -122,7 +119,7 @@ def deep_enough_for_a_burst(depth_for_burst):
             return hear_burst(threads, ReentrantCallbackGroup(), in_flight, depth, more)
 
         if (count := heard(depth)) < messages:
-            return f'{case}: {count} were received'
+            return f'{case}: {count} of {messages} were received'
         return depth == 1 or heard(depth - 1) < messages or f'{case}, but {depth - 1} would do'
 
     hint = 'A message that a thread takes at once needs no place.'
@@ -141,17 +138,17 @@ def publish_numbers(NumberPublisher):
             heard = bench.hear('number', Int32)
             node = bench.spin(NumberPublisher(messages, period_s))
             must_have(node, 'publisher')
-            if node.publisher.topic_name != '/number':
-                return f'it publishes on {node.publisher.topic_name}'
+            topic = node.publisher.topic_name
+            if topic != '/number':
+                return f'it publishes on {topic}, not on /number'
             periods = [timer.timer_period_ns / 1e9 for timer in node.timers]
             bench.wait(lambda: len(heard) >= messages)
             bench.wait(lambda: len(heard) > messages, 6 * period_s)
         found = [message.data for message in heard]
-        if found[:messages] != [*range(messages)]:
-            return f'of {messages} messages these were received: {found[:messages]}'
-        if len(found) > messages:
-            return f'more than {messages} messages were published'
-        return periods in ([], [period_s]) or f'the period is {periods[0]} s, not {period_s}'
+        return all_of(
+            expect(found, [*range(messages)], 'it published'),
+            periods == [] or expect(periods, [period_s], 'the periods (s) of its timers are'),
+        )
 
     hint = 'Count in self.count; self.timer.cancel() stops the timer.'
     return [
@@ -164,27 +161,21 @@ def publish_numbers(NumberPublisher):
 def work_at_once(WorkingSubscriber, DEPTH):
     def works_at_once(threads, messages):
         must_define(WorkingSubscriber, '__init__')
-        gate, inside = threading.Event(), []
-
-        def work():
-            inside.append(1)
-            gate.wait(timeout=30)
-
         with Bench() as bench:
-            node = WorkingSubscriber(work)
+            gate = bench.gate()
+            node = WorkingSubscriber(lambda: gate.hold())  # not with a message
             must_have(node, 'subscription')
             depth = node.subscription.qos_profile.depth
             handlers = len(node.subscription.event_handlers)
             bench.spin(node, threads=threads)
             bench.say('number', *numbers(messages), qos=20, at_once=True)
             bench.quiet()
-            at_once = len(inside)
-            gate.set()
-        if depth != DEPTH or handlers:
-            return f'its depth is {depth}, and it has {handlers} event handlers'
-        wanted = min(threads, messages)
-        text = f'with {threads} threads, {at_once} worked at once, not {wanted}'
-        return at_once == wanted or text
+            at_once = len(gate.entered)
+        return all_of(
+            expect(depth, DEPTH, 'its depth is'),
+            expect(handlers, 0, 'the number of its event handlers is'),
+            expect(at_once, min(threads, messages), f'with {threads} threads, at work at once:'),
+        )
 
     hint = 'callback_group=ReentrantCallbackGroup(), event_callbacks=QUIET'
     return [
@@ -208,13 +199,15 @@ def threads_for_a_camera(threads_needed):
         return not spare or f'{case}, but {threads - 1} would do'
 
     hint = 'How many messages come while one callback runs? math.ceil rounds up.'
-    return [
-        ('30 Hz, 0.15 s, reserve 0.0', lambda: keeps_up(30, 0.15, 0.0), hint),
-        ('22 Hz, 0.1 s, reserve 0.0', lambda: keeps_up(22, 0.1, 0.0), hint),
-        ('10 Hz, 0.05 s, reserve 0.0', lambda: keeps_up(10, 0.05, 0.0), hint),
-        ('20 Hz, 0.2 s, reserve 0.0', lambda: keeps_up(20, 0.2, 0.0), hint),
-        ('20 Hz, 0.19 s, reserve 0.2', lambda: keeps_up(20, 0.19, 0.2), hint),
-    ]
+    return rows(
+        keeps_up,
+        hint,
+        ('30 Hz, 0.15 s, reserve 0.0', 30, 0.15, 0.0),
+        ('22 Hz, 0.1 s, reserve 0.0', 22, 0.1, 0.0),
+        ('10 Hz, 0.05 s, reserve 0.0', 10, 0.05, 0.0),
+        ('20 Hz, 0.2 s, reserve 0.0', 20, 0.2, 0.0),
+        ('20 Hz, 0.19 s, reserve 0.2', 20, 0.19, 0.2),
+    )
 
 
 def losses(rate_hz, callback_s, threads):
@@ -299,7 +292,7 @@ def spin_it_yourself(spin_until):
             executor.shutdown()
         if not asked:
             return 'done() was never called'
-        return len(heard) == messages or f'it ended when {len(heard)} of {messages} were received'
+        return expect(len(heard), messages, 'messages received when it ended:')
 
     def stops_at_once():
         asked = []

@@ -3,9 +3,9 @@
 import re
 
 from helpers.checks.errors import Failed
-from helpers.checks.other_robots import LAST
-from helpers.checks.tasks import Tasks, once
-from helpers.faults import KINDS, OTHER, TURNED, proves, words
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
+from helpers.faults import CORE, KINDS, OTHER, TURNED, proves, words
 from helpers.faults import drive as drive_apart
 from helpers.workspace import error_of_launch
 
@@ -136,9 +136,9 @@ def fault_of(case, *answer):
     return case.fault.name
 
 
-for number in (1, 3, 5, 7, LAST - 1):
-    tasks.add(number, about=fault_of)(found)
-    tasks.add(number + 1, limit_s=120, cpu_s=60, about=fault_of)(mended)
+for one in (*CORE, 'the_next'):
+    tasks.add(found, name=f'find_{one}', about=fault_of)
+    tasks.add(mended, name=f'mend_{one}', limit_s=120, cpu_s=60, about=fault_of)
 
 
 def params(case):

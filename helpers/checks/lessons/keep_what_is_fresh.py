@@ -18,7 +18,8 @@ from std_msgs.msg import Empty, Int32
 
 from helpers.checks.bench import Bench, must_define
 from helpers.checks.errors import Failed, sentence
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.ros import ros_session
 from helpers.trials import stop_while_looking
 

@@ -6,8 +6,9 @@ import signal
 import time
 
 from helpers.checks.builds import builds
+from helpers.checks.points import cached
 from helpers.checks.programs import launch, manifest, needed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 from helpers.workspace import error_in, error_of_launch, started, wait_until
 
 tasks = Tasks()
@@ -137,7 +138,7 @@ def start_it_again(workspace, file):
         log, text = guarded(workspace, f'{file} speed:=0.4', kill=True)
         starts_s, died_s = times(log, 'process started'), times(log, 'has died')
         if not starts_s:
-            return error_of_launch(text)
+            return error_of_launch(text) or 'no program is started'
         if len(starts_s) != 2:
             return 'it was killed, and is not started again'
         return starts_s[1] - died_s[0] > 0.45 or 'it is started again at once'
@@ -146,7 +147,7 @@ def start_it_again(workspace, file):
         log, text = guarded(workspace, f'{file} speed:=fast')
         starts_s = times(log, 'process started')
         if not starts_s:
-            return error_of_launch(text)
+            return error_of_launch(text) or 'no program is started'
         often = {1: 'once', 2: 'twice'}.get(len(starts_s), 'again and again')
         return len(starts_s) == 3 or f'with speed:=fast it is started {often}'
 

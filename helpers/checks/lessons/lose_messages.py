@@ -13,9 +13,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from helpers.checks.bench import Bench, let, must_have
+from helpers.checks.bench import Bench, must_have, override
 from helpers.checks.errors import Failed, sentence
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.recording import explain, predict
 from helpers.ros import ros_session
 

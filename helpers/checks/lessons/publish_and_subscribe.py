@@ -1,9 +1,7 @@
 """What the tasks of the lesson "Publish and subscribe" are judged by."""
 
 import math
-import os
 import signal
-import sys
 import time
 
 from geometry_msgs.msg import Twist
@@ -13,10 +11,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from helpers.checks.bench import RELIABLE, Bench
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached, expect, rows
+from helpers.checks.programs import run_python
+from helpers.checks.tasks import Tasks
 from helpers.robot import EMPTY, Robot
 from helpers.ros import ros_session
-from helpers.workspace import TRACEBACK, error_in, wait_until
 
 tasks = Tasks()
 check = tasks.check
@@ -28,7 +27,7 @@ def hear_the_text(MinimalSubscriber):
         with Bench() as bench:
             node = bench.spin(MinimalSubscriber())
             bench.say('topic', *(String(data=text) for text in texts))
-        return node.heard == [*texts] or f'of {[*texts]}, self.heard has {node.heard}'
+        return expect(node.heard, [*texts], f'of {[*texts]}, self.heard has')
 
     def logs(*texts):
         with Bench() as bench:
@@ -36,7 +35,7 @@ def hear_the_text(MinimalSubscriber):
             bench.say('topic', *(String(data=text) for text in texts))
             log = bench.log('minimal_subscriber')
         right = [f'[INFO] [minimal_subscriber]: I heard: "{text}"' for text in texts]
-        return log == right or f'its log is: {" / ".join(log) or "empty"}'
+        return expect(log, right, 'its log is')
 
     quotes = 'The text has quotation marks: I heard: "..."'
     return [
@@ -60,13 +59,15 @@ def one_executor_for_all(spin_together):
             executors = {node.executor for node in nodes}
         if len(ticked) < count:
             return f'{count - len(ticked)} of {count} nodes: their timers never fired'
-        return len(executors) == 1 or f'the {count} nodes are in {len(executors)} executors'
+        return expect(len(executors), 1, f'the number of executors for {count} nodes is')
 
     hint = 'One executor before the loop, add_node(node) in the loop, session.spin after it.'
-    return [
-        ('two nodes spin in one executor', lambda: all_tick(2), hint),
-        ('four nodes spin in one executor', lambda: all_tick(4), hint),
-    ]
+    return rows(
+        all_tick,
+        hint,
+        ('two nodes spin in one executor', 2),
+        ('four nodes spin in one executor', 4),
+    )
 
 
 @tasks.add
@@ -76,20 +77,18 @@ def a_driver(Driver):
             commands = bench.hear('cmd_vel', Twist)
             bench.spin(Driver(speed, turn))
             bench.wait(lambda: len(commands) >= 3)
+        driver = f'Driver({speed}, {turn})'
         if not commands:
-            return f'Driver({speed}, {turn}) published nothing on cmd_vel'
+            return f'{driver} published nothing on cmd_vel'
         right = Twist()
         right.linear.x, right.angular.z = speed, turn
         wrong = [twist for twist in commands[:3] if twist != right]
         if wrong:
-            return f'Driver({speed}, {turn}) published {fields(wrong[0])}'
-        return len(commands) >= 3 or f'in 2 s it published {len(commands)} messages'
+            return f'{driver} published {fields(wrong[0])}, not {fields(right)}'
+        return len(commands) >= 3 or f'in 2 s {driver} published {len(commands)} messages, not 3'
 
     hint = 'message = Twist(), message.linear.x = ..., message.angular.z = ..., and publish it.'
-    return [
-        ('Driver(0.5, 1.0)', lambda: drives(0.5, 1.0), hint),
-        ('Driver(-0.2, -0.7)', lambda: drives(-0.2, -0.7), hint),
-    ]
+    return rows(drives, hint, ('Driver(0.5, 1.0)', 0.5, 1.0), ('Driver(-0.2, -0.7)', -0.2, -0.7))
 
 
 def fields(twist):
@@ -113,8 +112,8 @@ def measure_the_distance(Odometer):
         with Bench() as bench:
             node = bench.spin(Odometer())
             bench.say('odom', *messages)
-        found = node.distance
-        return abs(found - distance) < 0.001 or f'from {places} it measures {found:g} m'
+        what = f'at the places {places} it measures'
+        return expect(node.distance, distance, what, within=0.001, unit='m')
 
     return [
         ('3 m', lambda: measures(3, (1, 1), (1, 2), (3, 2)), 'math.dist((0, 0), (3, 4)) is 5.0.'),
@@ -153,7 +152,7 @@ def drive_a_square(Square):
 
     def length(path, side):
         driven = sum(map(math.dist, path, path[1:]))
-        return abs(driven - 4 * side) < 0.2 or f'it drives {driven:.1f} m, not {4 * side:g} m'
+        return expect(driven, 4 * side, 'it drives', within=0.2, unit='m')
 
     def stops():
         _, commands, timers, running = small()
@@ -161,8 +160,9 @@ def drive_a_square(Square):
             return 'it has no timer'
         if running:
             return 'after 20 s its timer still runs'
-        last = commands[-1:]
-        return last == [(0.0, 0.0)] or f'the last speed that it published is {last or "none"}'
+        if not commands:
+            return 'it published no speed'
+        return expect(commands[-1], (0.0, 0.0), 'the last speed that it published is')
 
     tick = 'self.ticks % (self.side_ticks + 10) is the number of the tick in this side and turn.'
     end = 'After 4 * (self.side_ticks + 10) ticks: publish Twist(), and self.timer.cancel().'
@@ -186,12 +186,12 @@ def mirror_the_robot(Mirror):
             bench.say('odom', *messages)
         found = [(twist.linear.x, twist.angular.z) for twist in commands]
         right = [(v, -w) for v, w in speeds]
-        return found == right or f'of {[*speeds]} it made {found[:3] or "nothing"}'
+        return expect(found, right, f'of {[*speeds]} it made')
 
     def name():
         with ros_session():
             name = Mirror().get_name()
-        return name == 'mirror' or f'its name is {name}'
+        return expect(name, 'mirror', 'its name is')
 
     hint = 'A callback that makes a Twist, sets two fields, and publishes it. Compare Driver.'
     return [
@@ -211,14 +211,14 @@ def hear_the_laser(asked):
             node.create_subscription(String, 'topic', heard.append, asked)
             bench.spin(node)
             bench.say('topic', *(String(data=str(number)) for number in range(4)), qos=offered)
-        return len(heard) == 4 or f'of four messages, {len(heard)} were received'
+        return expect(len(heard), 4, 'of four messages it received')
 
     def has_depth():
         with ros_session():
             node = Node('minimal_subscriber')
             subscription = node.create_subscription(String, 'topic', print, asked)
             depth = subscription.qos_profile.depth
-        return depth == 10 or f'the depth is {depth}'
+        return expect(depth, 10, 'the depth is')
 
     hint = 'Above, a QoSProfile has a depth and a reliability. Ask for less.'
     return [
@@ -233,27 +233,25 @@ def a_program_of_its_own(workspace, file):
     def is_program(team):
         with Bench() as bench:
             heard = bench.hear('topic', String)
-            start = f'exec {sys.executable} {file} {team} --ros-args --disable-external-lib-logs'
-            with workspace.start(start, team) as process:
-                bench.wait(lambda: len(heard) >= 2 or not process.running, 8)
-                went_on = process.running
+            with run_python(workspace, file, team) as talker:
+                talker.wait(lambda: len(heard) >= 2)
+                ended = talker.end(signal.SIGINT)
         teams = {message.data for message in heard}
-        if not went_on:
-            return f'the program ended by itself. {(["It printed nothing", *process.lines])[-1]}'
         if teams != {team}:
-            return f'team {team}: the listener received {", ".join(teams) or "nothing"}'
-        if not any(f'[talker]: {team} talks' in line for line in process.lines):
+            received = ', '.join(sorted(teams)) or 'nothing'
+            return f'the listener received {received}, not {team}'
+        if not talker.says(f'[talker]: {team} talks'):
             return f'its log has no line "[talker]: {team} talks"'
-        ends = not any('Traceback' in line for line in process.lines)
-        return ends or 'Ctrl+C ends it with a traceback'
+        if talker.failed:
+            return f'Ctrl+C ends it with a traceback: {talker.error}'
+        return ended or 'Ctrl+C does not end it'
 
     def can_be_imported():
-        command = f'{sys.executable} -c "import {file.removesuffix(".py")}"'
-        with workspace.start(f'exec {command}', 'import') as process:
-            ended = wait_until(lambda: not process.running, 8)
+        with run_python(workspace, '-c', f'import {file.removesuffix(".py")}') as program:
+            ended = program.has_ended()
         if not ended:
             return 'the import does not end within 8 s: it starts to talk'
-        return process.wait() == 0 or f'the import ends with an error: {error_in(process.lines)}'
+        return program.exit_code() == 0 or f'the import ends with an error: {program.error}'
 
     hint = 'main(): rclpy.init(), then in a try: rclpy.spin(Talker(sys.argv[1])).'
     caught = 'except (KeyboardInterrupt, ExternalShutdownException): pass'
@@ -271,23 +269,18 @@ def leave_a_robot_that_stands(workspace, file):
         """Let the program drive, send it a signal, and look at what it has commanded."""
         with Bench() as bench:
             commands = bench.hear('cmd_vel', Twist, RELIABLE)
-            start = f'exec {sys.executable} {file} --ros-args --disable-external-lib-logs'
-            with workspace.start(start, 'driver') as process:
-                drove = bench.wait(lambda: len(commands) >= 3 or not process.running, 15)
-                if not drove or not process.running:
-                    return f'it does not drive: {error_in(process.lines)}'
-                os.kill(process.pid, sent)
-                ended = bench.wait(lambda: not process.running, 3)
+            with run_python(workspace, file) as driver:
+                if not driver.wait(lambda: len(commands) >= 3, limit_s=15):
+                    return f'it does not drive: {driver.error}'
+                if not driver.end(sent, limit_s=3):
+                    return f'3 s after {sent.name} it has not ended'
             bench.quiet()
-        if not ended:
-            return f'3 s after {sent.name} it has not ended'
         speed = commands[-1].linear.x
         if speed:  # first: whether spin raises or returns depends on what it does just then
-            return f'{sent.name} ends it, and its last command is {speed:g} m/s'
-        failed = any(TRACEBACK in line for line in process.lines)
-        return not failed or f'{sent.name} ends it with an error: {error_in(process.lines)}'
+            return f'{sent.name} ends it, and its last command is {speed:g} m/s, not 0 m/s'
+        return not driver.failed or f'{sent.name} ends it with an error: {driver.error}'
 
-    def without_messages():
+    def ends_while_nothing_happens():
         """Let the same main() spin a node to which nothing happens."""
         name = file.removesuffix('.py')
         idle = (
@@ -295,14 +288,11 @@ def leave_a_robot_that_stands(workspace, file):
             'own.Driver.timer_callback = lambda self: (self.timer.cancel(), print(self.timer)); '
             'own.main()'
         )
-        with workspace.start(f'exec {sys.executable} -c "{idle}"', 'idle') as process:
-            if not wait_until(lambda: process.lines or not process.running, 15):
+        with run_python(workspace, '-c', idle) as driver:
+            if not driver.wait(lambda: driver.lines, limit_s=15):
                 return 'its timer never fired'
-            if not process.running:
-                return f'it ends by itself: {error_in(process.lines)}'
             time.sleep(0.3)  # now it waits
-            process.interrupt(limit_s=3)
-            ended = not process.running
+            ended = driver.end(signal.SIGINT, limit_s=3)
         return ended or 'while no callback is due, Ctrl+C does not end it'
 
     no_handler = 'SignalHandlerOptions.NO, and node.stop() in finally, before try_shutdown().'
@@ -315,5 +305,5 @@ def leave_a_robot_that_stands(workspace, file):
             no_handler,
         ),
         ('after SIGTERM, too', lambda: leaves_it_standing(signal.SIGTERM), term),
-        ('Ctrl+C also ends it while no callback is due', without_messages, once_more),
+        ('Ctrl+C also ends it while no callback is due', ends_while_nothing_happens, once_more),
     ]

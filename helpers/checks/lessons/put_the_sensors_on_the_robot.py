@@ -19,13 +19,16 @@ from urdf_parser_py.urdf import URDF
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build
 from helpers.checks.errors import Failed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.fusion import VARIANCES, localize
 from helpers.ros import quaternion, seconds_of, stamp_of, yaw_of
 from helpers.workspace import DIED, error_of_launch, started, without_folders
 
 tasks = Tasks()
 check = tasks.check
+
+SETTINGS = 'src/small_robot/config/localization.yaml'  # of the filters
 
 DESCRIPTION = 'src/small_robot/urdf/small_robot.urdf'
 MOUNTING = {'base_scan': math.radians(-30), 'imu_link': math.radians(20)}  # as it is described
@@ -225,8 +228,8 @@ def from_a_frame_to_its_parent(to_parent):
 
 
 @tasks.add(limit_s=90, cpu_s=20)  # each drive takes some seconds of CPU
-def fix_three_faults(workspace, settings, StaticBroadcaster):
-    drive = cached(lambda: drive_by(workspace, StaticBroadcaster, settings, seconds=6))
+def fix_three_faults(workspace, StaticBroadcaster):
+    drive = cached(lambda: drive_by(workspace, StaticBroadcaster, SETTINGS, seconds=6))
 
     def uses(name, sensor, *parts):
         if sensor not in drive().parts[name]:
@@ -244,7 +247,7 @@ def fix_three_faults(workspace, settings, StaticBroadcaster):
         flat = [name for name, is_flat in drive().two_d.items() if is_flat is not True]
         if flat:
             return f'two_d_mode is not true for {", ".join(flat)}'
-        given = yaml.safe_load(workspace.file(settings).read_text(encoding='utf-8'))
+        given = yaml.safe_load(workspace.file(SETTINGS).read_text(encoding='utf-8'))
         section = given.get('navsat_transform') or given.get('/navsat_transform') or {}
         waits = (section.get('ros__parameters') or {}).get('wait_for_datum')
         return waits is True or 'navsat_transform has no wait_for_datum: true'
@@ -289,13 +292,13 @@ def fix_three_faults(workspace, settings, StaticBroadcaster):
     ]
 
 
-def drive_by(workspace, StaticBroadcaster, *settings, **options):
-    """Let the robot drive past two filters with these settings. Raises Failed if they do not start.
+def drive_by(workspace, StaticBroadcaster, *SETTINGS, **options):
+    """Let the robot drive past two filters with these SETTINGS. Raises Failed if they do not start.
 
     In one process rclpy refuses a subscription whose type is not that of the topic, and prints a
     page; on a robot the subscription hears nothing. So the types are compared before.
     """
-    robot, files = described(workspace), [workspace.file(name) for name in settings]
+    robot, files = described(workspace), [workspace.file(name) for name in SETTINGS]
     for file in files:
         compare_types(file)
     return localize(files, lambda: StaticBroadcaster(robot), mounting=MOUNTING, **options)

@@ -12,7 +12,8 @@ from test_msgs.action import Fibonacci as Patrol
 
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.ros import STATUS
 
 tasks = Tasks()

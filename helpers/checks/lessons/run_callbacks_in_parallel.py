@@ -10,7 +10,8 @@ from std_msgs.msg import Int32, String
 
 from helpers.checks.bench import Bench, must_define, must_have
 from helpers.checks.errors import Failed
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.ros import ros_session
 from helpers.trials import callbacks_at_once
 

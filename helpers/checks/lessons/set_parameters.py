@@ -10,7 +10,8 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Int32
 
 from helpers.checks.bench import Bench
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.robot import EMPTY, Robot
 from helpers.ros import ros_session
 from helpers.trials import ways

@@ -13,8 +13,9 @@ from sensor_msgs.msg import LaserScan
 
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
+from helpers.checks.points import cached
 from helpers.checks.programs import manifest
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 from helpers.trials import build_anew
 from helpers.workspace import compile_error, why_it_failed
 

@@ -6,7 +6,8 @@ The sources below are versions of what the student tests, right ones and wrong o
 import re
 
 from helpers.checks.builds import build
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.points import cached
+from helpers.checks.tasks import Tasks
 from helpers.trials import BRAKE, BUSY, Device, planted, run_busy, run_tests, state_after
 
 tasks = Tasks()

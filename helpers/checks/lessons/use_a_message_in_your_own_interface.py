@@ -9,8 +9,9 @@ from sensor_msgs.msg import Image
 
 from helpers.checks.bench import Bench
 from helpers.checks.builds import builds
+from helpers.checks.points import cached
 from helpers.checks.programs import manifest, needed, sourced
-from helpers.checks.tasks import Tasks, once
+from helpers.checks.tasks import Tasks
 from helpers.robot import ROOMS, Robot
 
 tasks = Tasks()
@@ -187,14 +188,14 @@ def is_named(workspace, package, moment, *wanted):
 
 
 def service_type():
-    """Return the learner's service. It is there when task 3 has built it."""
+    """Return the learner's service. It is there when `fix_the_build` has built it."""
     from custom_interfaces.srv import TurnCamera
 
     return TurnCamera
 
 
 def serve(bench, robot):
-    """Serve the camera of a robot, as task 4 wants it."""
+    """Serve the camera of a robot, as `the_server` wants it."""
 
     def turn(request, response):
         response.camera_image = robot.turn_camera(request.deg_turn)

@@ -8,7 +8,7 @@ import sys
 from importlib import metadata
 
 from ros2_command import index
-from ros2_command.commands import CommandError, command
+from ros2_command.commands import CommandError, command, what_is_missing
 from ros2_command.domain import join_domain
 from ros2_command.graph import graph
 from ros2_command.names import node_names
@@ -37,6 +37,8 @@ def _doctor(args: argparse.Namespace) -> None:
         rows += ('Domain', _words(join_domain())), ('Nodes there', ', '.join(names) or 'none')
     except CommandError as error:
         rows.append(('Domain', str(error)))
+    except ModuleNotFoundError as error:
+        rows.append(('Missing', what_is_missing(error)))
     rows.append(('Tab', 'eval "$(register-python-argcomplete ros2)" completes names in bash'))
     for title, value in rows:
         print(f'{title:12} {value}')

@@ -4,18 +4,27 @@
 
 It reads what the lessons have saved, and writes `notebooks/images/`: what is seen has happened.
 A picture plays once, in 4.5 s. Without motion it is its own end.
+
+Saved outputs and the code that draws make a picture, and nothing else does. So a file whose picture
+is the same stays as it is, also where another zlib would compress its photographs to other bytes.
 """
 
+import base64
+import io
+import re
 from functools import partial
 
+from PIL import Image
+
+from helpers.lesson import FOLDER, PICTURES, lessons
 from tools.lessons.first_pictures.drives import drive_picture
 from tools.lessons.first_pictures.queues import gate_picture, queue_picture, threads_picture
 from tools.lessons.first_pictures.sensors import camera_picture, lidar_picture, wheels_picture
 from tools.lessons.first_pictures.terminals import terminal_picture
 from tools.lessons.first_pictures.two_brakes import two_brakes_picture
-from tools.lessons.lesson import FOLDER, PICTURES, lessons
 
 IMAGES = FOLDER / PICTURES
+PHOTOGRAPH = re.compile(r'data:image/png;base64,([^"]*)')
 
 # What each lesson shows first. What a learner guesses is not told.
 FIRST = {
@@ -83,9 +92,23 @@ def pictures() -> dict[str, str]:
     return made | {'depth_10_hits_depth_1_stops': two_brakes_picture(of['keep_what_is_fresh'])}
 
 
+def is_same(svg: str, other: str) -> bool:
+    """Whether two pictures show the same: all their text, and each pixel of their photographs."""
+    return PHOTOGRAPH.split(svg)[::2] == PHOTOGRAPH.split(other)[::2] and all(
+        _pixels(one) == _pixels(two)
+        for one, two in zip(PHOTOGRAPH.findall(svg), PHOTOGRAPH.findall(other), strict=True)
+    )
+
+
+def _pixels(png: str) -> tuple[tuple[int, int], bytes]:
+    image = Image.open(io.BytesIO(base64.b64decode(png))).convert('RGBA')
+    return image.size, image.tobytes()
+
+
 if __name__ == '__main__':
     for name, svg in pictures().items():
         file = IMAGES / f'{name}.svg'
-        if not file.exists() or file.read_text(encoding='utf-8') != svg:
+        if not file.exists() or not is_same(svg, file.read_text(encoding='utf-8')):
             file.write_text(svg, encoding='utf-8')
-            print(f'{file.relative_to(FOLDER.parent)}: written from the notebooks')
+            of = file.relative_to(FOLDER.parent)
+            print(f'{of}: new, because outputs of its lesson or what draws it have changed')

@@ -4,6 +4,7 @@ import math
 import re
 from itertools import pairwise
 
+from helpers.lesson import Lesson
 from tools.lessons.first_pictures.look import (
     PLAYS_S,
     colour,
@@ -13,7 +14,6 @@ from tools.lessons.first_pictures.look import (
     styled,
     svg_of,
 )
-from tools.lessons.lesson import Lesson
 
 TRAIL = 2.6  # pixels
 

@@ -5,8 +5,8 @@ import re
 from html import unescape
 from urllib.parse import unquote
 
+from helpers.lesson import Lesson
 from helpers.notebook import LOOK
-from tools.lessons.lesson import Lesson
 
 PLAYS_S = 4.5
 WIDTH = 720  # pixels

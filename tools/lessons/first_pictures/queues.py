@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
+from helpers.lesson import Lesson
 from tools.lessons.first_pictures.look import PLAYS_S, WIDTH, moving, output_of, runs_of, svg
-from tools.lessons.lesson import Lesson
 
 ARRIVE, TAKE, END = range(3)  # moves of a replay
 # Pixels: the width of a place of the queue, and where the first one and the callback are.

@@ -9,7 +9,9 @@ import numpy as np
 from PIL import Image
 
 from helpers.fusion import fuse, simulate
-from helpers.robot import ROOMS, Robot, replay_drive
+from helpers.lesson import Lesson
+from helpers.robot import ROOMS, Robot
+from helpers.robot_view import replay_drive
 from helpers.ros import ros_session
 from tools.lessons.first_pictures.look import (
     PLAYS_S,
@@ -21,7 +23,6 @@ from tools.lessons.first_pictures.look import (
     svg,
     svg_of,
 )
-from tools.lessons.lesson import Lesson
 
 ASKEW = math.radians(-30)  # as MOUNTING of the lesson says
 RAYS = 45  # so many groups of points come one after the other

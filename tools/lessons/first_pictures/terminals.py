@@ -2,8 +2,8 @@
 
 from html import escape
 
+from helpers.lesson import Lesson
 from tools.lessons.first_pictures.look import PLAYS_S, WIDTH, svg, text_of
-from tools.lessons.lesson import Lesson
 
 LINE, PAD = 32, 18  # pixels
 STYLE = """

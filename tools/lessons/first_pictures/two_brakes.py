@@ -6,6 +6,7 @@ Poses, queues and ages are those of the saved drives of lesson 05. Without motio
 from itertools import pairwise
 from typing import NamedTuple
 
+from helpers.lesson import Lesson
 from helpers.robot import CORRIDOR, RADIUS_M
 from tools.lessons.first_pictures.look import PLAYS_S, moving, output_of, percent, runs_of, svg
 from tools.lessons.first_pictures.queues import (
@@ -18,7 +19,6 @@ from tools.lessons.first_pictures.queues import (
     places,
     tape,
 )
-from tools.lessons.lesson import Lesson
 
 CELLS = {10: 'drive-depth-10', 1: 'drive-depth-1'}
 FAST = 1.6  # times as fast as the drives were

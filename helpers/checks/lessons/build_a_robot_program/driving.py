@@ -14,7 +14,7 @@ from helpers.checks.lessons.build_a_robot_program.shared import (
     one_command_a_scan,
     tasks,
 )
-from helpers.checks.tasks import once
+from helpers.checks.points import cached
 from helpers.patrol import (
     CIRCLE,
     DEGREES,

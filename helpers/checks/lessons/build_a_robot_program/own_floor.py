@@ -1,7 +1,7 @@
 """Of the project: a floor of the student's own."""
 
 from helpers.checks.lessons.build_a_robot_program.shared import comes_to_each_place, tasks
-from helpers.checks.tasks import once
+from helpers.checks.points import cached
 from helpers.patrol import PACKAGE, Tour, round_tour, route_of
 from helpers.robot import Floor
 from helpers.ros import ros_session

@@ -12,7 +12,7 @@ from sensor_msgs.msg import BatteryState
 from helpers.checks.bench import Bench, must_define
 from helpers.checks.builds import builds
 from helpers.checks.lessons.build_a_robot_program.shared import tasks
-from helpers.checks.tasks import once
+from helpers.checks.points import cached
 from helpers.patrol import SIM, Ear, action, module
 from helpers.robot import EMPTY, Robot
 from helpers.ros import STATUS, ros_session, spun

@@ -5,7 +5,7 @@ from rcl_interfaces.srv import GetParameters
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build, builds
 from helpers.checks.lessons.build_a_robot_program.shared import DRIVES, tasks
-from helpers.checks.tasks import once
+from helpers.checks.points import cached
 from helpers.patrol import LAUNCH, PACKAGE, launched, printed
 from helpers.robot import ROOMS
 from helpers.workspace import DIED, started

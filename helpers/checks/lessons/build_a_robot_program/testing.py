@@ -1,7 +1,7 @@
 """Of the project: the student's tests, which test right programs and wrong ones."""
 
 from helpers.checks.lessons.build_a_robot_program.shared import tasks
-from helpers.checks.tasks import once
+from helpers.checks.points import cached
 from helpers.patrol import PACKAGE
 from helpers.trials import planted, run_tests
 

@@ -11,7 +11,7 @@ from helpers.checks.lessons.build_a_robot_program.shared import (
     one_command_a_scan,
     tasks,
 )
-from helpers.checks.tasks import once
+from helpers.checks.points import cached
 from helpers.patrol import Tour, round_tour
 from helpers.robot import ROOMS
 from helpers.ros import ros_session

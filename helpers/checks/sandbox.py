@@ -67,7 +67,7 @@ class Ending:
     printed: str = ''
 
 
-class Apart:
+class Sandbox:
     """A function that runs in a worker. Iterate over what it sends; then read `ending`.
 
     `function(send)` gets a function that sends any object that can be pickled. Each message begins

@@ -14,8 +14,8 @@ from typing import Protocol
 
 from helpers.notebook import hear_while_a_cell_runs, somebody_watches
 from helpers.replay import script, style
-from helpers.robot.robot import Robot
-from helpers.robot.view.picture import DRIVE_CSS
+from helpers.robot import Robot
+from helpers.robot_view.picture import DRIVE_CSS
 from helpers.ros import current_session
 
 BY_HAND_JS = Path(__file__).with_name('by_hand.js')

@@ -15,10 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from helpers.notebook import LOOK
-from helpers.robot.body import RADIUS_M
-from helpers.robot.floor import Floor, Pose
-from helpers.robot.record import Scan
-from helpers.robot.sensors import RANGE_MAX
+from helpers.robot import RADIUS_M, RANGE_MAX, Floor, Pose, Scan
 
 WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor

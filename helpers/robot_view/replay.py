@@ -11,11 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from helpers.replay import Replay, replay
-from helpers.robot.floor import Pose
-from helpers.robot.record import DriveRecord, Event, Scan
-from helpers.robot.sensors import RANGE_MAX
-from helpers.robot.view.picture import BEAMS, DRIVE_CSS, Later, floor_in_words, floor_picture
-from helpers.robot.view.scans import ScanRecording
+from helpers.robot import RANGE_MAX, DriveRecord, Event, Pose, Scan
+from helpers.robot_view.picture import BEAMS, DRIVE_CSS, Later, floor_in_words, floor_picture
+from helpers.robot_view.scans import ScanRecording
 
 # What a notebook keeps of a drive, at most: so it stays below 60 kB.
 POSES, SCANS, COMMANDS, EVENTS = 400, 50, 150, 50

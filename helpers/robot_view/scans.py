@@ -10,7 +10,7 @@ from rclpy.subscription import Subscription
 from rclpy.time import Time
 
 from helpers.recording import Recording
-from helpers.robot.robot import Robot, speeds_of
+from helpers.robot import Robot, speeds_of
 from helpers.ros import find
 
 

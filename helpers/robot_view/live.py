@@ -9,11 +9,10 @@ from rclpy.subscription import Subscription
 
 from helpers.notebook import somebody_watches
 from helpers.replay import Replay, style
-from helpers.robot.floor import Pose
-from helpers.robot.robot import Robot
-from helpers.robot.view.picture import DRIVE_CSS, floor_in_words, floor_picture
-from helpers.robot.view.replay import bumps, outcome, place, replay_drive, seconds
-from helpers.robot.view.scans import ScanRecording
+from helpers.robot import Pose, Robot
+from helpers.robot_view.picture import DRIVE_CSS, floor_in_words, floor_picture
+from helpers.robot_view.replay import bumps, outcome, place, replay_drive, seconds
+from helpers.robot_view.scans import ScanRecording
 from helpers.ros import current_session
 
 PERIOD_S = 1 / 12

@@ -11,7 +11,7 @@ import psutil
 import pytest
 from support.waits import wait_for
 
-from helpers.checks import apart
+from helpers.checks import sandbox
 from helpers.checks.tasks import Tasks
 
 LIMIT_S = 3.0
@@ -130,17 +130,17 @@ def points_of(function, capsys):
     """Judge a function as the last point of a task, and return what the verdict found."""
     tasks = Tasks()
 
-    @tasks.add(1, limit_s=LIMIT_S, cpu_s=1.0)
+    @tasks.add(limit_s=LIMIT_S, cpu_s=1.0)
     def task(answer):
         return [('before', lambda: True, ''), ('it ends', answer, '')]
 
-    tasks.check(1, function)
+    tasks.check('task', function)
     return capsys.readouterr().out
 
 
 @pytest.mark.parametrize('function', HOSTILE, ids=lambda function: function.__name__)
 def test_each_hostile_answer_gets_a_sentence_and_leaves_nothing(function, capsys, monkeypatch):
-    monkeypatch.setattr(apart, 'MEMORY_BYTES', 200 << 20)  # to fill it takes time
+    monkeypatch.setattr(sandbox, 'MEMORY_BYTES', 200 << 20)  # to fill it takes time
     threads, started = threading.active_count(), time.monotonic()
     said = ' '.join(points_of(function, capsys).split())
     assert '[ok] before [not yet] it ends' in said
@@ -172,14 +172,14 @@ def test_an_interrupt_ends_the_check_and_all_it_started(capsys):
 
 
 def test_an_interrupt_while_the_guard_begins(capsys, monkeypatch):
-    fork = apart._fork
+    fork = sandbox._fork
 
     def interrupted():
         process = fork()
         signal.raise_signal(signal.SIGINT)  # in this process, and in the guard
         return process
 
-    monkeypatch.setattr(apart, '_fork', interrupted)
+    monkeypatch.setattr(sandbox, '_fork', interrupted)
     with pytest.raises(KeyboardInterrupt):
         points_of(sleeps_for_ever, capsys)
     assert psutil.Process().children(recursive=True) == []
@@ -194,8 +194,8 @@ def starts_and_waits():
     time.sleep(1000)
 
 tasks = Tasks()
-tasks.add(1, limit_s=100)(lambda answer: [('it ends', answer, '')])
-tasks.check(1, starts_and_waits)
+tasks.add(lambda answer: [('it ends', answer, '')], name='it', limit_s=100)
+tasks.check('it', starts_and_waits)
 """
 
 

@@ -1,1 +1,0 @@
-"""What the session and the recorder cost, measured by `make bench`."""
