@@ -218,7 +218,7 @@ def update_from_folder(newer: Path, mine: Path, course: Path) -> list[str]:
 def with_solutions(folder: Path) -> set[str]:
     """Return the numbers of the lessons of a folder that have a solution."""
     lessons = map(outline, folder.rglob('[0-9][0-9]_*.ipynb'))
-    return {lesson.number for lesson in lessons if any(task.solutions for task in lesson.tasks)}
+    return {lesson.number for lesson in lessons if lesson.has_solutions}
 
 
 def update_from_archive(archive: Path, mine: Path) -> list[str]:

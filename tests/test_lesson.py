@@ -4,11 +4,11 @@ import ast
 import re
 
 import pytest
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
+from nbformat.v4 import new_code_cell, new_raw_cell
+from support.lessons import lesson, task
 
 from helpers.lesson import (
     ROOT,
-    Lesson,
     bare_mentions,
     check_call,
     lessons,
@@ -26,17 +26,6 @@ GRAMMAR = re.compile(
 )
 READS = {'compile', 'match', 'search', 'fullmatch', 'findall', 'finditer', 'sub', 'split'}
 READS |= {'startswith', 'removeprefix', 'partition', 'index', 'find'}
-
-
-def task(name, number=1, title='Try', star=''):
-    text = new_markdown_cell(f'### ✎ Task {number}{star}: {title}\n\nDo it.')
-    cells = ('x = 1', 'exercise'), (f"check('{name}', x)", 'check')
-    cells += ((f'%%solution {name}\nx = 2', 'solution'),)
-    return [text, *(new_code_cell(source, metadata={'tags': [tag]}) for source, tag in cells)]
-
-
-def lesson(*cells, file='05_keep_it.ipynb'):
-    return Lesson(file, new_notebook(cells=[new_markdown_cell('# 05 Keep it'), *cells]))
 
 
 def test_a_task_has_a_name_for_ever_and_the_number_of_its_place():
@@ -96,7 +85,8 @@ def test_a_guess_is_found_with_its_comparison():
     asked = new_code_cell("%time 1\nmy_x = guess('How many?', ...)", metadata={'tags': ['predict']})
     other = new_code_cell("compare_prediction('How far?', my_x, 1)")
     compared = new_code_cell("found = 3\ncompare_prediction(\n    'How many?', my_x, found)")
-    one = lesson(compared, asked, new_raw_cell('For the instructor: 4 minutes'), other, compared)
+    early = new_code_cell(compared.source)
+    one = lesson(early, asked, new_raw_cell('For the instructor: 4 minutes'), other, compared)
     [guess] = one.guesses
     assert (guess.variable, guess.question, guess.value) == ('my_x', 'How many?', ...)
     assert one.comparison_of(guess) is compared

@@ -179,11 +179,13 @@ def _looks(cells: list[Node], known: set[str]) -> dict[str, list[str]]:
 def _same_task(cells: list[Node], task: Task) -> list[Node]:
     """Return the code cells below the heading of a task, in a student's notebook.
 
-    The heading is that with the same id; else, in a notebook without ids, that with the same title.
+    It is that with the same id; else, in a notebook without ids, that whose check has the name of
+    the task; else, in one of version 0.3, that with the same title.
     """
     own = Lesson('', Node(cells=cells)).tasks
-    ids = [one for one in own if task.heading and one.heading.id == task.heading.id]
-    same = ids or [one for one in own if (one.title, one.star) == (task.title, task.star)]
+    same = [one for one in own if one.heading.id == task.heading.id]
+    same = same or [one for one in own if one.name == task.name]
+    same = same or [one for one in own if one.title == task.title]
     return [cell for one in same[:1] for cell in one.code]
 
 

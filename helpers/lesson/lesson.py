@@ -273,6 +273,11 @@ class Lesson:
         return next((match[1] for match in found if match), '')
 
     @property
+    def has_solutions(self) -> bool:
+        """Whether this edition of the lesson has a solution."""
+        return any('solution' in tags(cell) for cell in self.code_cells())
+
+    @property
     def packages(self) -> set[str]:
         """The packages of its workspace that its cells name: those of `src/fleet_pkg`."""
         return {name for cell in self.code_cells() for name in PACKAGE.findall(cell.source)}
