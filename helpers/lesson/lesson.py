@@ -46,9 +46,12 @@ class Task:
 
     @property
     def name(self) -> str:
-        names = [call[0] for cell in self.checks if (call := check_call(cell.source))]
-        names += [name for cell in self.solutions if (name := name_of_solution(cell.source))]
-        return names[0] if names else ''
+        # An editor may have taken the tags away.
+        for cell in (*self.checks, *self.solutions, *self.code):
+            call = check_call(cell.source)
+            if name := call[0] if call else name_of_solution(cell.source):
+                return name
+        return ''
 
     @property
     def cells(self) -> list[Node]:
