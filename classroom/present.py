@@ -13,9 +13,9 @@ from pathlib import Path
 from jupyter_core.paths import jupyter_config_dir
 
 from classroom.deck.copies import FOLDER, Copies
+from helpers import lesson
 from helpers.workspace import BEGIN_EMPTY
 from tools.lab import open_lab, parser
-from tools.lessons import lesson
 
 EXTENSIONS = Path(__file__).with_name('deck')  # of JupyterLab
 SETTINGS = {

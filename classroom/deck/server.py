@@ -6,6 +6,8 @@ GET deck/class      the address of the page of the class: of a hub's, if one was
 GET deck/plan       the rows of the timetable from its first lesson on, as JSON; none without one:
                     [{"minutes": 15, "file": "01_publish_and_subscribe.ipynb", "steps": [1, 3]},
                      {"minutes": 10, "file": "", "steps": null}]
+GET deck/steps      ?file=02_lose_messages.ipynb: the steps of a copy, with their notes and minutes,
+                    and the index of the step of each cell by its id, as JSON
 GET deck/look.css   colours and fonts of the lessons
 """
 
@@ -18,8 +20,10 @@ from jupyter_server.utils import url_path_join
 from tornado import web
 
 from classroom.class_page import page_file
+from classroom.class_page.lessons import Known
 from classroom.deck.copies import Copies
 from classroom.plan import Plan
+from helpers.lesson import read
 from helpers.notebook import LOOK_CSS
 
 
@@ -67,6 +71,25 @@ class Rows(JupyterHandler):
         self.finish(json.dumps([row._asdict() for row in self.plan.from_first_lesson]))
 
 
+class Steps(JupyterHandler):
+    """Give the deck the steps of a lesson, with the notes of the instructor."""
+
+    def initialize(self, copies: Copies) -> None:
+        """Take over the copies."""
+        self.copies = copies
+
+    @web.authenticated
+    def get(self) -> None:
+        """Answer with what is known of them."""
+        file = Path(self.get_argument('file')).name
+        try:
+            text = (self.copies.folder / file).read_text(encoding='utf-8')
+            known = Known(read(text, file))
+        except (OSError, ValueError) as error:
+            raise web.HTTPError(404, str(error)) from None
+        self.finish({'steps': known.notes, 'step_of': known.step_of})
+
+
 class Look(JupyterHandler):
     """Give the deck and the notes window their colours and fonts."""
 
@@ -88,6 +111,7 @@ def _load_jupyter_server_extension(server: ServerApp) -> None:
             (url_path_join(base, 'deck/fresh'), Fresh, {'copies': copies}),
             (url_path_join(base, 'deck/class'), PageOfClass, {'page': page}),
             (url_path_join(base, 'deck/plan'), Rows, {'plan': copies.plan}),
+            (url_path_join(base, 'deck/steps'), Steps, {'copies': copies}),
             (url_path_join(base, 'deck/look.css'), Look),
         ],
     )

@@ -350,13 +350,13 @@ function rowOf(step) {
   return Math.max(plan.findIndex(row => row.file === file && (!row.steps || step <= row.steps[1])), 0);
 }
 
-const minutesOf = source => Number(/^For the instructor: (\d+) minutes/.exec(source)?.[1] ?? 0);
+// The steps of a lesson, with their notes and minutes: the server reads them from its copy.
+const stepsKnown = {};
+const stepsOf = file =>
+  (stepsKnown[file] ??= server.ask(`deck/steps?file=${encodeURIComponent(file)}`).then(answer => answer.json()));
 
-// Of a note, lines stay lines.
-const htmlOf = ({ type, source, isNote }) =>
-  type === 'code'
-    ? element('pre', { textContent: source }).outerHTML
-    : markdown.render(isNote ? source.replace(/(?<=\S)\n(?=\S)/g, '  \n') : source);
+const htmlOf = ({ type, source }) =>
+  type === 'code' ? element('pre', { textContent: source }).outerHTML : markdown.render(source);
 
 // Tell the notes of this step, the next slide, and the minutes, to the notes window and the class.
 async function tell(place) {
@@ -365,41 +365,35 @@ async function tell(place) {
     id: model.id,
     type: model.type,
     source: model.sharedModel.getSource(),
-    isNote: Boolean(model.getMetadata('tags')?.includes('notes')),
   }));
   const at = content.activeCellIndex;
-  const starts = index => cells[index].type === 'markdown' && /^##? /.test(cells[index].source);
-  const indices = [...cells.keys()];
-  const step = indices.findLast(index => index <= at && starts(index)) ?? 0;
-  const end = indices.find(index => index > at && starts(index)) ?? cells.length;
-  const notesIn = (from, to) => cells.slice(from, to).filter(({ isNote }) => isNote);
-  const minutesIn = (from, to) => notesIn(from, to).reduce((sum, { source }) => sum + minutesOf(source), 0);
-  const titleOf = ({ source }) => source.split('\n')[0].replace(/^#+ /, '');
   const all = slides();
   const { began } = kept();
-  let minutes = { own: minutesIn(step, end), planned: minutesIn(0, end), all: minutesIn(0) };
+  const { steps, step_of: stepOf } = await stepsOf(fileOf(deck));
+  // A cell that was added in front of the class belongs to the step of the one above it.
+  const known = cells.slice(0, at + 1).findLast(({ id }) => id in stepOf);
+  const step = steps[known ? stepOf[known.id] : 0];
+  let { own, planned, all: inAll } = step;
   if (plan.some(({ file }) => file === fileOf(deck))) {
     // In a timetable they are those of all lessons and breaks up to here.
-    const numberOf = index => Number(/^## (\d+)/.exec(cells[index].source)?.[1] ?? 0);
-    const row = rowOf(numberOf(step));
-    const start = indices.find(index => starts(index) && numberOf(index) === plan[row].steps?.[0]) ?? 0;
-    minutes = {
-      own: minutes.own,
-      planned: sumOf(plan.slice(0, row)) + Math.min(minutesIn(start, end), plan[row].minutes),
-      all: sumOf(plan),
-    };
+    const row = rowOf(step.number);
+    const start = steps.find(({ number }) => number === plan[row].steps?.[0]) ?? steps[0];
+    const inRow = planned - start.planned + start.own;
+    planned = sumOf(plan.slice(0, row)) + Math.min(inRow, plan[row].minutes);
+    inAll = sumOf(plan);
   }
+  const minutes = { own, planned, all: inAll };
   const path = context.path;
   void tellClass({ lesson: path.match(/\d\d_(\w+)\.ipynb$/)?.[1], cell: cells[at].id, began_s: began ?? null, ...minutes });
   const following = (all[here() + 1] ?? []).map(index => cells[index]);
   const state = {
-    lesson: titleOf(cells[0]),
-    step: titleOf(cells[step]),
+    lesson: step.lesson,
+    step: step.step,
     slide: here() + 1,
     slides: all.length,
     began,
     ...minutes,
-    notes: (await Promise.all(notesIn(step, end).map(htmlOf))).join(''),
+    notes: step.notes,
     next: (await Promise.all(following.map(htmlOf))).join(''),
   };
   if (place !== shownPlace) return; // the deck has gone on meanwhile
