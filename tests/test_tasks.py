@@ -185,13 +185,18 @@ def test_long_lines_are_broken_at_blanks(capsys, lesson):
     assert ' '.join(' '.join(lines).split()).count(words) == 3
 
 
-def test_an_unknown_task_is_a_sentence():
+def test_an_unknown_task_is_a_sentence(monkeypatch):
     tasks = Tasks()
     tasks.add(list, name='a_list')
     with pytest.raises(
         ValueError, match="^This lesson has no task 'a_lisp'. Its tasks are called: a_"
     ):
         tasks.check('a_lisp')
+    monkeypatch.setenv('JPY_SESSION_NAME', '02_lose_messages.ipynb')
+    tasks.add(list, name='be_the_queue')
+    said = "^This lesson has no task 4. Tasks have names now, and this one is 'be_the_queue'[.]$"
+    with pytest.raises(ValueError, match=said):
+        tasks.check(4)  # as a student's cell of version 0.3 has it
     with pytest.raises(ValueError, match='^This lesson has two tasks that are called a_list[.]$'):
         tasks.add(list, name='a_list')
 

@@ -46,7 +46,7 @@ from helpers.checks import classroom, progress
 from helpers.checks.points import Test, judge_points
 from helpers.checks.sandbox import Ending, Sandbox
 from helpers.checks.verdict import Point, Verdict, bundle
-from helpers.lesson import check_call
+from helpers.lesson import check_call, earlier_name
 from helpers.notebook import names_of, own_line, somebody_watches
 
 CPU_LIMIT_S = 5.0  # of one point: an endless loop uses it up
@@ -176,9 +176,16 @@ class Tasks:
 
     def _judge_of(self, task: str) -> Judge:
         if task not in self.judges:
-            names = ', '.join(self.judges)
-            raise ValueError(f'This lesson has no task {task!r}. Its tasks are called: {names}.')
+            raise ValueError(f'This lesson has no task {task!r}. {self.names_in_words(task)}')
         return self.judges[task]
+
+    def names_in_words(self, task: object) -> str:
+        """Say how the tasks are called. In version 0.3 a student wrote a number."""
+        if str(task).isdecimal():
+            name = earlier_name(progress.this_lesson(), int(str(task)))
+            if name in self.judges:
+                return f'Tasks have names now, and this one is {name!r}.'
+        return f'Its tasks are called: {", ".join(self.judges)}.'
 
     def is_written(self, names: set[str]) -> None:
         """Note that a cell of the student has given these names a value: no solution has."""
@@ -197,7 +204,8 @@ def solution(line: str, cell: str) -> None:
     it has not. The cell may begin with another magic, such as `%%write`.
     """
     if _of_this_notebook is None or line.strip() not in _of_this_notebook.judges:
-        raise UsageError('Write the name of a task of this lesson: %%solution hear_the_text')
+        names = _of_this_notebook.names_in_words(line.strip()) if _of_this_notebook else ''
+        raise UsageError(f'Write the name of a task of this lesson. {names}'.strip())
     _of_this_notebook.run_solution(line.strip(), cell)
 
 
