@@ -1,4 +1,4 @@
-"""What a lesson is, read from its notebook. Nothing else reads a notebook as a lesson.
+"""What a lesson is, read from its notebook. Nothing else in Python reads a notebook as a lesson.
 
     for task in read(path.read_text(), path.name).tasks:
         print(task.number, task.name, task.title, task.star)
