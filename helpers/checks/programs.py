@@ -102,7 +102,14 @@ class Program:
         return self
 
     def __exit__(self, *exception) -> None:
+        if self.running:
+            os.kill(self.pid, signal.SIGCONT)  # one that was stopped could not end
         self._process.stop()
+
+    @property
+    def pid(self) -> int:
+        """The id of its process, for a signal that does not end it."""
+        return self._process.pid
 
     @property
     def running(self) -> bool:

@@ -20,6 +20,8 @@ tasks = Tasks()
 check = tasks.check
 
 QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
+ENDS_S = 0.3  # for a callback that waits for nothing
+SPINS_S = 5.0  # for two calls of spin_once, of 0.1 s each
 
 
 @tasks.add
@@ -27,18 +29,21 @@ def a_gate(GatedSubscriber):
     def holds(messages, depth, group, events):
         must_define(GatedSubscriber, '__init__')
         with Bench() as bench:
-            node, ended = GatedSubscriber(depth, group, events), []
+            node, begun, ended = GatedSubscriber(depth, group, events), [], []
             must_have(node, 'gate', 'subscription')
             subscription, callback = node.subscription, node.subscription.callback
 
             def call(message):
+                begun.append(message.data)
                 callback(message)
                 ended.append(message.data)
 
             subscription.callback = call
             bench.spin(node, threads=4)
             bench.say('number', *numbers(messages), at_once=True)
-            bench.quiet()
+            bench.wait(lambda: len(begun) == messages)
+            # A callback may also look at the gate again and again, so it is never quiet.
+            bench.wait(lambda: ended, ENDS_S)
             held = messages - len(ended)
             node.gate.set()
             bench.wait(lambda: len(ended) == messages)
@@ -126,7 +131,11 @@ def deep_enough_for_a_burst(depth_for_burst):
     return [
         ('30 messages, 2 threads', lambda: deep_enough(30, 2), hint),
         ('20 messages, 4 threads', lambda: deep_enough(20, 4), hint),
-        ('3 messages, 4 threads', lambda: deep_enough(3, 4), 'A depth is at least 1.'),
+        (
+            '3 messages, 4 threads',
+            lambda: all_of(deep_enough(3, 4), deep_enough(2, 6)),
+            'A depth is at least 1.',
+        ),
     ]
 
 
@@ -136,18 +145,21 @@ def publish_numbers(NumberPublisher):
         must_define(NumberPublisher, '__init__')
         with Bench() as bench:
             heard = bench.hear('number', Int32)
-            node = bench.spin(NumberPublisher(messages, period_s))
+            node = NumberPublisher(messages, period_s)
             must_have(node, 'publisher')
             topic = node.publisher.topic_name
             if topic != '/number':
                 return f'it publishes on {topic}, not on /number'
             periods = [timer.timer_period_ns / 1e9 for timer in node.timers]
+            if not periods:
+                return 'it has no timer'
+            bench.spin(node)
             bench.wait(lambda: len(heard) >= messages)
             bench.wait(lambda: len(heard) > messages, 6 * period_s)
         found = [message.data for message in heard]
         return all_of(
             expect(found, [*range(messages)], 'it published'),
-            periods == [] or expect(periods, [period_s], 'the periods (s) of its timers are'),
+            expect(periods, [period_s], 'the periods (s) of its timers are'),
         )
 
     hint = 'Count in self.count; self.timer.cancel() stops the timer.'
@@ -207,6 +219,8 @@ def threads_for_a_camera(threads_needed):
         ('10 Hz, 0.05 s, reserve 0.0', 10, 0.05, 0.0),
         ('20 Hz, 0.2 s, reserve 0.0', 20, 0.2, 0.0),
         ('20 Hz, 0.19 s, reserve 0.2', 20, 0.19, 0.2),
+        ('25 Hz, 0.2 s, reserve 0.0', 25, 0.2, 0.0),
+        ('21 Hz, 0.1 s, reserve 0.1', 21, 0.1, 0.1),
     )
 
 
@@ -306,10 +320,34 @@ def spin_it_yourself(spin_until):
             spin_until(SingleThreadedExecutor(), done)
         return bool(asked) or 'done() was never called'
 
+    def ends_while_nothing_comes():
+        asked = []
+
+        def done():
+            asked.append(1)
+            return len(asked) > 2
+
+        with ros_session():
+            executor = SingleThreadedExecutor()
+            thread = threading.Thread(target=spin_until, args=(executor, done), daemon=True)
+            thread.start()
+            thread.join(SPINS_S)
+            waits = thread.is_alive()
+            executor.shutdown(1)  # which wakes it
+            thread.join(1)
+        if waits:
+            return 'while no message comes, spin_once waits for ever: its time-out is missing'
+        return len(asked) > 2 or 'it ended before done() was true'
+
     hint = 'while not done(): ...'
     single = SingleThreadedExecutor
     return [
         ('SingleThreadedExecutor, 3 messages', lambda: spins_until(single, 3), hint),
         ('EventsExecutor, 5 messages', lambda: spins_until(EventsExecutor, 5), hint),
         ('it ends if all is done', stops_at_once, 'Call done: done(), not done.'),
+        (
+            'it asks done() again while no message comes',
+            ends_while_nothing_comes,
+            'executor.spin_once(timeout_sec=0.1)',
+        ),
     ]

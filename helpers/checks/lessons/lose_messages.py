@@ -1,12 +1,11 @@
 """What the tasks of the lesson "Lose messages" are judged by."""
 
 import os
-import re
 import signal
-import subprocess
-import sys
 import threading
 import time
+from collections.abc import Iterable
+from numbers import Integral
 
 import psutil
 from rclpy.executors import SingleThreadedExecutor
@@ -15,7 +14,8 @@ from std_msgs.msg import String
 
 from helpers.checks.bench import Bench, must_have, override
 from helpers.checks.errors import Failed, sentence
-from helpers.checks.points import cached
+from helpers.checks.points import all_of, cached, expect, rows
+from helpers.checks.programs import run_python
 from helpers.checks.tasks import Tasks
 from helpers.recording import explain, predict
 from helpers.ros import ros_session
@@ -34,10 +34,9 @@ def publish_numbers(MinimalPublisher, PERIOD_S):
             bench.spin(node)
             bench.wait(lambda: len(heard) >= messages)
             bench.wait(lambda: len(heard) > messages, 6 * PERIOD_S)
+        right = [f'Hello World: {number}' for number in range(messages)]
         texts = [message.data for message in heard]
-        if texts[:messages] != [f'Hello World: {number}' for number in range(messages)]:
-            return f'with messages={messages}, these were received: {texts[:messages]}'
-        return len(texts) == messages or f'more than {messages} messages were published'
+        return expect(texts, right, f'with messages={messages}, these were received:')
 
     def one_each_period():
         with ros_session():
@@ -47,9 +46,11 @@ def publish_numbers(MinimalPublisher, PERIOD_S):
             node.timer_callback()
             period_s = node.timer.timer_period_ns / 1e9
             depth = node.publisher.qos_profile.depth
-        found = f'{len(published)} a call, period {period_s:g} s, depth {depth}'
-        right = f'1 a call, period {PERIOD_S:g} s, depth 7'
-        return found == right or f'with the depth 7: {found}'
+        return all_of(
+            expect(len(published), 1, 'the number of messages that one call publishes is'),
+            expect(period_s, PERIOD_S, 'the period of its timer is', within=0.0001, unit='s'),
+            expect(depth, 7, 'with qos=7, the depth is'),
+        )
 
     hint = 'An f-string writes the number. Compare self.count with self.messages after you count.'
     return [
@@ -62,38 +63,40 @@ def publish_numbers(MinimalPublisher, PERIOD_S):
 @tasks.add
 def a_slow_subscriber(SlowSubscriber):
     def hear_once(text, callback_s=0.0):
-        """Return what the node logs of one message, and how long its callback takes."""
+        """Return what the node logs of one message, and how long its callback takes and sleeps."""
         override(SlowSubscriber, CALLBACK_S=callback_s)
         with Bench() as bench:
             node, executor = SlowSubscriber(10), SingleThreadedExecutor()
             must_have(node, 'subscription')
-            times_s, callback = [], node.subscription.callback
+            topic, callback, took = node.subscription.topic_name, node.subscription.callback, []
 
             def call(message):
-                begun_s = time.monotonic()
+                begun_s, before_s = time.monotonic(), awake_s()
                 callback(message)
-                times_s.append(time.monotonic() - begun_s)
+                took_s = time.monotonic() - begun_s
+                took.append((took_s, took_s - (awake_s() - before_s)))
 
             node.subscription.callback = call
             executor.add_node(node)
             bench.publisher('topic', String).publish(String(data=text))
             executor.spin_once(timeout_sec=1)
             log = bench.log('slow_subscriber')
-        if not times_s:
-            raise Failed(
-                f'a message on topic did not come: it receives {node.subscription.topic_name}'
-            )
-        return log, times_s[0]
+        if not took:
+            raise Failed(f'a message on topic did not come: it receives {topic}')
+        return log, *took[0]
 
     def logs(text):
-        log, _ = hear_once(text)
-        right = [f'[INFO] [slow_subscriber]: I heard: "{text}"']
-        return log == right or f'its log is: {" / ".join(log) or "empty"}'
+        log, _, _ = hear_once(text)
+        return expect(log, [f'[INFO] [slow_subscriber]: I heard: "{text}"'], 'its log is')
 
     def sleeps():
-        if hear_once('Hello World: 1', 0.7)[1] < 0.7:
-            return 'with CALLBACK_S = 0.7 the callback took less'
-        return hear_once('Hello World: 1')[1] < 1 or 'with CALLBACK_S = 0 it took a second'
+        _, took_s, slept_s = hear_once('Hello World: 1', 0.7)
+        if took_s < 0.7:
+            return f'with CALLBACK_S = 0.7 the callback took {took_s:.2f} s'
+        if slept_s < 0.35:
+            return 'with CALLBACK_S = 0.7 the callback is busy all the time, and does not sleep'
+        _, took_s, _ = hear_once('Hello World: 1')
+        return took_s < 1 or 'with CALLBACK_S = 0 it took a second'
 
     def subscription(*arguments, **options):
         with ros_session():
@@ -103,10 +106,10 @@ def a_slow_subscriber(SlowSubscriber):
 
     def depths():
         found = [subscription(depth)[0] for depth in (3, 10)]
-        return found == [3, 10] or f'with qos 3 and 10, the depths are {found}'
+        return expect(found, [3, 10], 'with qos 3 and 10, the depths are')
 
     def passes_options_on():
-        raw = subscription(10, raw=True)[1]
+        _, raw = subscription(10, raw=True)
         return raw or 'SlowSubscriber(10, raw=True) makes a subscription without raw=True'
 
     quotes = 'The text has quotation marks: I heard: "..."'
@@ -118,6 +121,16 @@ def a_slow_subscriber(SlowSubscriber):
         ('qos is its depth', depths, call),
         ('it passes **options on', passes_options_on, 'The same call: ..., qos, **options).'),
     ]
+
+
+def awake_s():
+    """Return how long this thread has run, or waited for a CPU (s): it has slept the rest."""
+    try:
+        with open('/proc/thread-self/schedstat') as file:
+            run_ns, waited_ns, _ = map(int, file.read().split())
+    except OSError:  # not each Linux counts how long a thread waits
+        return time.thread_time()
+    return (run_ns + waited_ns) / 1e9
 
 
 @tasks.add
@@ -136,15 +149,20 @@ def two_executors(spin_apart):
             spin_apart(bench.session, nodes)
             bench.wait(lambda: all(event.is_set() for event in ticked), 1)
             idle = sum(not event.is_set() for event in ticked)
+            executors = {node.executor for node in nodes}
             for event in ticked:
                 event.set()
-        return idle == 0 or f'of {count} nodes, {idle} did nothing while another one was busy'
+        if idle:
+            return f'of {count} nodes, {idle} did nothing while another one was busy'
+        return expect(len(executors), count, f'the number of executors for {count} nodes is')
 
     hint = 'Three lines in a loop: make an executor, add the node, let the session spin.'
-    return [
-        ('two nodes run at the same time', lambda: none_waits_for_another(2), hint),
-        ('three nodes run at the same time', lambda: none_waits_for_another(3), hint),
-    ]
+    return rows(
+        none_waits_for_another,
+        hint,
+        ('two nodes run at the same time', 2),
+        ('three nodes run at the same time', 3),
+    )
 
 
 @tasks.add
@@ -165,8 +183,9 @@ def be_the_queue(MyQueue):
         real = real_queue(depth, plan)
         if taken != real:
             return f'your queue gives {taken}, the real one {real}'
-        lost = [number for number in range(come) if number not in real]
-        return sorted(queue.lost) == lost or f'lost is {queue.lost}, but {lost} were pushed out'
+        pushed_out = [number for number in range(come) if number not in real]
+        lost = sorted(queue.lost) if isinstance(queue.lost, Iterable) else queue.lost
+        return expect(lost, pushed_out, f'0 to {come - 1} came, and self.lost is')
 
     first = 'Is there room? If not, which one goes?'
     oldest = 'list.pop(0) removes the oldest.'
@@ -197,12 +216,14 @@ def real_queue(depth, plan):
 def deep_enough(smallest_depth):
     def is_smallest(*run):
         depth = smallest_depth(*run)
+        case = f'smallest_depth{run} is {depth!r}'
+        if not isinstance(depth, Integral) or depth < 1:
+            return f'{case}, and a depth is a whole number from 1 up'
         period_s, callback_s, messages = run
         if lost := losses(period_s, callback_s, depth, messages):
-            return f'smallest_depth{run} is {depth}, and {lost} are lost'
-        if depth > 1 and not losses(period_s, callback_s, depth - 1, messages):
-            return f'smallest_depth{run} is {depth}, but {depth - 1} loses none, either'
-        return True
+            return f'{case}, and {lost} are lost'
+        spare = depth > 1 and not losses(period_s, callback_s, depth - 1, messages)
+        return not spare or f'{case}, but {depth - 1} loses none, either'
 
     hint = 'A while loop raises the depth by one as long as something is lost.'
     return [
@@ -220,7 +241,7 @@ def losses(period_s, callback_s, depth, messages):
 
 @tasks.add
 def count_the_losses(LossCounter):
-    def finds(numbers, missing):
+    def finds(numbers, right):
         override(LossCounter, CALLBACK_S=0.02)
         with Bench() as bench:
             node, executor = LossCounter(100, callback_group=None), SingleThreadedExecutor()
@@ -234,18 +255,14 @@ def count_the_losses(LossCounter):
         if took_s < 0.02 * len(numbers):
             return 'it does not do what a slow subscriber does'
         must_have(node, 'missing')
-        found = [*node.missing]
-        return found == missing or f'of {numbers} it says that {found} are missing'
+        missing = [*node.missing] if isinstance(node.missing, Iterable) else node.missing
+        return expect(missing, right, f'{numbers} came, and self.missing is')
 
-    hint = 'From self.expected up to this number, without it: range(...).'
+    between = 'From self.expected up to this number, without it: range(...).'
     return [
-        ('0, 1, 3: 2 is missing', lambda: finds([0, 1, 3], [2]), hint),
-        ('0, 4, 5, 7: four are missing', lambda: finds([0, 4, 5, 7], [1, 2, 3, 6]), hint),
-        (
-            '0, 1, 2: none is missing',
-            lambda: finds([0, 1, 2], []),
-            'Which one is expected after 0?',
-        ),
+        ('0, 1, 3: 2 is missing', lambda: finds([0, 1, 3], [2]), between),
+        ('0, 4, 5, 7: four are missing', lambda: finds([0, 4, 5, 7], [1, 2, 3, 6]), between),
+        ('0, 1, 2: none is missing', lambda: finds([0, 1, 2], []), 'Which one comes after 0?'),
         ('2, 3: 0 and 1 are missing', lambda: finds([2, 3], [0, 1]), 'The publisher began with 0.'),
     ]
 
@@ -268,51 +285,26 @@ except KeyboardInterrupt:
     node.destroy_node()
     rclpy.try_shutdown()
 """
+LISTENER = 'the listener'  # a program with the name of the talker would end it
 LONGER_THAN_PUBLISHING_S = 2.0
 WAITS_AT_MOST_S = 12.0
-ENDS_S = 5.0  # after Ctrl+C
 
 
-@tasks.add
+@tasks.add(limit_s=60)
 def a_program_of_its_own(workspace, file):
-    def start(bench, *arguments):
-        return subprocess.Popen(
-            [sys.executable, *arguments],
-            env=os.environ | bench.session.environment,
-            cwd=workspace.path,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        )
-
-    def end(*programs):
-        """End programs as Ctrl+C does: a kill leaves the shared memory of their participants."""
-        for program in programs:
-            program.send_signal(signal.SIGCONT)
-            program.send_signal(signal.SIGINT)
-        for program in programs:
-            try:
-                program.wait(ENDS_S)
-            except subprocess.TimeoutExpired:
-                program.kill()
-                program.wait()
-
     def comes(bench, talker):
         """Wait until the talker publishes texts, or has ended. Raises Failed for another topic."""
-        bench.wait(lambda: topics_of_texts(bench.tester) or talker.poll() is not None, 10)
+        bench.wait(lambda: topics_of_texts(bench.tester) or not talker.running, 10)
         topics = topics_of_texts(bench.tester)
         if topics and '/topic' not in topics:
-            end(talker)
             raise Failed(f'it publishes on {", ".join(topics)}, not on /topic')
 
-    def ended(bench, talker):
-        """Wait for the end of the talker. Raises Failed if it fails, or says nothing at its end."""
-        if not bench.wait(lambda: talker.poll() is not None, WAITS_AT_MOST_S):
-            end(talker)
+    def ends_well(talker):
+        """Wait for the end of the talker. Raises Failed if it does not end, or with an error."""
+        if not talker.has_ended(WAITS_AT_MOST_S):
             raise Failed('the program does not end')
-        printed = talker.stdout.read().strip().splitlines()
-        if talker.returncode:
-            raise Failed(python_error(printed) or f'the program ended with {talker.returncode}')
+        if talker.exit_code():
+            raise Failed(talker.error)
 
     def last_ones(depth):
         """Subscribe, and spin only when the program has ended."""
@@ -320,17 +312,16 @@ def a_program_of_its_own(workspace, file):
         with Bench() as bench:
             node, executor = Node('late_listener'), SingleThreadedExecutor()
             executor.add_node(node)
-            talker = start(bench, file)
-            comes(bench, talker)
-            node.create_subscription(String, 'topic', lambda m: heard.append(m.data), depth)
-            ended(bench, talker)
+            with run_python(workspace, file) as talker:
+                comes(bench, talker)
+                node.create_subscription(String, 'topic', lambda m: heard.append(m.data), depth)
+                ends_well(talker)
             bench.spin(node, executor=executor)
             bench.quiet()
-        right = [f'Hello World: {number}' for number in range(50 - depth, 50)]
-        if heard == right:
+        if heard == [f'Hello World: {number}' for number in range(50 - depth, 50)]:
             return True
-        numbers = [text.removeprefix('Hello World: ') for text in heard]
-        return f'with depth {depth}, these were received: {", ".join(numbers) or "none"}'
+        numbers = ', '.join(text.removeprefix('Hello World: ') for text in heard) or 'none'
+        return f'with depth {depth}, these were received: {numbers}; right is {50 - depth} to 49'
 
     last_ten = cached(lambda: last_ones(10))
 
@@ -338,24 +329,28 @@ def a_program_of_its_own(workspace, file):
         last_ten()  # what raises there would raise here, too
         return last_ones(3)
 
+    def too_early(talker):
+        ends_well(talker)
+        return 'it ends before a subscriber is there'
+
     def waits_for_all():
         """Keep a subscriber from getting anything: the program must not end."""
         last_ten()
-        with Bench() as bench:
-            talker = start(bench, file)
+        with Bench() as bench, run_python(workspace, file) as talker:
             # Two programs that begin at once in one domain may choose the same port.
             comes(bench, talker)
-            if talker.poll() is None:
-                listener = start(bench, '-c', SUBSCRIBER, str(talker.pid))
-                bench.wait(lambda: is_stopped(listener) or talker.poll() is not None, 10)
-            if talker.poll() is not None or not is_stopped(listener):
-                ended(bench, talker)
-                return 'it ends before a subscriber is there'
-            os.kill(talker.pid, signal.SIGCONT)
-            early = bench.wait(lambda: talker.poll() is not None, LONGER_THAN_PUBLISHING_S)
+            if not talker.running:
+                return too_early(talker)
+            with run_python(
+                workspace, '-c', SUBSCRIBER, str(talker.pid), name=LISTENER
+            ) as listener:
+                bench.wait(lambda: is_stopped(listener) or not talker.running, 10)
+                if not talker.running or not is_stopped(listener):
+                    return too_early(talker)
+                os.kill(talker.pid, signal.SIGCONT)
+                early = talker.has_ended(LONGER_THAN_PUBLISHING_S)
             if early:
-                ended(bench, talker)
-            end(listener, talker)
+                ends_well(talker)
         return not early or 'it ended although a slow subscriber had not got the messages'
 
     numbers = 'Which numbers does range(50) give?'
@@ -372,13 +367,5 @@ def topics_of_texts(node):
     return [name for name, types in topics if 'std_msgs/msg/String' in types]
 
 
-def is_stopped(process):
-    return psutil.Process(process.pid).status() == psutil.STATUS_STOPPED
-
-
-def python_error(lines):
-    """Return the error at the end of a traceback, and the line of the program where it came."""
-    places = [re.match(r'  File ".*?(\w+\.py)", line (\d+)', line) for line in lines]
-    places = [place for place in places if place and place[1] == 'talker.py']
-    where = f'Line {places[-1][2]} of {places[-1][1]}: ' if places else ''
-    return where + lines[-1] if lines else ''
+def is_stopped(program):
+    return psutil.Process(program.pid).status() == psutil.STATUS_STOPPED

@@ -11,7 +11,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from helpers.checks.bench import RELIABLE, Bench
-from helpers.checks.points import cached, expect, rows
+from helpers.checks.points import all_of, cached, expect, rows
 from helpers.checks.programs import run_python
 from helpers.checks.tasks import Tasks
 from helpers.robot import EMPTY, Robot
@@ -115,9 +115,24 @@ def measure_the_distance(Odometer):
         what = f'at the places {places} it measures'
         return expect(node.distance, distance, what, within=0.001, unit='m')
 
+    def measures_a_burst():
+        messages = [Odometry() for _ in range(6)]
+        for x, message in enumerate(messages):
+            message.pose.pose.position.x = float(x * x % 7)  # there and back: 0 1 4 2 2 4
+        with Bench() as bench:
+            node = Odometer()
+            bench.say('odom', *messages, at_once=True)
+            bench.spin(node)
+            bench.quiet()
+        what = 'of six places that come at once, 8 m long, it measures'
+        return expect(node.distance, 8, what, within=0.001, unit='m')
+
+    def there_and_back():
+        return all_of(measures(10, (0, 0), (3, 4), (0, 0)), measures_a_burst())
+
     return [
         ('3 m', lambda: measures(3, (1, 1), (1, 2), (3, 2)), 'math.dist((0, 0), (3, 4)) is 5.0.'),
-        ('there and back: 10 m', lambda: measures(10, (0, 0), (3, 4), (0, 0)), 'Keep each place.'),
+        ('there and back: 10 m', there_and_back, 'Keep each place. The depth is 10.'),
         ('one message: 0 m', lambda: measures(0, (5, 5)), 'If self.place is None, add nothing.'),
     ]
 
@@ -138,24 +153,29 @@ def drive_a_square(Square):
             commands = [(command.v, command.w) for command in robot.record.commands]
             robot.run(1.0)
         path = [(pose.x - 5, pose.y - 5) for pose in robot.record.poses]
-        return path, commands, timers, running
+        return path, commands, timers, running, robot.pose.yaw
 
     small, large = cached(lambda: drive(0.6)), cached(lambda: drive(1.0))
 
-    def corners(path, side):
+    def corners(drive, side):
+        path, *_, yaw = drive
         for corner in (side, 0), (side, side), (0, side), (0, 0):
             near = [number for number, place in enumerate(path) if math.dist(place, corner) < 0.1]
             if not near:
                 return f'the robot does not come to the corner {corner}'
             path = path[near[0] :]
-        return math.dist(path[-1], (0, 0)) < 0.1 or 'it does not end where it started'
+        if math.dist(path[-1], (0, 0)) > 0.1:
+            return 'it does not end where it started'
+        turned = math.degrees(math.remainder(yaw, math.tau))
+        return abs(turned) < 20 or f'at its end it looks {turned:.0f} degrees to the side'
 
-    def length(path, side):
+    def length(drive, side):
+        path, *_ = drive
         driven = sum(map(math.dist, path, path[1:]))
         return expect(driven, 4 * side, 'it drives', within=0.2, unit='m')
 
     def stops():
-        _, commands, timers, running = small()
+        _, commands, timers, running, _ = small()
         if not timers:
             return 'it has no timer'
         if running:
@@ -167,11 +187,14 @@ def drive_a_square(Square):
     tick = 'self.ticks % (self.side_ticks + 10) is the number of the tick in this side and turn.'
     end = 'After 4 * (self.side_ticks + 10) ticks: publish Twist(), and self.timer.cancel().'
     return [
-        ('side 1 m: it comes to the corners, and back', lambda: corners(large()[0], 1.0), tick),
-        ('side 0.6 m: it comes to the corners, and back', lambda: corners(small()[0], 0.6), tick),
-        ('side 1 m: it drives 4 m', lambda: length(large()[0], 1.0), 'Count self.ticks.'),
+        ('side 1 m: it comes to the corners, and back', lambda: corners(large(), 1.0), tick),
+        ('side 0.6 m: it comes to the corners, and back', lambda: corners(small(), 0.6), tick),
+        ('side 1 m: it drives 4 m', lambda: length(large(), 1.0), 'Count self.ticks.'),
         ('it stops the robot and its timer', stops, end),
     ]
+
+
+MORE_S = 0.5  # for a command that no message has asked for
 
 
 @tasks.add
@@ -184,6 +207,7 @@ def mirror_the_robot(Mirror):
             commands = bench.hear('two/cmd_vel', Twist)
             bench.spin(Mirror())
             bench.say('odom', *messages)
+            bench.wait(lambda: len(commands) > len(speeds), MORE_S)
         found = [(twist.linear.x, twist.angular.z) for twist in commands]
         right = [(v, -w) for v, w in speeds]
         return expect(found, right, f'of {[*speeds]} it made')
@@ -230,21 +254,28 @@ def hear_the_laser(asked):
 
 @tasks.add(limit_s=60)
 def a_program_of_its_own(workspace, file):
-    def is_program(team):
+    def is_program(team, sent=signal.SIGINT, name='Ctrl+C'):
         with Bench() as bench:
             heard = bench.hear('topic', String)
             with run_python(workspace, file, team) as talker:
-                talker.wait(lambda: len(heard) >= 2)
-                ended = talker.end(signal.SIGINT)
+                # It takes 1.5 s on an idle computer; once a second is too seldom on each.
+                often = talker.wait(lambda: heard) and talker.wait(lambda: len(heard) > 15, 10)
+                ended = talker.end(sent)
         teams = {message.data for message in heard}
         if teams != {team}:
             received = ', '.join(sorted(teams)) or 'nothing'
             return f'the listener received {received}, not {team}'
-        if not talker.says(f'[talker]: {team} talks'):
-            return f'its log has no line "[talker]: {team} talks"'
+        line = f'[talker]: {team} talks'
+        if not talker.says(line):
+            return f'its log has no line "{line}"'
+        logged = sum(line in printed for printed in talker.lines)
+        if logged < len(heard) - 1:  # the end may come between the two
+            return f'it sent {len(heard)} messages, and logged {logged} lines "{line}"'
+        if not often:
+            return f'in 10 s, {len(heard)} messages came, and not one every 0.1 s'
         if talker.failed:
-            return f'Ctrl+C ends it with a traceback: {talker.error}'
-        return ended or 'Ctrl+C does not end it'
+            return f'{name} ends it with a traceback: {talker.error}'
+        return ended or f'{name} does not end it'
 
     def can_be_imported():
         with run_python(workspace, '-c', f'import {file.removesuffix(".py")}') as program:
@@ -259,11 +290,33 @@ def a_program_of_its_own(workspace, file):
     return [
         ('red talks, until Ctrl+C ends it', lambda: is_program('red'), hint),
         ('blue talks, until Ctrl+C ends it', lambda: is_program('blue'), caught),
+        (
+            'red talks, until a shutdown by something else ends it',
+            lambda: is_program('red', signal.SIGTERM, 'SIGTERM, which shuts rclpy down,'),
+            caught,
+        ),
         ('a program that imports it gets the class, and nothing starts', can_be_imported, guarded),
     ]
 
 
-@tasks.add(limit_s=60)
+# The third tick that somebody hears fails.
+FAILS = """
+import {name} as own
+drive, ticks = own.Driver.timer_callback, []
+
+def fail(self):
+    drive(self)
+    if self.publisher.get_subscription_count():
+        ticks.append(1)
+    if len(ticks) == 3:
+        raise RuntimeError('the sensor is gone')
+
+own.Driver.timer_callback = fail
+own.main()
+"""
+
+
+@tasks.add(limit_s=90)
 def leave_a_robot_that_stands(workspace, file):
     def leaves_it_standing(sent):
         """Let the program drive, send it a signal, and look at what it has commanded."""
@@ -279,6 +332,19 @@ def leave_a_robot_that_stands(workspace, file):
         if speed:  # first: whether spin raises or returns depends on what it does just then
             return f'{sent.name} ends it, and its last command is {speed:g} m/s, not 0 m/s'
         return not driver.failed or f'{sent.name} ends it with an error: {driver.error}'
+
+    def leaves_it_standing_after_an_error():
+        """Let a callback fail while the robot drives, and look at what is commanded last."""
+        with Bench() as bench:
+            commands = bench.hear('cmd_vel', Twist, RELIABLE)
+            fails = FAILS.format(name=file.removesuffix('.py'))
+            with run_python(workspace, '-c', fails) as driver:
+                ended = driver.has_ended(15)
+            bench.quiet()
+        if not ended or not commands:
+            return f'it does not drive, and then end: {driver.error}'
+        speed = commands[-1].linear.x
+        return not speed or f'an error ends it, and its last command is {speed:g} m/s, not 0 m/s'
 
     def ends_while_nothing_happens():
         """Let the same main() spin a node to which nothing happens."""
@@ -306,4 +372,9 @@ def leave_a_robot_that_stands(workspace, file):
         ),
         ('after SIGTERM, too', lambda: leaves_it_standing(signal.SIGTERM), term),
         ('Ctrl+C also ends it while no callback is due', ends_while_nothing_happens, once_more),
+        (
+            'after an error in a callback the robot stands',
+            leaves_it_standing_after_an_error,
+            'What is in finally happens after each end, what is in except only after one of them.',
+        ),
     ]
