@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from helpers.checks.errors import Failed, NeverEnds
+from helpers.checks.errors import Failed, NeverEnds, WithoutHint
 from helpers.checks.points import all_of, cached, expect, judge_points, needs, rows
 
 
@@ -125,3 +125,19 @@ def test_what_several_points_look_at_is_made_once():
         with pytest.raises(ValueError, match='no'):
             broken()
     assert made == [1, 2]
+
+
+def test_a_hint_for_another_mistake_is_not_shown():
+    """What an earlier point lacks, and what a judge says so of, is no mistake of this point."""
+
+    def lacks_the_build():
+        needs(lambda: 'Line 7: a name is missing')
+
+    def differs():
+        raise WithoutHint('the program has ended')
+
+    points = ('it drives', lacks_the_build, 'Drive.'), ('it stops', differs, 'Stop.')
+    assert sent(*points)[1:] == [
+        ('point', (False, 'Line 7: a name is missing', True)),
+        ('point', (False, 'the program has ended', True)),
+    ]

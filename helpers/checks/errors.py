@@ -22,6 +22,10 @@ class Failed(Exception):  # noqa: N818 - a verdict, and no error
     """What a check has found: raised by the bench, shown as it is."""
 
 
+class WithoutHint(Failed):
+    """What a check has found, if it is not the mistake that the hint of the point is for."""
+
+
 class NeverEnds(Failed):
     """What a check has found, if each later point of the task would wait as long for the same."""
 

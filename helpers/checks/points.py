@@ -37,7 +37,7 @@ from numbers import Real
 
 import numpy as np
 
-from helpers.checks.errors import Failed, NeverEnds, place_of, sentence
+from helpers.checks.errors import Failed, NeverEnds, WithoutHint, place_of, sentence
 from helpers.notebook import frames, own_line, places
 
 Test = tuple[str, Callable[[], object], str]
@@ -75,7 +75,7 @@ def all_of(*results: bool | str) -> bool | str:
 
 
 def needs(point: Callable[[], object], otherwise: str = '') -> None:
-    """Raise Failed if an earlier point is not right. Call it at the beginning of a test.
+    """Raise WithoutHint if an earlier point is not right. Call it at the beginning of a test.
 
     `point` is the test of that point, which should be `cached`. `otherwise` says what is missing,
     'it is not built'; without it, what the earlier point has found is said again.
@@ -87,7 +87,7 @@ def needs(point: Callable[[], object], otherwise: str = '') -> None:
     except Failed as failed:
         found = str(failed)
     if found is not True:
-        raise Failed(otherwise or found)
+        raise WithoutHint(otherwise or found)
 
 
 def cached(function: Callable[[], object]) -> Callable[[], object]:
@@ -154,8 +154,9 @@ def _value(value: object, unit: str) -> str:
 def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
     """Judge the points one by one. This runs in the sandbox.
 
-    It sends ('points', [(what, hint), ...]), then ('point', (ok, found, names_line)) for each. If
-    the check itself is wrong it sends ('mistake', text), and no more.
+    It sends ('points', [(what, hint), ...]), then ('point', (ok, found, says_all)) for each: with
+    `says_all` its hint would be for another mistake. If the check itself is wrong it sends
+    ('mistake', text), and no more.
     """
     failures: list[str] = []
     threading.excepthook = lambda error: failures.append(
@@ -170,7 +171,7 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
     send(('points', [(what, hint) for what, _, hint in tests]))
     for number, (what, test, _) in enumerate(tests):
         failures.clear()
-        never_ends = names_line = False
+        never_ends = says_all = False
         try:
             result = _result(test)
             ok, found = (False, result) if isinstance(result, str) else (True, '')
@@ -180,7 +181,9 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
         except BaseException as error:  # whatever a student's code raises is an answer, not right
             ok, found = False, sentence(error)
             never_ends = isinstance(error, NeverEnds)
-            names_line = bool(place_of(error)) and not isinstance(error, Failed)
+            says_all = isinstance(error, WithoutHint) or (
+                bool(place_of(error)) and not isinstance(error, Failed)
+            )
         if failures and not ok:
             found = found if found[-1:] in ('', '.', '!', '?') else f'{found}.'
             found = f'{found} {failures[0]}'.strip()
@@ -192,7 +195,7 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
             ]
             if left and ok:
                 ok, found = False, _still_runs(left[0])
-        send(('point', (ok, found, names_line)))
+        send(('point', (ok, found, says_all)))
         if never_ends:
             break
 

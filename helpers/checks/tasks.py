@@ -229,9 +229,9 @@ def _judge(
                 verdict.points = []  # those that were tried count for nothing
                 verdict.note = f'This task cannot be judged: {content}.'
             else:
-                verdict.points[tried].ok, verdict.points[tried].found, names_line = content
-                if names_line:
-                    hints[tried] = ''  # the line says more; a hint for another mistake misleads
+                verdict.points[tried].ok, verdict.points[tried].found, says_all = content
+                if says_all:
+                    hints[tried] = ''  # a hint for another mistake misleads
                 tried += 1
             running.update(time.monotonic() - started)
     verdict.seconds = time.monotonic() - started

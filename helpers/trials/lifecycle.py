@@ -67,7 +67,10 @@ def _watched(camera_class: type[Node], raised: list[Exception]) -> type[Node]:
 
         def step(self, state):
             try:
-                return method(self, state)
+                result = method(self, state)
+                if not isinstance(result, TransitionCallbackReturn):
+                    raise TypeError(f'{name} returned {result}. Is there a return?')
+                return result
             except OSError:
                 raise
             except Exception as error:

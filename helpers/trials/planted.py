@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 import linecache
 import os
+import shlex
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -27,6 +28,7 @@ class Failure:
     """A test that failed: its name, the line of the student, and what pytest says.
 
     One that never `ran` failed before: in a fixture, or because an argument is no fixture.
+    `places` are where Python was, the innermost first.
     """
 
     test: str
@@ -34,6 +36,20 @@ class Failure:
     file: str
     line: int
     message: str
+    places: list[tuple[str, int]] = field(default_factory=list)
+
+    @property
+    def line_of_student(self) -> str:
+        """The innermost line of the student, `Line 7 of brake.py: ...`, or nothing."""
+        return own_line(self.places)
+
+    @property
+    def reason(self) -> str:
+        """What a test of ours has found, whose name and lines the student has never seen."""
+        message = ' '.join(self.message.partition('\n')[0].split())
+        said = message.removeprefix('AssertionError: ')[:LONGEST]
+        place = self.line_of_student
+        return f'{said}{"" if said[-1:] in (".", "!", "?") else "."} {place}' if place else said
 
     def __str__(self) -> str:
         source = linecache.getline(self.file, self.line).strip()
@@ -61,6 +77,11 @@ class TestRun:
     def fails(self) -> bool:
         """Whether a test ran and failed. Tests that cannot run do not find a bug."""
         return any(failure.ran for failure in self.failed)
+
+    @property
+    def reason(self) -> str:
+        """The result of tests of ours in words."""
+        return self.failed[0].reason if self.failed and not self.problem else self.says
 
     @property
     def says(self) -> str:
@@ -105,7 +126,8 @@ def run_tests(
     workspace.write('.versions.json', json.dumps(task))
     for file in (workspace.path / package).rglob('*.py'):
         linecache.checkcache(str(file))
-    command = f'PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 python -B {RUNNER} .versions.json'
+    runner = shlex.quote(str(RUNNER))
+    command = f'PYTEST_DISABLE_PLUGIN_AUTOLOAD=1 python -B {runner} .versions.json'
     if sourced:
         command = f'source install/setup.bash\n{command}'
     printed = workspace.terminal(command)
@@ -124,7 +146,14 @@ def _test_run(result: dict, folder: Path) -> TestRun:
         place = own_line((str(folder / file), int(line)) for file, line in result['places'])
         return TestRun(problem=f'{test} does not end. {place}'.rstrip('. '))
     failed = [
-        Failure(**entry | {'file': str(folder / entry['file'])}) for entry in result['failed']
+        Failure(
+            **entry
+            | {
+                'file': str(folder / entry['file']),
+                'places': [(str(folder / file), line) for file, line in entry['places']],
+            }
+        )
+        for entry in result['failed']
     ]
     run = TestRun(result['passed'], failed)
     if result['problems']:

@@ -52,6 +52,8 @@ class Reports:
             self.passed += 1
         if report.failed:
             file, line, message = _place_and_message(report)
+            entries = getattr(getattr(report.longrepr, 'reprtraceback', None), 'reprentries', [])
+            places = [getattr(entry, 'reprfileloc', None) for entry in reversed(entries)]
             self.failed.append(
                 {
                     'test': _name(report.nodeid),
@@ -59,6 +61,7 @@ class Reports:
                     'file': file,
                     'line': line,
                     'message': message,
+                    'places': [(place.path, place.lineno) for place in places if place],
                 }
             )
 

@@ -1,3 +1,4 @@
+#define _GLIBCXX_ASSERTIONS  // an empty optional that is read ends the program
 #include <algorithm>
 #include <iostream>
 #include <string>
@@ -6,8 +7,8 @@
 // Prints nearest(), and what min_element finds.
 int main(int argc, char ** argv)
 {
-  if (argc < 4) {
-    std::cerr << "usage: try_nearest RANGE_MIN RANGE_MAX RANGE..." << std::endl;
+  if (argc < 3) {
+    std::cerr << "usage: try_nearest RANGE_MIN RANGE_MAX [RANGE...]" << std::endl;
     return 2;
   }
   sensor_msgs::msg::LaserScan scan;
@@ -18,5 +19,6 @@ int main(int argc, char ** argv)
   }
   const auto found = scan_tools::nearest(scan);
   std::cout << (found ? std::to_string(*found) : "nothing") << std::endl;
-  std::cout << *std::min_element(scan.ranges.begin(), scan.ranges.end()) << std::endl;
+  const auto least = std::min_element(scan.ranges.begin(), scan.ranges.end());
+  std::cout << (least != scan.ranges.end() ? std::to_string(*least) : "nothing") << std::endl;
 }

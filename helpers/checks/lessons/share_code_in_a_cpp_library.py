@@ -9,15 +9,14 @@ import threading
 
 import numpy as np
 from geometry_msgs.msg import Twist
-from sensor_msgs.msg import LaserScan
 
-from helpers.checks.bench import Bench
-from helpers.checks.errors import Failed
-from helpers.checks.points import cached
+from helpers.checks.bench import Bench, scan
+from helpers.checks.errors import Failed, WithoutHint
+from helpers.checks.points import all_of, cached, expect, needs, rows
 from helpers.checks.programs import manifest
 from helpers.checks.tasks import Tasks
 from helpers.trials import build_anew
-from helpers.workspace import compile_error, why_it_failed
+from helpers.workspace import compile_error, error_in, why_it_failed
 
 tasks = Tasks()
 check = tasks.check
@@ -28,18 +27,20 @@ NOT_BUILT = 'it does not build'
 
 # --- A header and a source file, in a program of their own ----------------------------------------
 
-# Prints what a call returns for the numbers in its arguments. What is beyond the end of the ranges
-# is there, and is far away.
-PROGRAM = """#include <cstdlib>
+# Prints what a call returns for the numbers in its arguments, in a line that begins with "= ": a
+# student may print, too. What is beyond the end of the ranges is there, and is far away. The
+# assertions end it where an empty optional is read.
+PROGRAM = """#define _GLIBCXX_ASSERTIONS
+#include <cstdlib>
 #include <iostream>
 #include <optional>
 #include <stdexcept>
 #include <vector>
 #include <scan_tools/HEADER>
-template<class T> void show(const T & x) {std::cout << x << std::endl;}
+template<class T> void show(const T & x) {std::cout << "\\n= " << x << std::endl;}
 template<class T> void show(const std::optional<T> & x)
 {
-  if (x) {show(*x);} else {std::cout << "nothing" << std::endl;}
+  if (x) {show(*x);} else {show("nothing");}
 }
 int main(int count, char ** word) try {
   const int a = std::atoi(word[1]), b = std::atoi(word[2]);
@@ -51,107 +52,114 @@ int main(int count, char ** word) try {
   (void)n;
   show(CALL);
 } catch (const std::invalid_argument &) {
-  std::cout << "refused" << std::endl;
+  show("refused");
 }
 """
+EMPTY = '_M_is_engaged'  # the assertion of an optional
 
 
-class Program:
-    """A program that is compiled for a check, once."""
+class Compiled:
+    """A call of the student's function in a program of its own, which is compiled once.
+
+    The call has the ranges `r.data()`, their number `n`, and two numbers `a` and `b`.
+    """
 
     def __init__(self, workspace, header, call, source=''):
-        self._workspace = workspace
-        program = PROGRAM.replace('HEADER', header).replace('CALL', call)
-        self._text, self._source = program, source
-        self.error = cached(self._compile)
+        self._workspace, self._call, self._source = workspace, call, source
+        self._text = PROGRAM.replace('HEADER', header).replace('CALL', f'scan_tools::{call}')
+        self.compiles = cached(self._compile)
 
     def _compile(self):
-        """Return the first error of the compiler, or ''."""
+        """Return True, or the first error of the compiler."""
         self._workspace.write('try/main.cpp', self._text)
         output = self._workspace.terminal(
             'cd try && rm -f main\n'
             f'c++ -std=c++17 -I ../src/scan_tools/include main.cpp {self._source} -o main 2>&1'
         )
-        return compile_error(output) if output else ''
+        return self._workspace.file('try/main').is_file() or compile_error(output)
 
-    def compiles(self):
-        """Return True, or the first error of the compiler."""
-        return self.error() or True
-
-    def gives(self, right, a, b, ranges):
-        """Run the program. Return True if it prints what is right, or what it prints."""
-        if self.error():
-            return NOT_COMPILED
+    def gives(self, right, ranges, a, b=0):
+        """Return True if the call returns what is right, or else what it returns."""
+        needs(self.compiles, NOT_COMPILED)
         output = self._workspace.terminal(
             f'cd try && ulimit -t 1 && timeout 20 ./main {a} {b} {ranges} 2>&1'
         )
-        found = output or 'nothing: it crashed, or never ended'
-        return found == right or f'for {ranges} and {a}, {b} it is {found}, not {right}'
-
-
-FEW = 'nothing', 0, 3, 'nan 1 0'
+        lines = [line for line in output.splitlines() if line.startswith('= ')]
+        numbers = ranges.split()
+        values = {'r.data()': f'{{{", ".join(numbers)}}}', 'n': len(numbers), 'a': a, 'b': b}
+        words = r'r\.data\(\)|\b[nab]\b'
+        call = re.sub(words, lambda word: str(values[word[0]]), self._call)
+        if not lines and EMPTY in output:
+            raise WithoutHint(f'{call} reads the value of a std::optional that is empty')
+        found = lines[-1].removeprefix('= ') if lines else 'nothing: it crashed, or never ended'
+        return found == right or f'{call} is {found}, not {right}'
 
 
 @tasks.add
 def the_nearest_range(workspace):
-    program = Program(workspace, 'nearest.hpp', 'scan_tools::nearest(r.data(), a, b)')
+    program = Compiled(workspace, 'nearest.hpp', 'nearest(r.data(), a, b)')
     loop = 'A for loop from first, while less than last; an if.'
     nan = 'Skip it, with std::isnan.'
     negative = 'Skip NaN and 0.0, and nothing else.'
     half = 'Count the known ones. If 2 * known < last - first, return std::nullopt.'
     return [
         ('it compiles', program.compiles, 'Braces and semicolons?'),
-        ('of 3, 1, 2 it is 1', lambda: program.gives('1', 0, 3, '3 1 2'), loop),
-        (
-            'from beam 1 up to 3',
-            lambda: program.gives('4', 1, 3, '1 5 4 2'),
+        *rows(program.gives, loop, ('of 3, 1, 2 it is 1', '1', '3 1 2', 0, 3)),
+        *rows(
+            program.gives,
             'Beam `last` is not included.',
+            ('from beam 1 up to 3', '4', '1 5 4 2', 1, 3),
         ),
-        ('NaN does not count', lambda: program.gives('2', 0, 4, 'nan 3 nan 2'), nan),
-        ('also after the nearest', lambda: program.gives('1', 0, 4, '1 nan 3 nan'), nan),
-        (
-            '-infinity is the nearest',
-            lambda: program.gives('-inf', 0, 3, '1 -inf 2'),
+        *rows(
+            program.gives,
+            nan,
+            ('NaN does not count', '2', 'nan 3 nan 2', 0, 4),
+            ('also after the nearest', '1', '1 nan 3 nan', 0, 4),
+        ),
+        *rows(
+            program.gives,
             negative,
+            ('-infinity is the nearest', '-inf', '1 -inf 2', 0, 3),
+            ('0.0 does not count', '2', '0 3 2', 0, 3),
+            ('infinity counts', 'inf', 'inf nan', 0, 2),
         ),
-        ('0.0 does not count', lambda: program.gives('2', 0, 3, '0 3 2'), negative),
-        ('infinity counts', lambda: program.gives('inf', 0, 2, 'inf nan'), negative),
-        ('one known beam of three is not enough', lambda: program.gives(*FEW), half),
-        ('of no range it is nothing', lambda: program.gives('nothing', 1, 1, '1 2'), half),
+        *rows(
+            program.gives,
+            half,
+            ('one known beam of three is not enough', 'nothing', 'nan 1 0', 0, 3),
+            ('of no range it is nothing', 'nothing', '1 2', 1, 1),
+        ),
     ]
 
 
 @tasks.add
 def the_gap(workspace):
-    call = 'scan_tools::widest_gap(r.data(), n, a)'
-    program = Program(workspace, 'gap.hpp', call, '../src/scan_tools/src/gap.cpp')
+    source = '../src/scan_tools/src/gap.cpp'
+    program = Compiled(workspace, 'gap.hpp', 'widest_gap(r.data(), n, a)', source)
+    call = 'nearest(ranges, first, ...)'
     every = 'for (int first = 0; first + width <= size; ++first)'
     known = 'A window whose nearest range is std::nullopt is no gap: if (here && ...).'
     ties = '1 inf inf inf 1 inf inf inf'
     return [
         ('it compiles', program.compiles, 'Braces and semicolons?'),
-        (
-            'in the middle',
-            lambda: program.gives('3', 3, 0, '1 1 5 6 7 1'),
-            'nearest(ranges, first, ...)',
+        *rows(program.gives, call, ('in the middle', '3', '1 1 5 6 7 1', 3)),
+        *rows(
+            program.gives,
+            every,
+            ('the last window counts', '4', '1 1 1 2 3', 2),
+            ('no beam beyond the end', '1', '2 2 1', 2),
         ),
-        ('the last window counts', lambda: program.gives('4', 2, 0, '1 1 1 2 3'), every),
-        ('no beam beyond the end', lambda: program.gives('1', 2, 0, '2 2 1'), every),
-        ('the first of several', lambda: program.gives('2', 3, 0, ties), '>, not >='),
-        (
-            'what is not known is no gap',
-            lambda: program.gives('6', 2, 0, 'nan nan 0 nan 1 2 3 1'),
+        *rows(program.gives, '>, not >=', ('the first of several', '2', ties, 3)),
+        *rows(
+            program.gives,
             known,
+            ('what is not known is no gap', '6', 'nan nan 0 nan 1 2 3 1', 2),
+            ('nothing, if nothing is known', 'nothing', 'nan nan 0', 2),
         ),
-        (
-            'nothing, if nothing is known',
-            lambda: program.gives('nothing', 2, 0, 'nan nan 0'),
-            known,
-        ),
-        (
-            'a width of 9 of 3 beams is refused',
-            lambda: program.gives('refused', 9, 0, '1 1 1'),
+        *rows(
+            program.gives,
             'Keep throw.',
+            ('a width of 9 of 3 beams is refused', 'refused', '1 1 1', 9),
         ),
     ]
 
@@ -193,11 +201,10 @@ def result_of(workspace, *packages, library=None):
     return result.ok or why_it_failed(result)
 
 
-def printed_by(workspace, package, executable):
-    """Return the last line that an executable prints."""
-    run = f'source install/setup.bash\nros2 run {package} {executable}'
-    output = workspace.terminal(run)
-    return output.splitlines()[-1] if output else 'nothing'
+def prints(workspace, package, executable, right):
+    """Return True if the last line that an executable prints is right, or else this line."""
+    output = workspace.terminal(f'source install/setup.bash\nros2 run {package} {executable}')
+    return expect((output.splitlines() or ['nothing'])[-1], right, 'it prints')
 
 
 @tasks.add(limit_s=BUILD_S)
@@ -220,10 +227,8 @@ def make_the_library(workspace, library):
         return f'in install/scan_tools/lib: {", ".join(others) or "no library"}'
 
     def finds_the_gap():
-        if built() is not True:
-            return NOT_BUILT
-        output = printed_by(workspace, 'try_library', 'user')
-        return output == '2' or f'it prints: {output}'
+        needs(built, NOT_BUILT)
+        return prints(workspace, 'try_library', 'user', '2')
 
     return [
         ('another package builds with it', built, 'target_include_directories(... PUBLIC ...)'),
@@ -253,17 +258,15 @@ def link_the_library(workspace, library):
             result = workspace.build('look')
         finally:
             file.write_text(yours)
-        output = printed_by(workspace, 'look', 'look') if result.ok else why_it_failed(result)
-        right = f'The gap is at beam {beam}'
-        return output == right or f'for {ranges} it prints: {output}'
+        if not result.ok:
+            return f'for {ranges} it does not build: {why_it_failed(result)}'
+        right = prints(workspace, 'look', 'look', f'The gap is at beam {beam}')
+        return right is True or f'for {ranges}, {right}'
 
     def prints_the_gap():
-        if built() is not True:
-            return NOT_BUILT
-        output = printed_by(workspace, 'look', 'look')
-        if output != 'The gap is at beam 3':
-            return f'it prints: {output}'
-        return prints_for('7, 8, 9, 1, 1, 1', 1)
+        needs(built, NOT_BUILT)
+        right = prints(workspace, 'look', 'look', 'The gap is at beam 3')
+        return prints_for('7, 8, 9, 1, 1, 1', 1) if right is True else right
 
     steps = 'As in step 1, with find_package and target_link_libraries.'
     call = 'scan_tools::widest_gap(ranges, 6, 3).value(), and install(...)'
@@ -285,15 +288,27 @@ def give_it_to_others(workspace):
         return headers == right or f'in install/scan_tools/include: {", ".join(headers) or "none"}'
 
     def look_runs():
-        if built() is not True:
-            return NOT_BUILT
-        output = printed_by(workspace, 'look', 'look')
-        return output == 'The gap is at beam 3' or f'it prints: {output}'
+        needs(built, NOT_BUILT)
+        return prints(workspace, 'look', 'look', 'The gap is at beam 3')
+
+    def is_found_at_the_start():
+        """Source the package alone: for a library that is shared, colcon helps."""
+        needs(built, NOT_BUILT)
+        folders = workspace.terminal("""unset LD_LIBRARY_PATH DYLD_LIBRARY_PATH
+            source install/scan_tools/share/scan_tools/local_setup.bash
+            echo $LD_LIBRARY_PATH $DYLD_LIBRARY_PATH""")
+        is_there = 'install/scan_tools/lib' in folders
+        return is_there or 'after sourcing, programs do not look into install/scan_tools/lib'
 
     return [
         ('look builds with your library', built, 'Copy the three lines of the table.'),
         ('both headers are installed', headers_are_installed, 'install(DIRECTORY ...)'),
         ('look runs', look_runs, 'It runs if it builds.'),
+        (
+            'sourcing tells programs where the library is',
+            is_found_at_the_start,
+            'ament_export_targets(... HAS_LIBRARY_TARGET)',
+        ),
     ]
 
 
@@ -309,7 +324,7 @@ print(m.search(4.0))"""
 def bind(workspace):
     @cached
     def compiled():
-        include = f'-I {sysconfig.get_path("include")} -I {sys.prefix}/include'
+        include = f"-I '{sysconfig.get_path('include')}' -I '{sys.prefix}/include'"
         output = workspace.terminal(f"""
             mkdir -p try_module && cd try_module && rm -f scan_tools_py.so
             c++ -std=c++17 -shared -fPIC {include} -I ../src/scan_tools/include \\
@@ -320,27 +335,25 @@ def bind(workspace):
         return is_made or compile_error(output)
 
     def prints(code, right):
-        if compiled() is not True:
-            return NOT_COMPILED
+        needs(compiled, NOT_COMPILED)
         workspace.write(
             'try_module/try.py',
             f'import numpy as np, threading, time\nimport scan_tools_py as m\n{code}\n',
         )
-        output = workspace.terminal('cd try_module && python try.py 2>&1')
-        lines = output.splitlines() or ['nothing']
-        if lines[-1] == right:
-            return True
-        errors = [number for number, line in enumerate(lines) if re.match(r'\w*Error', line)]
-        first = errors[0] if errors else len(lines) - 1
-        return 'in Python: ' + ' '.join(map(str.strip, lines[first : first + 4]))
+        lines = workspace.terminal('cd try_module && python try.py 2>&1').splitlines()
+        return lines[-1:] == [right] or f'in Python: {error_in(lines)}'
 
-    guard = 'm.def("search", &search, py::call_guard<...>());'
     function = '[](const Ranges & ranges, int width) {return scan_tools::widest_gap(...);}'
+    guard = 'm.def("search", &search, py::call_guard<...>());'
     return [
         ('it compiles', compiled, 'Compare with nearest: parentheses, commas, semicolons.'),
-        ('a gap', lambda: prints('print(m.widest_gap([1, 5, 6, 5, 1], 3))', '2'), function),
-        ('another gap', lambda: prints('print(m.widest_gap(np.arange(9), 4))', '7'), function),
-        ('no gap is None', lambda: prints('print(m.widest_gap([0, 0], 1))', 'None'), function),
+        *rows(
+            prints,
+            function,
+            ('a gap', 'print(m.widest_gap([1, 5, 6, 5, 1], 3))', '2'),
+            ('another gap', 'print(m.widest_gap(np.arange(9), 4))', '7'),
+            ('no gap is None', 'print(m.widest_gap([0, 0], 1))', 'None'),
+        ),
         ('search releases the GIL', lambda: prints(STOPPED, 'True'), guard),
     ]
 
@@ -349,30 +362,36 @@ def bind(workspace):
 def name_what_it_needs(workspace):
     package = cached(lambda: manifest(workspace, 'src/scan_tools_py'))
 
-    def needs(kind, *right):
+    def names(kind, *right):
         found = sorted(depend.name for depend in getattr(package(), f'{kind}_depends'))
         return found == sorted(right) or f'named: {", ".join(found) or "none"}'
 
     tools = 'ament_cmake', 'ament_cmake_python'
     to_build = 'pybind11-dev', 'python3-dev', 'scan_tools'
     to_run = 'python3-numpy', 'scan_tools'
+    both = '<build_depend>, and <depend>'
     return [
-        ('the tools', lambda: needs('buildtool', *tools), '<buildtool_depend>'),
-        (
-            'what it needs to build',
-            lambda: needs('build', *to_build),
-            '<build_depend>, and <depend>',
-        ),
-        ('what it needs to run', lambda: needs('exec', *to_run), '<exec_depend>'),
+        ('the tools', lambda: names('buildtool', *tools), '<buildtool_depend>'),
+        ('what it needs to build', lambda: names('build', *to_build), both),
+        ('what it needs to run', lambda: names('exec', *to_run), '<exec_depend>'),
     ]
 
 
-def imports_the_module(workspace):
-    output = workspace.terminal("""
-        source install/setup.bash
-        python -c 'import scan_tools_py as m; print(m.widest_gap([1, 5, 6, 5, 1], 3))' 2>&1
-    """)
-    return output == '2' or (output.splitlines() or ['it printed nothing'])[-1]
+def module_points(workspace, built, hint):
+    """Return the points of a task that makes the module: it builds, and Python imports it."""
+
+    def is_imported():
+        needs(built, NOT_BUILT)
+        lines = workspace.terminal("""
+            source install/setup.bash
+            python -c 'import scan_tools_py as m; print(m.widest_gap([1, 5, 6, 5, 1], 3))' 2>&1
+        """).splitlines()
+        return lines[-1:] == ['2'] or error_in(lines)
+
+    return [
+        ('the module builds', built, hint),
+        ('Python imports it', is_imported, 'It comes with the build.'),
+    ]
 
 
 @tasks.add(limit_s=BUILD_S)
@@ -381,28 +400,14 @@ def make_the_module(workspace, library):
     built = cached(
         lambda: result_of(workspace, 'scan_tools', 'scan_tools_py', library=shared + GIVEN)
     )
-
-    def is_imported():
-        return imports_the_module(workspace) if built() is True else NOT_BUILT
-
     module = 'pybind11_add_module(scan_tools_py NO_EXTRAS src/bindings.cpp)'
-    return [
-        ('the module builds', built, module),
-        ('Python imports it', is_imported, 'It comes with the build.'),
-    ]
+    return module_points(workspace, built, module)
 
 
 @tasks.add(limit_s=BUILD_S)
 def fix_it(workspace):
     built = cached(lambda: result_of(workspace, 'scan_tools', 'look', 'scan_tools_py'))
-
-    def is_imported():
-        return imports_the_module(workspace) if built() is True else NOT_BUILT
-
-    return [
-        ('the module builds', built, "'add_library(scan_tools SHARED'"),
-        ('Python imports it', is_imported, 'It comes with the build.'),
-    ]
+    return module_points(workspace, built, "'add_library(scan_tools SHARED'")
 
 
 # --- The node -------------------------------------------------------------------------------------
@@ -418,11 +423,9 @@ def through_the_slalom(GapDriver, WIDTH, scan_tools_py):
             if event == 'c_call':
                 calls.append(function)
 
-        ranges = np.full(181, math.nan if gap is None else 1.0, np.float32)
+        ranges = np.full(181, math.nan if gap is None else 1.0)
         if gap is not None:
             ranges[gap - WIDTH // 2 : gap + WIDTH // 2 + 1] = 3.0
-        step = math.pi / 180
-        scan = LaserScan(angle_min=-math.pi / 2, angle_increment=step, ranges=ranges.tolist())
         with Bench() as bench:
             commands = bench.hear('cmd_vel', Twist)
             threading.setprofile(note)  # for the thread that spins the node
@@ -430,17 +433,18 @@ def through_the_slalom(GapDriver, WIDTH, scan_tools_py):
             threading.setprofile(None)
             if not bench.tester.count_subscribers('scan'):
                 raise Failed('nobody hears the topic scan')
-            bench.say('scan', scan)
+            bench.say('scan', scan(ranges))
         if not commands:
             raise Failed('after a scan, it publishes nothing on cmd_vel')
         return commands[0], scan_tools_py.widest_gap in calls
 
-    def drives(gap, right):
+    def drives(gap, w):
         command, _ = command_for(gap)
-        v, w = command.linear.x, command.angular.z
-        if abs(v - 0.4) > 0.001:
-            return f'linear.x is {v:.2f}'
-        return abs(w - right) < 0.001 or f'with the gap at beam {gap}, angular.z is {w:.2f}'
+        of = f'with the gap at beam {gap},'
+        return all_of(
+            expect(command.linear.x, 0.4, f'{of} linear.x is', within=0.001),
+            expect(command.angular.z, w, f'{of} angular.z is', within=0.001),
+        )
 
     def stops():
         command, _ = command_for(None)

@@ -9,6 +9,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <rcl/error_handling.h>
@@ -190,20 +191,29 @@ public:
   // (In rclcpp this is the work of a WaitSet.)
   std::vector<SubscriptionBase::SharedPtr> wait()
   {
+    constexpr std::chrono::milliseconds limit{100};
+    std::vector<SubscriptionBase::SharedPtr> subscriptions;  // those that somebody still holds
+    for (const auto & each : subscriptions_) {
+      if (auto subscription = each.lock()) {subscriptions.push_back(subscription);}
+    }
+    if (subscriptions.empty()) {  // rcl_wait refuses to wait for nothing
+      std::this_thread::sleep_for(limit);
+      return {};
+    }
     auto wait_set = rcl_get_zero_initialized_wait_set();
     const auto allocator = rcl_get_default_allocator();
-    check(rcl_wait_set_init(&wait_set, subscriptions_.size(), 0, 0, 0, 0, 0, &context, allocator));
-    for (const auto & subscription : subscriptions_) {
+    check(rcl_wait_set_init(&wait_set, subscriptions.size(), 0, 0, 0, 0, 0, &context, allocator));
+    for (const auto & subscription : subscriptions) {
       check(rcl_wait_set_add_subscription(&wait_set, &subscription->subscription_, nullptr));
     }
-    const auto result = rcl_wait(&wait_set, RCL_MS_TO_NS(100));
+    const auto result = rcl_wait(&wait_set, RCL_MS_TO_NS(limit.count()));
     std::vector<SubscriptionBase::SharedPtr> ready;
     if (result == RCL_RET_TIMEOUT) {
       rcl_reset_error();
     } else {
       check(result);
-      for (std::size_t i = 0; i < subscriptions_.size(); ++i) {
-        if (wait_set.subscriptions[i] != nullptr) {ready.push_back(subscriptions_[i]);}
+      for (std::size_t i = 0; i < subscriptions.size(); ++i) {
+        if (wait_set.subscriptions[i] != nullptr) {ready.push_back(subscriptions[i]);}
       }
     }
     check(rcl_wait_set_fini(&wait_set));
@@ -212,7 +222,7 @@ public:
 
 private:
   Handle handle_;
-  std::vector<SubscriptionBase::SharedPtr> subscriptions_;
+  std::vector<std::weak_ptr<SubscriptionBase>> subscriptions_;  // as in rclcpp: it keeps none
 };
 
 // Waits, takes, calls, until Ctrl+C.
