@@ -205,9 +205,11 @@ def test_evidence_must_have_been_run(workspace):
     assert results(found(robot, 'qos', command, line))[3] == 'qos: no'
 
 
-def test_a_drive_can_have_a_clock_that_is_ahead(workspace):
-    fault = FAULTS['two_clocks']
+@pytest.mark.parametrize(('name', 'trouble'), [('two_clocks', 'clock'), ('wrong_way', 'push')])
+def test_a_drive_can_have_trouble(workspace, name, trouble):
+    fault = FAULTS[name]
     robot = take(workspace, fault, 'cleo', anew=True)
     robot.mend(fault.right[0])
-    end = drive(robot, OTHER, trouble='clock')
+    end = drive(robot, OTHER, trouble=trouble)
     assert (end.how, end.braked, end.went_on, end.stands_at_exit) == ('stops', True, True, True)
+    assert end.voices == 1  # who pushes it is no program of the robot

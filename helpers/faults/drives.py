@@ -71,7 +71,7 @@ class Drive:
     braked: bool | None  # while its laser saw nothing; None: it did not come so far
     went_on: bool  # after that
     stands_at_exit: bool  # its last command, after Ctrl+C, was to stop
-    voices: int  # publishers on cmd_vel while it drove
+    voices: int  # publishers on cmd_vel while it drove, without our remote control
 
 
 def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', params='') -> Drive:
@@ -144,7 +144,7 @@ class Watcher:
             if is_still:
                 return 'stands' if self._waited_enough() else ''
             self._moved_at_s = now_s
-        self.voices = max(self.voices, self.session.node.count_publishers('cmd_vel'))
+        self.voices = max(self.voices, self._count_voices())
         if self.trouble and self._is_in_trouble(now_s, is_still):
             return ''
         if self.braked is not None and self.moved_m > self._trouble_at_m + 0.1:
@@ -156,6 +156,11 @@ class Watcher:
         elif now_s - self._still_at_s > STILL_S:
             return 'stops'
         return 'goes on' if now_s - self._moved_at_s > LONGEST_S else ''
+
+    def _count_voices(self) -> int:
+        """Return how many publishers on cmd_vel there are beside the one that pushes."""
+        found = self.session.node.get_publishers_info_by_topic('cmd_vel')
+        return sum(publisher.node_name != self.robot.get_name() for publisher in found)
 
     def _is_in_trouble(self, now_s: float, is_still: bool) -> bool:
         """Bring the trouble when it is on its way, and end it after its time."""
