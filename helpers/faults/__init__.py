@@ -14,7 +14,7 @@ tempting and wrong. Another fault is another folder: CONTRIBUTING.md says what i
 """
 
 from helpers.faults.cases import FAULTS, KINDS, Case, Fault, Mend, forget, mend_in_words, take
-from helpers.faults.drives import OTHER, SEEN, Drive, drive
+from helpers.faults.drives import FRESH_S, OTHER, SEEN, Drive, drive
 from helpers.faults.robots import (
     CORE,
     OTHERS,
@@ -46,6 +46,7 @@ __all__ = [
     'OTHERS',
     'CORE',
     'FAULTS',
+    'FRESH_S',
     'KINDS',
     'OTHER',
     'SEEN',

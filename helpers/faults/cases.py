@@ -74,6 +74,7 @@ class Fault:
     `breaks` the edits of the healthy files. `fails` has how a drive may end (see `Drive.how`).
     `look` and `line` are a command and a line of its output that is evidence. `trouble` is what
     happens to its laser on the drive that judges a mend, and `keeps` has what must stay in a file.
+    With `asks_route` its brake must stop it while the route is not active: one more drive.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Fault:
     breaks: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     also: tuple[str, ...] = ()
     trouble: str = 'blind'
+    asks_route: bool = False
     keeps: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property

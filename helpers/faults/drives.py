@@ -7,6 +7,10 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from geometry_msgs.msg import Twist, Vector3
+from rcl_interfaces.srv import GetParameters
+from rclpy.task import Future
+from std_msgs.msg import Float64
 
 from helpers.faults.cases import Case
 from helpers.robot import CORRIDOR, TURTLEBOT3, DriveRecord, Floor, Pose, Robot
@@ -24,6 +28,9 @@ LIMIT_S = 57.0  # of a drive in which nothing is decided
 TROUBLE_M, TROUBLE_S, PUSH_S = 0.4, 1.4, 0.5
 AHEAD = np.radians(np.arange(-10.0, 11.0))
 NODES = 3  # of the package
+TOPICS = 'cmd_vel', 'wanted'  # on which only one program may publish
+ASKED = 'brake', 'route'
+FRESH_S, FRESH_LIMIT_S = 0.15, 6.0  # ten scans come in a second
 
 
 @dataclass(frozen=True)
@@ -71,26 +78,39 @@ class Drive:
     braked: bool | None  # while its laser saw nothing; None: it did not come so far
     went_on: bool  # after that
     stands_at_exit: bool  # its last command, after Ctrl+C, was to stop
-    voices: int  # publishers on cmd_vel while it drove
+    voices: dict[str, int]  # publishers on cmd_vel and wanted while it drove, without our own
+    simulated: list[str]  # its nodes that said they use simulated time
+    freshest_s: float  # how old the scan was on which its brake worked, at the end: the least
 
 
-def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', params='') -> Drive:
+def drive(
+    case: Case,
+    place: Place = SEEN,
+    name: str = '',
+    trouble: str = '',
+    params: str = '',
+    wanted_mps: float = 0.0,
+) -> Drive:
     """Launch a robot's programs beside it, and let it drive until something is decided.
 
     With a `name` one sees it. `trouble` is what happens for a moment on its way: 'blind', its laser
     sees nothing; 'clock', its stamps are ahead; 'push', it is blind, and somebody turns it by
-    remote control. `params` are more words of `ros2 launch`.
+    remote control. `params` are more words of `ros2 launch`. With `wanted_mps` we publish that
+    speed on `wanted`.
     """
     workspace = case.workspace
     end_launches(workspace.terminals.values())
     words = f'{LAUNCH.format(name=case.name)} {params}'.strip()
+    freshest_s = 0.0
     with ros_session() as session:
         robot = Robot(place.floor, start=place.start, driver=DRIVER)
         if name:
             watch(robot, name=name)
         with workspace.start(words, f'the launch of {case.name}') as program:
-            watcher = Watcher(session, robot, program, trouble)
+            watcher = Watcher(session, robot, program, trouble, wanted_mps)
             robot.run(LIMIT_S, until=watcher.is_over)
+            if watcher.how == 'stops' and trouble:
+                freshest_s = watcher.wait_for_a_fresh_scan()
             program.interrupt()
         for record in session.records():  # what programs log stands in their terminal
             record.printed = True
@@ -108,15 +128,33 @@ def drive(case: Case, place: Place = SEEN, name: str = '', trouble: str = '', pa
             went_on=watcher.went_on,
             stands_at_exit=not last or last[0].v == last[0].w == 0,
             voices=watcher.voices,
+            simulated=watcher.simulated,
+            freshest_s=freshest_s,
         )
 
 
 class Watcher:
     """Looks at a drive until it is over, and brings the trouble."""
 
-    def __init__(self, session: Session, robot: Robot, program: Process, trouble: str) -> None:
-        self.session, self.robot, self.program, self.trouble = session, robot, program, trouble
-        self.how, self.braked, self.went_on, self.voices = '', None, False, 0
+    def __init__(
+        self, session: Session, robot: Robot, program: Process, trouble: str, wanted_mps: float
+    ) -> None:
+        self.robot, self.program, self.trouble = robot, program, trouble
+        self.how, self.braked, self.went_on = '', None, False
+        self.voices = dict.fromkeys(TOPICS, 0)
+        self.node = session.node
+        self.ours = {robot.get_name(), self.node.get_name()}  # the names of these two nodes
+        # Of a drive that one sees, the session would say what these wait for.
+        asked = ASKED if trouble else ()
+        self._clients = {
+            name: robot.create_client(GetParameters, f'{name}/get_parameters') for name in asked
+        }
+        self._answers: dict[str, Future] = {}  # whether a node uses simulated time
+        self._ages: list[float] = []
+        if trouble:
+            robot.create_subscription(Float64, 'brake/scan_age', self._on_age, 10)
+        self._wanted = robot.create_publisher(Twist, 'wanted', 1) if wanted_mps else None
+        self._wanted_mps = wanted_mps
         self._begun_s, self._ready_s = time.monotonic(), None
         self._moved_at_s = self._still_at_s = self._trouble_at_s = None
         self._trouble_at_m = 0.0
@@ -132,8 +170,23 @@ class Watcher:
         self.how = self._decide()
         return bool(self.how)
 
+    def wait_for_a_fresh_scan(self) -> float:
+        """Wait until its brake works on a scan that is new. Return how old the newest one was.
+
+        It stands. If its callback is slower than the laser, its queue is full now, and in one of
+        three or more each scan waits for two others.
+        """
+        self._ages.clear()
+        self.robot.run(FRESH_LIMIT_S, until=lambda: min(self._ages, default=1.0) < FRESH_S)
+        return min(self._ages, default=0.0)
+
+    def _on_age(self, age: Float64) -> None:
+        self._ages.append(age.data)
+
     def _decide(self) -> str:
         robot, now_s = self.robot, self.robot.t_s
+        if self._wanted:
+            self._wanted.publish(Twist(linear=Vector3(x=self._wanted_mps)))
         if robot.bumps:
             return 'hits'
         if not self.program.running or any(DIED in line for line in self.program.lines):
@@ -144,7 +197,7 @@ class Watcher:
             if is_still:
                 return 'stands' if self._waited_enough() else ''
             self._moved_at_s = now_s
-        self.voices = max(self.voices, self.session.node.count_publishers('cmd_vel'))
+        self._look_at_its_nodes()
         if self.trouble and self._is_in_trouble(now_s, is_still):
             return ''
         if self.braked is not None and self.moved_m > self._trouble_at_m + 0.1:
@@ -156,6 +209,26 @@ class Watcher:
         elif now_s - self._still_at_s > STILL_S:
             return 'stops'
         return 'goes on' if now_s - self._moved_at_s > LONGEST_S else ''
+
+    @property
+    def simulated(self) -> list[str]:
+        """Which of its nodes have said that they use simulated time."""
+        return [
+            name
+            for name, answer in self._answers.items()
+            if answer.done() and answer.result().values[0].bool_value
+        ]
+
+    def _look_at_its_nodes(self) -> None:
+        """Count who publishes, without us, and ask once whether they use simulated time."""
+        for topic in TOPICS:
+            found = self.node.get_publishers_info_by_topic(topic)
+            voices = sum(publisher.node_name not in self.ours for publisher in found)
+            self.voices[topic] = max(self.voices[topic], voices)
+        for name, client in self._clients.items():
+            if name not in self._answers and client.service_is_ready():
+                request = GetParameters.Request(names=['use_sim_time'])
+                self._answers[name] = client.call_async(request)
 
     def _is_in_trouble(self, now_s: float, is_still: bool) -> bool:
         """Bring the trouble when it is on its way, and end it after its time."""
@@ -185,8 +258,7 @@ class Watcher:
         """Return whether a robot that stands will not move any more: a slow machine has longer."""
         now_s = time.monotonic()
         if self._ready_s is None:
-            names = set(self.session.node.get_node_names()) - {self.robot.get_name()}
-            names.discard(self.session.node.get_name())
+            names = {*self.node.get_node_names()} - self.ours
             if len(names) < NODES and now_s - self._begun_s < READY_S:
                 return False
             self._ready_s = now_s

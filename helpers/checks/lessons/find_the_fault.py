@@ -3,9 +3,9 @@
 import re
 
 from helpers.checks.errors import Failed
-from helpers.checks.points import cached
+from helpers.checks.points import all_of, cached, needs
 from helpers.checks.tasks import Tasks
-from helpers.faults import CORE, KINDS, OTHER, TURNED, proves, words
+from helpers.faults import CORE, FRESH_S, KINDS, OTHER, TURNED, proves, words
 from helpers.faults import drive as drive_apart
 from helpers.workspace import error_of_launch
 
@@ -15,56 +15,58 @@ check = tasks.check
 STOP_M = 0.9  # in the file of the drive that judges
 NEARER_M, FARTHER_M = 0.35, 0.15  # it may stop so far from that: it is heard late, and measured
 LEAST = 3  # letters of a line
+IDLE = ': the route is not active'
+SLOW_MPS = 0.1  # as far as a drive may last, it comes near nothing
+NOT_SO_FAR = 'it did not come so far'
+NOTHING = '', 'None'
 
 
 def found(case, kind, command, line):
     """Judge what somebody says is wrong, and by what it is seen."""
+    kind_said, command_said, line_said = words(kind).lower(), words(command), words(line)
 
-    def outputs():
-        wanted = words(command)
-        if wanted in ('', 'None'):
-            raise Failed('no command yet')
-        printed = [said for ran, said in case.commands() if wanted in words(ran)]
-        if not printed:
-            raise Failed(f'since {case.name} is here, no cell with %%terminal has run: {wanted}')
-        return printed
+    @cached
+    def printed():
+        """Return the lines that the command has printed, in all of its runs."""
+        runs = [said for ran, said in case.commands() if command_said in words(ran)]
+        return [words(one) for said in runs for one in said.splitlines()] if runs else None
 
+    @cached
     def lines():
-        wanted = words(line)
-        if wanted in ('', 'None'):
-            raise Failed('no line yet')
-        printed = [words(one) for said in outputs() for one in said.splitlines()]
-        same = [one for one in printed if wanted == one]
-        same = same or [one for one in printed if wanted in one and len(wanted) >= LEAST]
-        if not same:
-            raise Failed(f'{words(command)} has printed no line with: {wanted}')
-        return same
+        """Return the lines that are meant: equal ones, or else those that have it in them."""
+        same = [one for one in printed() if line_said == one]
+        return same or [one for one in printed() if line_said in one and len(line_said) >= LEAST]
 
     def was_run():
-        return bool(outputs())
+        if command_said in NOTHING:
+            return 'no command yet'
+        return printed() is not None or (
+            f'since {case.name} is here, no cell with %%terminal has run: {command_said}'
+        )
 
     def was_printed():
-        return bool(lines())
+        if line_said in NOTHING:
+            return 'no line yet'
+        needs(was_run)
+        return bool(lines()) or f'{command_said} has printed no line with: {line_said}'
 
     def shows_the_fault():
-        if any(proves(case, words(command), one) for one in lines()):
-            return True
-        return 'this line alone does not show it: a good robot could print it, too'
+        needs(was_printed)
+        shows = any(proves(case, command_said, one) for one in lines())
+        return shows or 'this line alone does not show it: a good robot could print it, too'
 
     def is_of_this_kind():
         if kind in (None, ...):
             return 'no kind yet'
-        if word not in KINDS:
+        if kind_said not in KINDS:
             return f'{kind!r} is none of the kinds'
-        if shown() is not True:
-            return 'it is judged when the line shows the fault'
-        return word in (case.fault.kind, *case.fault.also) or f'{kind}: no'
+        needs(shows_the_fault, 'it is judged when the line shows the fault')
+        return kind_said in (case.fault.kind, *case.fault.also) or f'{kind}: no'
 
-    word, shown = words(kind).lower(), cached(shows_the_fault)
     return [
         ('the command was run', was_run, 'Run it in a cell that begins with %%terminal.'),
         ('it has printed the line', was_printed, 'Copy the line from its output.'),
-        ('the line shows the fault', shown, case.fault.hint),
+        ('the line shows the fault', shows_the_fault, case.fault.hint),
         ('the kind of the fault', is_of_this_kind, case.fault.hint),
     ]
 
@@ -80,53 +82,83 @@ def mended(case):
     def driven():
         return drive_apart(case, OTHER, trouble=case.fault.trouble, params=params(case))
 
+    def came_so_far():
+        return driven().how not in ('stands', 'died')
+
+    def wrong(text):
+        """Return what is wrong, and what is said of each tempting mend that is seen."""
+        mends = case.wrong_mends()
+        said = [mend.says for mend in mends if not mend.ends or driven().how in mend.ends]
+        return ' '.join([f'{text}.', *said]) if said else text
+
     def drives_off():
         end = driven()
         if end.how == 'died':
-            raise Failed(error_of_launch(end.said) or 'the launch has ended, and said nothing')
-        return end.how != 'stands' or with_mends(case, end, 'it does not move')
+            return error_of_launch(end.said) or 'the launch has ended, and said nothing'
+        return end.how != 'stands' or wrong('it does not move')
 
     def minds_its_laser():
         end = driven()
         if end.braked is None:
-            return 'it did not come so far'
-        if not end.braked:
-            return with_mends(case, end, 'it drives on')
-        return end.went_on or with_mends(case, end, 'it stops, and never goes on')
+            return NOT_SO_FAR
+        return all_of(
+            end.braked or wrong('it drives on'),
+            end.went_on or wrong('it stops, and never goes on'),
+        )
 
     def arrives():
         end = driven()
-        if end.how in ('stands', 'died'):
-            return 'it did not come so far'
+        if not came_so_far():
+            return NOT_SO_FAR
         if end.how == 'hits':
-            return with_mends(case, end, 'it hits something')
-        if end.voices > 1:
-            return with_mends(case, end, f'{end.voices} programs publish on cmd_vel')
+            return wrong('it hits something')
+        for topic, voices in end.voices.items():
+            if voices > 1:
+                return wrong(f'{voices} programs publish on {topic}')
         if end.how == 'goes on':
-            return with_mends(case, end, 'it does not come to an end')
+            return wrong('it does not come to an end')
         if abs(end.turned) > TURNED:
-            return with_mends(case, end, 'it does not keep its direction')
-        away_m = end.free_m - STOP_M
-        if -NEARER_M <= away_m <= FARTHER_M:
+            return wrong('it does not keep its direction')
+        if end.simulated:
+            return wrong(f'{end.simulated[0]} has use_sim_time, and nobody publishes /clock')
+        if end.freshest_s > FRESH_S:
+            age = f'{end.freshest_s:.1f} s'
+            return wrong(f'its brake works on scans of which even the newest is {age} old')
+        if -NEARER_M <= end.free_m - STOP_M <= FARTHER_M:
             return True
-        found = f'it stops {end.free_m:.1f} m before something, and stop_m was {STOP_M}'
-        return with_mends(case, end, found)
+        return wrong(f'it stops {end.free_m:.1f} m before something, and stop_m was {STOP_M}')
+
+    def stands_with_an_idle_route():
+        """Let nobody activate the route, and somebody else say where to go."""
+        asleep = params(case, autostart='false')
+        end = drive_apart(case, OTHER, params=asleep, wanted_mps=SLOW_MPS)
+        if IDLE not in end.said:
+            return wrong(f'nobody activates the route, and the brake never says: I stop{IDLE}')
+        # Until its brake has found the route, it may ask nobody, and drive.
+        is_at_rest = end.how in ('stands', 'stops')
+        return is_at_rest or wrong('the route is not active, and it drives on')
 
     def rests():
         end = driven()
-        if end.how in ('stands', 'died'):
-            return 'it did not come so far'
+        if not came_so_far():
+            return NOT_SO_FAR
         return end.stands_at_exit or 'its last command was to drive'
 
+    def is_right_there():
+        if case.fault.asks_route and came_so_far():
+            return all_of(arrives(), stands_with_an_idle_route())
+        return arrives()
+
+    sees = 'while its laser sees nothing it stops, then it goes on'
     trouble = {
-        'blind': 'while its laser sees nothing it stops, then it goes on',
-        'push': 'while its laser sees nothing it stops, then it goes on',
+        'blind': sees,
+        'push': sees,
         'clock': 'while the stamps of its scans are wrong it stops, then it goes on',
     }[case.fault.trouble]
     return [
         (title, drives_off, case.fault.hint),
         (trouble, minds_its_laser, case.fault.hint),
-        ('it stops where its file says, and hits nothing', arrives, case.fault.hint),
+        ('it stops where its file says, and hits nothing', is_right_there, case.fault.hint),
         ('Ctrl+C leaves it at rest', rests, 'How does brake.py end?'),
     ]
 
@@ -141,8 +173,11 @@ for one in (*CORE, 'the_next'):
     tasks.add(mended, name=f'mend_{one}', limit_s=120, cpu_s=60, about=fault_of)
 
 
-def params(case):
-    """Write the robot's own file of parameters with another limit, and return how it is given."""
+def params(case, autostart=''):
+    """Write the robot's own file of parameters with another limit, and return how it is given.
+
+    With `autostart` that parameter of the manager gets this value, too.
+    """
     file = f'install/{case.name}/share/{case.name}/config/{case.name}.yaml'
     try:
         text = case.workspace.file(file).read_text(encoding='utf-8')
@@ -151,12 +186,7 @@ def params(case):
     text, count = re.subn(r'(\bstop_m["\']?\s*:\s*)[-\d.]+', rf'\g<1>{STOP_M}', text)
     if not count:
         raise Failed(f'config/{case.name}.yaml says no stop_m any more')
+    if autostart:
+        text = re.sub(r'(\bautostart["\']?\s*:\s*)\w+', rf'\g<1>{autostart}', text)
     case.workspace.write('judged.yaml', text)
     return 'params_file:=judged.yaml'
-
-
-def with_mends(case, end, found):
-    """Return what was found, and what is said of each tempting mend that is seen."""
-    mends = case.wrong_mends()
-    said = [mend.says for mend in mends if not mend.ends or end.how in mend.ends]
-    return ' '.join([f'{found}.', *said]) if said else found

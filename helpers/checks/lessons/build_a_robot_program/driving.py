@@ -2,48 +2,45 @@
 
 import contextlib
 import math
-import os
 import signal
+import time
 
 import numpy as np
+from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.time import Time
+from sensor_msgs.msg import Imu
 
+from helpers.checks.bench import Bench
 from helpers.checks.lessons.build_a_robot_program.shared import (
+    commands_of,
+    is_driven_at_most,
     one_command_a_scan,
     tasks,
 )
-from helpers.checks.points import cached
-from helpers.patrol import (
-    CIRCLE,
-    DEGREES,
-    LAST,
-    SIM,
-    SNAKE,
-    drive,
-    estimated,
-    module,
-    steered,
-)
+from helpers.checks.points import all_of, cached, expect, needs
+from helpers.checks.programs import Program
+from helpers.patrol import CIRCLE, DEGREES, LAST, SIM, SNAKE, drive, estimated, module, steered
 from helpers.robot import CORRIDOR, EMPTY, KIND, ROOMS, Floor, Pose, Robot
-from helpers.ros import ros_session, spun
+from helpers.ros import ros_session
 
 
 @tasks.add
 def a_node_that_drives(workspace):
-    def moves():
-        robot = drive(CORRIDOR, module(workspace, 'patrol').Patrol, 3)
-        way = robot.pose.x - CORRIDOR.start.x
-        speeds = {(command.v, command.w) for command in robot.record.commands}
-        if not speeds:
-            return 'no command came in 3 s'
-        if speeds != {(0.3, 0.0)}:
-            return f'it commands (linear.x, angular.z) = {sorted(speeds)[0]}'
-        return 0.7 < way < 0.9 or f'in 3 s it drove {way:.1f} m'
+    def driven(floor, seconds, driver=KIND):
+        return drive(floor, module(workspace, 'patrol').Patrol, seconds, driver=driver)
 
-    def one_for_each_scan():
-        return one_command_a_scan(drive(EMPTY, module(workspace, 'patrol').Patrol, 2))
+    def moves():
+        robot = driven(CORRIDOR, 3)
+        speeds = sorted({*commands_of(robot)} - {(0.3, 0.0)})
+        if not robot.record.commands:
+            return 'no command came in 3 s'
+        if speeds:
+            return f'it commands (linear.x, angular.z) = {speeds[0]}, not (0.3, 0.0)'
+        way = robot.pose.x - CORRIDOR.start.x
+        return expect(way, 0.8, 'in 3 s it drove', within=0.1, unit='m')
 
     def has_methods():
         with ros_session():
@@ -54,125 +51,161 @@ def a_node_that_drives(workspace):
             robot.run(0.1)
             node.stop()
             robot.run(0.1)
-            commands = [(command.v, command.w) for command in robot.record.commands]
         right = [(0.1, 0.5), (0.0, 0.0)]
-        return commands == right or (
-            f'command(0.1, 0.5) and stop() published {commands or "nothing"}'
-        )
+        return expect(commands_of(robot), right, 'command(0.1, 0.5) and stop() published')
 
     def hears_any_laser():
-        driver = KIND.but(laser='ld08')
-        robot = drive(CORRIDOR, module(workspace, 'patrol').Patrol, 1, driver=driver)
+        robot = driven(CORRIDOR, 1, KIND.but(laser='ld08'))
         return bool(robot.record.commands) or 'it receives nothing from a laser that is BEST_EFFORT'
 
+    each = 'one command for each scan'
     return [
         ('the robot drives at 0.3 m/s', moves, 'on_scan(self, scan): self.command(0.3, 0.0)'),
-        ('one command for each scan', one_for_each_scan, 'Publish in the callback of the scan.'),
+        (
+            each,
+            lambda: one_command_a_scan(driven(EMPTY, 2)),
+            'Publish in the callback of the scan.',
+        ),
         ('command(v, w), stop()', has_methods, 'twist.linear.x and twist.angular.z'),
         ('the scans of a BEST_EFFORT laser', hears_any_laser, 'create_subscription(..., LASER)'),
     ]
 
 
-FAILS = """from patrol_pkg import main, patrol
+# The student's main(), with a node of ours: what Patrol does later does not matter here.
+PROGRAM = """import sys
+
+import rclpy
+from geometry_msgs.msg import Twist
+from patrol_pkg import main
+from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
 
 
-class Fails(patrol.Patrol):
-    def __init__(self, **options):
-        super().__init__(**options)
-        self.scans = 0
-        self.create_subscription(LaserScan, 'scan', self.fail, qos_profile_sensor_data)
+class Drives(Node):
+    def __init__(self):
+        super().__init__('patrol')
+        self.publisher, self.scans = self.create_publisher(Twist, 'cmd_vel', 1), 0
+        self.create_subscription(LaserScan, 'scan', self.on_scan, qos_profile_sensor_data)
+        self.timer = self.create_timer(0.1, self.is_idle) if 'idle' in sys.argv else None
 
-    def fail(self, scan):
+    def command(self, v, w):
+        twist = Twist()
+        twist.linear.x, twist.angular.z = v, w
+        self.publisher.publish(twist)
+
+    def stop(self):
+        self.command(0.0, 0.0)
+
+    def on_scan(self, scan):
+        self.command(0.3, 0.0)
         self.scans += 1
-        if self.scans > 15:
+        if 'failed' in sys.argv and self.scans > 15:
             raise RuntimeError('planted')
 
+    def is_idle(self):
+        self.timer.cancel()
+        print('idle', flush=True)
 
-main.run(Fails)
+
+main.Patrol = Drives
+main.main()
 """
-WITH_INTERFACES = '[ -f install/setup.bash ] && source install/setup.bash\n'
-MAIN_ENDS = {'interrupted': signal.SIGINT, 'terminated': signal.SIGTERM, 'failed': None}
-
-
-def how_it_ended(robot, drove, program, by_itself):
-    """Return what the program printed if the robot stands after it, or else what is wrong."""
-    lines = program.lines
-    if not drove:
-        return f'the robot stands, and main() says: {(lines or ["nothing"])[-1]}'
-    if by_itself:
-        return 'it ends by itself'
-    if program.running:
-        return 'it does not end'
-    if not robot.stopped:
-        last = robot.record.commands[-1]
-        return f'it ends, and the robot drives on: the last command is {last.v:g} m/s'
-    return lines
+START = (
+    '[ -f install/setup.bash ] && source install/setup.bash\n'
+    'PYTHONPATH=src/patrol_pkg:$PYTHONPATH exec python -B .start.py '
+)
+SIGNALS = {'interrupted': signal.SIGINT, 'terminated': signal.SIGTERM, 'failed': None}
 
 
 @tasks.add(limit_s=120, cpu_s=20)
 def a_program(workspace):
     @cached
     def run_all():
-        """Run main() three times, each beside a base that keeps its last command, and end it."""
-        workspace.write('.start.py', 'from patrol_pkg.main import main\nmain()\n')
-        workspace.write('.fails.py', FAILS)
-        start = WITH_INTERFACES + 'PYTHONPATH=src/patrol_pkg:$PYTHONPATH exec python -B '
+        """Run main() for each end, beside a base that keeps its last command, and end it.
+
+        Return for each end whether the robot stands, or what is wrong, and the program.
+        """
+        workspace.write('.start.py', PROGRAM)
         robots, programs = {}, {}
         with ros_session() as session, contextlib.ExitStack() as stack:
-            for end in MAIN_ENDS:
-                driver = KIND.but(command_timeout_s=None)
-                robots[end] = Robot(EMPTY, namespace=end, driver=driver)
-                file = '.start.py' if MAIN_ENDS[end] else '.fails.py'
-                command = f'{start}{file} --ros-args -r __ns:=/{end}'
-                programs[end] = stack.enter_context(workspace.start(command, end))
+            for end in SIGNALS:
+                robots[end] = Robot(EMPTY, namespace=end, driver=KIND.but(command_timeout_s=None))
+                command = f'{START} {end} --ros-args -r __ns:=/{end}'
+                programs[end] = stack.enter_context(Program(workspace.start(command, end)))
 
             def drives(end):
                 return robots[end].pose.x > EMPTY.start.x + 0.05
 
             def each(condition, limit_s):
                 with contextlib.suppress(TimeoutError):
-                    session.wait_until(lambda: all(condition(end) for end in MAIN_ENDS), limit_s)
+                    session.wait_until(lambda: all(map(condition, SIGNALS)), limit_s)
 
             each(lambda end: drives(end) or not programs[end].running, 30)
-            ended = {end: not program.running for end, program in programs.items()}
-            for end, number in MAIN_ENDS.items():
-                if number is not None and drives(end) and not ended[end]:
-                    os.kill(programs[end].pid, number)
+            by_itself = [end for end in SIGNALS if SIGNALS[end] and not programs[end].running]
+            for end, sent in SIGNALS.items():
+                if sent and drives(end):
+                    programs[end].end(sent, limit_s=0)
             each(lambda end: not drives(end) or not programs[end].running, 30)
             each(lambda end: not drives(end) or robots[end].stopped, 1)
             return {
-                end: how_it_ended(
-                    robots[end],
-                    drives(end),
+                end: (
+                    how_it_ended(robots[end], drives(end), programs[end], end in by_itself),
                     programs[end],
-                    by_itself=ended[end] and number is not None,
                 )
-                for end, number in MAIN_ENDS.items()
+                for end in SIGNALS
             }
 
     def stands(end):
-        return lambda: True if isinstance(run_all()[end], list) else run_all()[end]
+        return run_all()[end][0]
 
     def ends_quietly():
-        lines = run_all()['interrupted']
-        if not isinstance(lines, list):
-            return f'not judged: {lines}'
-        return not lines or f'it ends with {lines[-1]}'
+        found, program = run_all()['interrupted']
+        if found is not True:
+            return f'not judged: {found}'
+        return not program.lines or f'it ends with {program.lines[-1]}'
+
+    def stands_and_says_why():
+        found, program = run_all()['failed']
+        says = program.says('planted') or 'it ends, and says nothing of the error'
+        return all_of(found, says)
+
+    def ends_while_nothing_happens():
+        needs(lambda: stands('interrupted'), 'not judged: Ctrl+C must end it first')
+        with Program(workspace.start(f'{START} idle --ros-args -r __ns:=/idle', 'idle')) as idle:
+            if not idle.wait(lambda: idle.says('idle'), limit_s=15):
+                return f'its timer never fired: {idle.error}'
+            time.sleep(0.3)  # now it waits
+            ended = idle.end(signal.SIGINT)
+        return ended or 'while no callback is due, Ctrl+C does not end it'
 
     stop = 'In finally: node.stop(), before rclpy.try_shutdown().'
     handlers = 'rclpy.init(signal_handler_options=SignalHandlerOptions.NO)'
+    term = 'signal.signal(signal.SIGTERM, signal.default_int_handler)'
+    once_more = 'while rclpy.ok(): rclpy.spin_once(node, timeout_sec=0.1)'
     return [
-        ('after Ctrl+C the robot stands', stands('interrupted'), handlers),
+        ('after Ctrl+C the robot stands', lambda: stands('interrupted'), handlers),
         ('without a traceback', ends_quietly, 'except KeyboardInterrupt: pass'),
-        (
-            'after SIGTERM it stands',
-            stands('terminated'),
-            'signal.signal(signal.SIGTERM, signal.default_int_handler)',
-        ),
-        ('after an error in a callback it stands', stands('failed'), stop),
+        ('after SIGTERM it stands', lambda: stands('terminated'), term),
+        ('after an error in a callback it stands', stands_and_says_why, stop),
+        ('Ctrl+C also ends it while no callback is due', ends_while_nothing_happens, once_more),
     ]
+
+
+def how_it_ended(robot, drove, program, by_itself):
+    """Return True if a program has ended and its robot stands, or else what is wrong."""
+    if not drove and program.running:
+        return 'main() goes on, and its robot never drives: does it spin the node?'
+    if not drove:
+        return f'main() has ended before its robot drove: {program.error}'
+    if by_itself:
+        return 'it ends by itself'
+    if program.running:
+        return 'it does not end'
+    last = robot.record.commands[-1]
+    return robot.stopped or (
+        f'it ends, and the robot drives on: the last command is {last.v:g} m/s'
+    )
 
 
 def scanned(**seen):
@@ -186,7 +219,8 @@ def scanned(**seen):
 def scene(seen):
     """Say what `scanned` is given: 1.5 m at 10 degrees to the left."""
     if len(seen) > 6:
-        return 'nan from 12 degrees on the right to 12 on the left'
+        beams = [int(beam[1:]) * (1 if beam[0] == 'l' else -1) for beam in seen]
+        return f'nan from {min(beams)} to {max(beams)} degrees (to the left)'
     sides = {'l': 'left', 'r': 'right'}
     beams = [
         f'{metres:g} m at {int(beam[1:])} degrees to the {sides[beam[0]]}'
@@ -195,90 +229,97 @@ def scene(seen):
     return ' and '.join(beams) or 'nothing in sight'
 
 
+def unknown(first, last):
+    """Return what `scanned` takes for beams that are unknown, between two angles (degrees)."""
+    return {f'{"l" if k > 0 else "r"}{abs(k)}': math.nan for k in range(first, last + 1)}
+
+
 @tasks.add
 def reach_and_speed(workspace):
     def reaches(*cases):
-        def test():
-            function = module(workspace, 'logic').reach
-            for seen, degrees, right in cases:
-                metres = function(scanned(**seen), np.radians(DEGREES), math.radians(degrees))
-                if not isinstance(metres, float | int):
-                    kind = 'None' if metres is None else f'the type {type(metres).__name__}'
-                    return f'it returns {kind}, and no number'
-                if not abs(metres - right) < 0.01:
-                    return (
-                        f'with {scene(seen)}, the reach at {degrees} degrees is {metres:.2f}, '
-                        f'not {right:.2f}'
-                    )
-            return True
+        for seen, degrees, right in cases:
+            what = f'with {scene(seen)}, the reach at {degrees} degrees is'
+            found = reach(scanned(**seen), np.radians(DEGREES), degrees, right, what)
+            if found is not True:
+                return found
+        return True
 
-        return test
-
-    def speeds_are(*cases):
-        def test():
-            function = module(workspace, 'logic').safe_speed
-            speeds = [float(function(*arguments)) for *arguments, _ in cases]
-            right = [speed for *_, speed in cases]
-            return bool(np.allclose(speeds, right)) or f'{speeds}, not {right}'
-
-        return test
-
-    strip = 'along[(along >= 0) & (abs(across) < HALF_M)], and its min(..., default=FAR_M)'
-    unknown = 'known = ~np.isnan(ranges), and then ranges[known], angles[known]'
-    share = 'np.mean(known[toward]) is the share of known beams: below 0.5, return 0.0.'
-    ahead = [({'l0': 2.0, 'r1': 1.5}, 0, 1.5), ({'l45': 0.5}, 0, 99)]
-    ahead += [({'r45': 0.5, 'l9': 2.0}, 0, 99)]
-    along = [({'l10': 0.5}, 0, 0.492), ({'l17': 0.5}, 0, 0.478)]
-    turned = [({'l45': 0.5}, 45, 0.5), ({'r60': 1.0, 'l0': 0.3}, -60, 1.0), ({'l20': 0.3}, 85, 99)]
-    behind = [
-        ({'r89': 0.1}, 85, 99),
-        ({'l85': 0.3}, -85, 99),
-        ({'r90': 0.4, 'l80': 1.0}, 85, 0.996),
-    ]
-    odd = [({'r70': -math.inf}, 10, 0), ({}, 0, 99)]
-    few = [({'l3': math.nan}, 0, 99), ({'l0': math.nan, 'r1': 1.5, 'l2': math.nan}, 0, 1.5)]
-    blind = {f'{side}{degrees}': math.nan for side in 'lr' for degrees in range(13)}
-    many = [(blind, 0, 0), (blind, 60, 99), (blind | {'l0': 2.0}, 0, 0), ({}, 180, 0)]
+    def reach(ranges, angles, degrees, right, what):
+        metres = module(workspace, 'logic').reach(ranges, angles, math.radians(degrees))
+        if not isinstance(metres, float | int):
+            kind = 'None' if metres is None else f'the type {type(metres).__name__}'
+            return f'it returns {kind}, and no number'
+        return expect(metres, right, what, within=0.01, unit='m')
 
     def all_around():
-        function = module(workspace, 'logic').reach
-        angles = np.radians(np.arange(360.0))
         ranges = np.full(360, 3.0)
         ranges[315] = 0.5
         ranges[100:260] = math.nan
-        for degrees, right in ((-45, 0.5), (0, 3.0), (170, 0.0)):
-            metres = function(ranges, angles, math.radians(degrees))
-            if not abs(metres - right) < 0.01:
-                return (
-                    'with angles from 0 to 2 pi, 0.5 m at 315 degrees and nan from 100 to 259, the '
-                    f'reach at {degrees} degrees is {metres:.2f}, not {right:.2f}'
+        seen = 'with angles from 0 to 2 pi, 0.5 m at 315 degrees and nan from 100 to 259'
+        return all_of(
+            *(
+                reach(
+                    *(ranges, np.radians(np.arange(360.0)), degrees, right),
+                    f'{seen}, the reach at {degrees} degrees is',
                 )
-        return True
+                for degrees, right in ((-45, 0.5), (0, 3.0), (170, 0.0))
+            )
+        )
 
+    def speed(*cases):
+        function = module(workspace, 'logic').safe_speed
+        return all_of(
+            *(
+                expect(
+                    function(metres, full_mps),
+                    right,
+                    f'safe_speed({metres}, {full_mps}) is',
+                    within=0.001,
+                    unit='m/s',
+                )
+                for metres, full_mps, right in cases
+            )
+        )
+
+    nan, inf = math.nan, math.inf
+    blind = unknown(-12, 12)
+    ahead = (
+        ({'l0': 2.0, 'r1': 1.5}, 0, 1.5),
+        ({'l45': 0.5}, 0, 99),
+        ({'r45': 0.5, 'l9': 2.0}, 0, 99),
+    )
+    along = ({'l10': 0.5}, 0, 0.492), ({'l17': 0.5}, 0, 0.478)
+    turned = ({'l45': 0.5}, 45, 0.5), ({'r60': 1.0, 'l0': 0.3}, -60, 1.0), ({'l20': 0.3}, 85, 99)
+    behind = ({'r89': 0.1}, 85, 99), ({'l85': 0.3}, -85, 99), ({'r90': 0.4, 'l80': 1.0}, 85, 0.996)
+    odd = ({'r70': -inf}, 10, 0), ({}, 0, 99)
+    few = ({'l3': nan}, 0, 99), ({'l0': nan, 'r1': 1.5, 'l2': nan}, 0, 1.5)
+    # At 0.5 degrees 40 beams look in the direction: half of them, and one more.
+    half = (unknown(-19, 0), 0.5, 99), (unknown(-19, 1), 0.5, 0)
+    many = (blind, 0, 0), (blind, 60, 99), (blind | {'l0': 2.0}, 0, 0), ({}, 180, 0), *half
+    strip = 'along[(along >= 0) & (abs(across) < HALF_M)], and its min(..., default=FAR_M)'
+    known = 'known = ~np.isnan(ranges), and then ranges[known], angles[known]'
+    share = 'np.mean(known[toward]) is the share of known beams: below 0.5, return 0.0.'
+    axes = 'cos(angles - heading), sin(angles - heading)'
+    infinite = 'np.nan_to_num(..., posinf=FAR_M, neginf=0.0)'
+    around, line = (
+        'np.cos(angles - heading) > math.cos(AROUND)',
+        '(reach - STOP_M) / (SLOW_M - STOP_M)',
+    )
     return [
-        ('straight on: the nearest in the strip', reaches(*ahead), strip),
-        ('measured along the strip, not to the beam', reaches(*along), 'min(along[...])'),
-        ('another direction', reaches(*turned), 'cos(angles - heading), sin(angles - heading)'),
-        ('what is behind does not count', reaches(*behind), 'along >= 0'),
-        ('too near, nothing', reaches(*odd), 'np.nan_to_num(..., posinf=FAR_M, neginf=0.0)'),
-        ('single unknown beams do not count', reaches(*few), unknown),
-        ('too many unknown beams: 0', reaches(*many), share),
-        (
-            'a laser that looks all around',
-            all_around,
-            'np.cos(angles - heading) > math.cos(AROUND)',
-        ),
-        ('near: 0', speeds_are((0.25, 0.5, 0), (0.1, 0.5, 0)), 'max(0.0, ...)'),
-        ('far: full speed', speeds_are((1.0, 0.5, 0.5), (99.0, 0.2, 0.2)), 'min(1.0, ...)'),
-        (
-            'between',
-            speeds_are((0.625, 0.5, 0.25), (0.4, 1.0, 0.2)),
-            '(reach - STOP_M) / (SLOW_M - STOP_M)',
-        ),
+        ('straight on: the nearest in the strip', lambda: reaches(*ahead), strip),
+        ('measured along the strip, not to the beam', lambda: reaches(*along), 'min(along[...])'),
+        ('another direction', lambda: reaches(*turned), axes),
+        ('what is behind does not count', lambda: reaches(*behind), 'along >= 0'),
+        ('too near, nothing', lambda: reaches(*odd), infinite),
+        ('single unknown beams do not count', lambda: reaches(*few), known),
+        ('too many unknown beams: 0', lambda: reaches(*many), share),
+        ('a laser that looks all around', all_around, around),
+        ('near: 0', lambda: speed((0.25, 0.5, 0), (0.1, 0.5, 0)), 'max(0.0, ...)'),
+        ('far: full speed', lambda: speed((1.0, 0.5, 0.5), (99.0, 0.2, 0.2)), 'min(1.0, ...)'),
+        ('between', lambda: speed((0.625, 0.5, 0.25), (0.4, 1.0, 0.2)), line),
     ]
 
 
-TURTLEBOT3_LASER = KIND.but(laser='ld08')
 HALL = Floor.from_text(
     """
 ############
@@ -294,192 +335,166 @@ HALL = Floor.from_text(
 
 @tasks.add
 def stop_before_a_wall(workspace):
-    def stops_at(floor, start, near_m):
-        def test():
-            robot = drive(floor, module(workspace, 'patrol').Patrol, 12, start=start)
-            ahead = floor.ranges(*robot.pose[:2], np.array([robot.pose.yaw]))[0][0]
-            fastest = max((command.v for command in robot.record.commands), default=0.0)
-            if robot.bumps:
-                return 'it hits something'
-            if fastest > 0.5001:
-                return f'it drives at {fastest:.2g} m/s: more than 0.5'
-            return 0.2 < ahead < near_m or f'it stands still {ahead:.1f} m from it'
+    def driven(floor, seconds, **options):
+        return drive(floor, module(workspace, 'patrol').Patrol, seconds, **options)
 
-        return test
+    def stops_at(floor, near_m, start=None):
+        robot = driven(floor, 12, start=start)
+        if robot.bumps:
+            return 'it hits something'
+        ahead = metres_ahead(robot)
+        return all_of(
+            is_driven_at_most(robot, 0.5, 'the speed is at most 0.5'),
+            0.2 < ahead < near_m or f'it stands still {ahead:.1f} m from it',
+        )
 
     def stops_blind():
-        patrol = module(workspace, 'patrol').Patrol
-        robot = drive(CORRIDOR, patrol, 4, blind_after_s=2)
+        robot = driven(CORRIDOR, 4, blind_after_s=2)
         if not robot.stopped:
             return 'all beams are nan, and it drives on'
-        robot = drive(CORRIDOR, patrol, 12, driver=TURTLEBOT3_LASER)
-        ahead = CORRIDOR.ranges(*robot.pose[:2], np.array([robot.pose.yaw]))[0][0]
+        robot = driven(CORRIDOR, 12, driver=KIND.but(laser='ld08'))
+        ahead = metres_ahead(robot)
         return (not robot.bumps and ahead < 0.5) or (
             f'with the laser of a TurtleBot 3 it stands {ahead:.1f} m before the wall'
         )
 
     hint = 'reach(*beams(scan), 0.0), then safe_speed(..., 0.5)'
-    near = stops_at(CORRIDOR, Pose(3.0, 1.25, 1.0), 0.5)
+    passes = 'it passes a box beside its path, and stops at the next'
+    near = 'it also stops if it starts near a wall'
     return [
-        ('it stops before the wall', stops_at(CORRIDOR, None, 0.35), hint),
-        (
-            'it passes a box beside its path, and stops at the next',
-            stops_at(HALL, None, 0.35),
-            hint,
-        ),
-        ('it also stops if it starts near a wall', near, hint),
+        ('it stops before the wall', lambda: stops_at(CORRIDOR, 0.35), hint),
+        (passes, lambda: stops_at(HALL, 0.35), hint),
+        (near, lambda: stops_at(CORRIDOR, 0.5, Pose(3.0, 1.25, 1.0)), hint),
         ('a blind laser, and that of a TurtleBot 3', stops_blind, hint),
     ]
+
+
+def metres_ahead(robot):
+    """Return how far it truly is to what a robot looks at."""
+    x, y, yaw = robot.pose
+    return robot.floor.ranges(x, y, np.array([yaw]))[0][0]
 
 
 @tasks.add(cpu_s=20)
 def where_am_i(workspace):
     def knows(commands):
-        def test():
-            where, place, yaw = estimated(module(workspace, 'where').Where, commands)
-            error = math.dist((where.x, where.y), place)
-            if abs(math.remainder(where.yaw - yaw, math.tau)) > 0.1:
-                return 'its yaw is wrong'
-            return error < 0.15 or f'at the end it is {error:.1f} m away'
+        where, place, yaw = estimated(module(workspace, 'where').Where, commands)
+        if abs(math.remainder(where.yaw - yaw, math.tau)) > 0.1:
+            return f'at the end its yaw is {where.yaw:.1f}, not {yaw:.1f}'
+        error = math.dist((where.x, where.y), place)
+        return error < 0.15 or f'at the end it is {error:.1f} m away'
 
-        return test
-
-    def driven(scale, period_s=0.1):
-        """Drive straight on. Return the true way, and x. The wheels report at another rate, too."""
-        with ros_session():
-            robot = Robot(EMPTY, sim_time=True, noise=False)
-            options = [*SIM, Parameter('wheel_scale', value=scale)]
-            node = Node('tested', parameter_overrides=options, cli_args=THINNED)
+    def goes(scale, *stamps_s):
+        """Publish what the wheels say at these times of their clock, all at once."""
+        options = [*SIM, Parameter('wheel_scale', value=scale)]
+        messages = [Odometry() for _ in stamps_s]
+        for message, stamp_s in zip(messages, stamps_s, strict=True):
+            message.header.stamp = Time(seconds=stamp_s).to_msg()
+            message.twist.twist.linear.x = 0.5
+        with Bench() as bench:
+            node = Node('tested', parameter_overrides=options)
             where = module(workspace, 'where').Where(node)
-            executor = spun(node, Thinner(period_s))
-            robot.run(0.2, executor)
-            for _ in range(20):
-                robot.command(0.5)
-                robot.run(0.1, executor)
-        return robot.pose.x - EMPTY.start.x, where.x
-
-    def scale_is_used():
-        way, x = driven(2.0)
-        text = f'with wheel_scale = 2 it drove {way:.1f} m, and x is {x:.1f} m'
-        return abs(x - way / 2) < 0.05 or text
-
-    def stamps_are_used():
-        way, x = driven(1.0, period_s=0.2)
-        text = f'with odom every 0.2 s it drove {way:.1f} m, and x is {x:.1f} m'
-        return abs(x - way) < 0.15 or text
+            bench.spin(node)
+            bench.say('imu/data', Imu(orientation=Quaternion(w=1.0)))  # it looks along the x axis
+            bench.say('odom', *messages)
+        way = 0.5 / scale * (stamps_s[-1] - stamps_s[0])
+        stamps = ', '.join(f'{stamp_s:g}' for stamp_s in stamps_s)
+        what = f'odom has 0.5 m/s at {stamps} s by its stamps, wheel_scale is {scale}, and x is'
+        return expect(where.x, way, what, within=0.01, unit='m')
 
     stamps = 'The seconds between two stamps, not a fixed time.'
+    scale = 'node.declare_parameter(...).value'
+    grows = 'x grows by way * cos(yaw), y by way * sin(yaw).'
     return [
-        ('a circle', knows(CIRCLE[:150]), 'x grows by way * cos(yaw), y by way * sin(yaw).'),
-        ('a line like a snake', knows(SNAKE), stamps),
-        ('odom comes less often', stamps_are_used, stamps),
-        ('the parameter wheel_scale', scale_is_used, 'node.declare_parameter(...).value'),
+        ('a circle', lambda: knows(CIRCLE[:150]), grows),
+        ('a line like a snake', lambda: knows(SNAKE), stamps),
+        ('odom comes less often', lambda: goes(1.0, 7.0, 7.9, 8.2, 9.0), stamps),
+        ('the parameter wheel_scale', lambda: goes(2.0, 7.0, 7.1, 7.2, 9.0), scale),
     ]
-
-
-THINNED = ['--ros-args', '-r', 'odom:=thin_odom']
-
-
-class Thinner(Node):
-    """Passes odometry on, at most once in a period."""
-
-    def __init__(self, period_s):
-        super().__init__('thinner')
-        self.period_s, self.last_s = period_s, -math.inf
-        self.publisher = self.create_publisher(Odometry, 'thin_odom', 10)
-        self.create_subscription(Odometry, 'odom', self.on_odom, 10)
-
-    def on_odom(self, odom):
-        """Pass a message on if the last one is old enough."""
-        now_s = odom.header.stamp.sec + odom.header.stamp.nanosec / 1e9
-        if now_s > self.last_s + self.period_s - 0.01:
-            self.last_s = now_s
-            self.publisher.publish(odom)
 
 
 @tasks.add
 def a_free_heading(workspace):
     def directions():
         function = module(workspace, 'logic').direction
-        cases = [((1, 1, 0, (1, 2)), 90), ((0, 0, 3, (-1, -0.2)), 19.4)]
-        cases += [((2, 0, 1.5, (1, 0)), 94.1), ((0, 0, 0, (-1, -0.01)), -179.4)]
-        degrees = [round(math.degrees(function(*arguments)), 1) for arguments, _ in cases]
-        right = [angle for _, angle in cases]
+        cases = {(1, 1, 0, (1, 2)): 90, (0, 0, 3, (-1, -0.2)): 19.4}
+        cases |= {(2, 0, 1.5, (1, 0)): 94.1, (0, 0, 0, (-1, -0.01)): -179.4}
+        degrees = [round(math.degrees(function(*arguments)), 1) for arguments in cases]
+        right = [*cases.values()]
         return degrees == right or f'{degrees} degrees, not {right}'
 
-    def headings(*cases):
-        def test():
-            function = module(workspace, 'logic').free_heading
-            for seen, wanted, far, right in cases:
-                heading = function(scanned(**seen), np.radians(DEGREES), math.radians(wanted), far)
-                heading = heading if heading is None else round(math.degrees(heading))
-                if heading != right:
-                    things = scene(seen) if len(seen) < 2 else 'a box 0.6 m ahead'
-                    return f'with {things}, wanted {wanted} degrees: {heading}, not {right}'
-            return True
+    def heads(*cases, things=''):
+        function = module(workspace, 'logic').free_heading
+        for seen, wanted, far, right in cases:
+            heading = function(scanned(**seen), np.radians(DEGREES), math.radians(wanted), far)
+            heading = heading if heading is None else round(math.degrees(heading))
+            if heading != right:
+                there = things or scene(seen)
+                return f'with {there}, wanted {wanted} degrees: {heading}, not {right}'
+        return True
 
-        return test
-
-    box = {f'{side}{degrees}': 0.6 for side in 'lr' for degrees in range(11)}
+    box, ahead = dict.fromkeys(unknown(-10, 10), 0.6), 'a box 0.6 m ahead'
     turn = 'math.atan2(dy, dx) - yaw, then math.remainder(angle, math.tau)'
-    nothing = headings(({}, 31, 0.5, 30), ({}, 170, 0.5, 85))
-    around = headings((box, 8, 0.7, 30), (box, -8, 0.7, -30))
-    no_way = headings(({'l0': -math.inf}, 0, 0.5, None))
+    free = 'reach(...) > far_m'
     return [
         ('direction', directions, turn),
-        ('nothing in sight', nothing, 'min(free, key=...)'),
-        ('around a box', around, 'reach(...) > far_m'),
-        ('a box that is farther away', headings((box, 8, 0.5, 10)), 'reach(...) > far_m'),
-        ('no way', no_way, 'min(..., default=None)'),
+        (
+            'nothing in sight',
+            lambda: heads(({}, 31, 0.5, 30), ({}, 170, 0.5, 85)),
+            'min(free, key=...)',
+        ),
+        (
+            'around a box',
+            lambda: heads((box, 8, 0.7, 30), (box, -8, 0.7, -30), things=ahead),
+            free,
+        ),
+        ('a box that is farther away', lambda: heads((box, 8, 0.5, 10), things=ahead), free),
+        (
+            'no way',
+            lambda: heads(({'l0': -math.inf}, 0, 0.5, None)),
+            'min(..., default=None)',
+        ),
     ]
 
 
 @tasks.add(cpu_s=20)
 def steer_to_a_place(workspace):
     def comes_to(floor, *places):
-        def test():
-            robot, left = steered(workspace, floor, places, 15 * len(places))
-            if robot.bumps:
-                return 'it hits something'
-            return not left or f'of {len(places)} places it does not reach {left}'
+        robot, left = steered(workspace, floor, places, 15 * len(places))
+        if robot.bumps:
+            return 'it hits something'
+        return not left or f'of {len(places)} places it does not reach {left}'
 
-        return test
+    def steers(wanted, distance_m, v, w, full_mps=0.5, beams=181, **seen):
+        """Ask for degrees and metres; m/s and rad/s are right. See the first `beams` beams."""
+        ranges, angles = scanned(**seen)[:beams], np.radians(DEGREES)[:beams]
+        function = module(workspace, 'logic').steer
+        speeds = function(ranges, angles, math.radians(wanted), distance_m, full_mps)
+        found = tuple(round(float(speed), 3) for speed in speeds)
+        return expect(found, (v, w), 'it returns')
 
-    def returns(wanted, distance_m, *right, full_mps=0.5, **seen):  # degrees, m; m/s and rad/s
-        def test():
-            steer = module(workspace, 'logic').steer
-            angles = np.radians(DEGREES)
-            v, w = steer(scanned(**seen), angles, math.radians(wanted), distance_m, full_mps)
-            answer = round(float(v), 3), round(float(w), 3)
-            return answer == right or f'it returns {answer}, not {right}'
-
-        return test
+    def stands_blind():
+        cases = (
+            ('all beams', steers(0, 3, 0.0, 0.0, **unknown(-90, 90))),
+            ('90 of 180 beams', steers(0, 3, 0.0, 0.0, beams=180, **unknown(-90, -1))),
+            ('61 of 181 beams', steers(0, 3, 0.5, 0.0, **unknown(-90, -30))),
+        )
+        return all_of(*(found is True or f'with {which} unknown {found}' for which, found in cases))
 
     turn = 'Speed times cos(heading), and 1.5 * heading. The heading 0.0 is a heading, too.'
     other = 'The speed for straight ahead, with full_mps: safe_speed(reach(..., 0.0), full_mps).'
-    door = comes_to(ROOMS, (4.75, 1.75), ROOMS.places['C'])
-    unknown = {f'{side}{degrees}': math.nan for side in 'lr' for degrees in range(91)}
-    on_the_right = {f'r{degrees}': math.nan for degrees in range(30, 91)}
-
-    def stands_blind():
-        blind = returns(0, 3, 0.0, 0.0, **unknown)()
-        if blind is not True:
-            return f'with all beams unknown {blind}'
-        partly = returns(0, 3, 0.5, 0.0, **on_the_right)()
-        return partly is True or f'with 61 of 181 beams unknown {partly}'
-
+    blind = 'np.isnan(ranges).sum(), of len(ranges)'
+    around, door = LAST.places['A'], ((4.75, 1.75), ROOMS.places['C'])
+    before = 'a wall at 0.4 m, a place before it'
+    beside = 'a wall at 0.4 m, a place beside'
     return [
-        ('nothing in sight: straight on', returns(0, 3, 0.5, 0.0), turn),
-        ('nothing in sight: 60 degrees', returns(60, 3, 0.25, 1.571), turn),
-        ('another full speed', returns(0, 3, 0.2, 0.0, full_mps=0.2), other),
-        ('a wall at 0.4 m, a place beside', returns(60, 3, 0.05, 1.571, l0=0.4), 'reach(..., 0.0)'),
-        (
-            'a wall at 0.4 m, a place before it',
-            returns(0, 0.3, 0.1, 0, l0=0.4),
-            'min(0.5, distance_m)',
-        ),
-        ('a blind laser: it stands', stands_blind, 'np.isnan(ranges).sum(), of len(ranges)'),
-        ('no way: it turns', returns(-57, 3, 0.0, 0.9, l0=-math.inf), 'if heading is None:'),
-        ('around two boxes', comes_to(LAST, LAST.places['A']), 'free_heading, then cos(heading)'),
-        ('through a door', door, 'The speed for straight ahead.'),
+        ('nothing in sight: straight on', lambda: steers(0, 3, 0.5, 0.0), turn),
+        ('nothing in sight: 60 degrees', lambda: steers(60, 3, 0.25, 1.571), turn),
+        ('another full speed', lambda: steers(0, 3, 0.2, 0.0, full_mps=0.2), other),
+        (beside, lambda: steers(60, 3, 0.05, 1.571, l0=0.4), 'reach(..., 0.0)'),
+        (before, lambda: steers(0, 0.3, 0.1, 0.0, l0=0.4), 'min(0.5, distance_m)'),
+        ('a blind laser: it stands', stands_blind, blind),
+        ('no way: it turns', lambda: steers(-57, 3, 0.0, 0.9, l0=-math.inf), 'if heading is None:'),
+        ('around two boxes', lambda: comes_to(LAST, around), 'free_heading, then cos(heading)'),
+        ('through a door', lambda: comes_to(ROOMS, *door), 'The speed for straight ahead.'),
     ]

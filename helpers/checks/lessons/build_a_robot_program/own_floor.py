@@ -15,50 +15,52 @@ def a_floor_of_your_own(workspace, file):
     def floor():
         return Floor.from_text(path.read_text(encoding='utf-8'), name=path.stem)
 
-    toured = cached(lambda: round_tour(workspace, floor(), path.stem))
+    @cached
+    def robot():
+        tour, _ = round_tour(workspace, floor(), path.stem)
+        return tour.robot
 
     def hits_nothing():
-        tour, _ = toured()
-        x, y, _ = tour.robot.pose
-        return not tour.robot.bumps or f'it hits something at {x:.1f}, {y:.1f}'
+        x, y, _ = robot().pose
+        return not robot().bumps or f'it hits something at {x:.1f}, {y:.1f}'
 
     def comes_everywhere():
-        tour, _ = toured()
         if not floor().places:
             return 'the floor has no place with a letter'
-        return comes_to_each_place(tour.robot)
+        return comes_to_each_place(robot())
 
-    def interrupted(by):
-        def test():
-            route = route_of(path.with_suffix('.yaml'))
-            with ros_session():
-                numbers = [float(number) for place in route for number in place]
-                tour = Tour(workspace, floor=floor(), route=numbers)
-                tour.run(1)
-                if any(v or w for v, w in tour.speeds(0.2)):
-                    return 'without a goal it drives'
-                tour.send(len(route))
-                tour.run(1)
-                if by == 'a cancel':
-                    tour.handle.cancel_goal_async()
-                else:
-                    tour.robot.blind = True
-                tour.run(1.5)
-                end = tour.robot.record.poses[-1]
-                if end.v:
-                    return f'after {by} it drives on'
-                return end.w == 0 or f'after {by} it turns'
-
-        return test
+    def stands_after(trouble):
+        route = route_of(path.with_suffix('.yaml'))
+        with ros_session():
+            numbers = [float(number) for place in route for number in place]
+            tour = Tour(workspace, floor=floor(), route=numbers)
+            tour.run(1)
+            if any(v or w for v, w in tour.speeds(0.2)):
+                return 'without a goal it drives'
+            tour.send(len(route))
+            tour.run(1)
+            if trouble == 'a cancel':
+                tour.handle.cancel_goal_async()
+            else:
+                tour.robot.blind = True
+            tour.run(1.5)
+            end = tour.robot.record.poses[-1]
+        if end.v:
+            return f'after {trouble} it drives on'
+        return end.w == 0 or f'after {trouble} it turns'
 
     hint = 'More places on the route, or a floor with more space.'
     return [
         ('it hits nothing', hits_nothing, hint),
         ('it comes to each place with a letter', comes_everywhere, 'x and y from the start'),
-        ('it stands without a goal, and after a cancel', interrupted('a cancel'), 'job.place()'),
+        (
+            'it stands without a goal, and after a cancel',
+            lambda: stands_after('a cancel'),
+            'job.place()',
+        ),
         (
             'it stands if the laser is blind',
-            interrupted('a blind laser'),
+            lambda: stands_after('a blind laser'),
             'steer(*beams(scan), ...)',
         ),
     ]

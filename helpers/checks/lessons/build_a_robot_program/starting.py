@@ -4,8 +4,9 @@ from rcl_interfaces.srv import GetParameters
 
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build, builds
-from helpers.checks.lessons.build_a_robot_program.shared import DRIVES, tasks
-from helpers.checks.points import cached
+from helpers.checks.lessons.build_a_robot_program.shared import DRIVES, NOT_BUILT, tasks
+from helpers.checks.points import all_of, cached, expect, needs
+from helpers.checks.programs import Program
 from helpers.patrol import LAUNCH, PACKAGE, launched, printed
 from helpers.robot import ROOMS
 from helpers.workspace import DIED, started
@@ -15,17 +16,15 @@ from helpers.workspace import DIED, started
 def install_it(workspace):
     it_builds = cached(lambda: builds(workspace, 'patrol_pkg'))
 
-    def after_build(test):
-        return lambda: test() if it_builds() is True else 'not judged: it does not build'
-
     def has_programs():
-        lines = workspace.terminal(
-            'source install/setup.bash\nros2 pkg executables patrol_pkg'
-        ).splitlines()
+        needs(it_builds, NOT_BUILT)
+        said = workspace.terminal('source install/setup.bash\nros2 pkg executables patrol_pkg')
+        lines = said.splitlines()
         programs = sorted(line.split()[-1] for line in lines if line.startswith('patrol_pkg '))
         return 'patrol' in programs or f'its programs: {", ".join(programs) or "none"}'
 
     def has_files():
+        needs(it_builds, NOT_BUILT)
         # The launch file is the next task: here any file in its folder must be installed.
         launch_file = workspace.file(f'{PACKAGE}/launch/patrol.launch.xml')
         planted_file = workspace.file(f'{PACKAGE}/launch/planted.launch.xml')
@@ -44,6 +43,7 @@ def install_it(workspace):
         return not missing or f'share/patrol_pkg has no {", no ".join(missing)}'
 
     def survives_pycache():
+        needs(it_builds, NOT_BUILT)
         folders = [workspace.file(f'{PACKAGE}/{name}/__pycache__') for name in ('launch', 'config')]
         new = [folder for folder in folders if not folder.exists()]
         for folder in new:
@@ -55,6 +55,7 @@ def install_it(workspace):
                 folder.rmdir()
 
     def wants_pytest():
+        needs(it_builds, NOT_BUILT)
         code = 'import setuptools; setuptools.setup = lambda **given: print(given)\n'
         code += "exec(open('setup.py').read())"
         workspace.write(f'{PACKAGE}/.given.py', code)
@@ -64,10 +65,10 @@ def install_it(workspace):
     files = "glob('launch/*launch.[pxy][yma]*') and glob('config/*.yaml')"
     return [
         ('it builds', it_builds, "entry_points={'console_scripts': [...]}"),
-        ('the program', after_build(has_programs), "'patrol = patrol_pkg.main:main'"),
-        ('its files', after_build(has_files), files),
-        ('beside a __pycache__', after_build(survives_pycache), files),
-        ('pytest', after_build(wants_pytest), "extras_require={'test': ['pytest']}"),
+        ('the program', has_programs, "'patrol = patrol_pkg.main:main'"),
+        ('its files', has_files, files),
+        ('beside a __pycache__', survives_pycache, files),
+        ('pytest', wants_pytest, "extras_require={'test': ['pytest']}"),
     ]
 
 
@@ -100,12 +101,14 @@ def one_file_starts_it(workspace):
             if DIED in text:
                 return f'{named} a program dies. {printed(workspace, text.splitlines())}'
             driven = text.partition(DRIVES)[2].partition('.')[0]
-            if driven != floor:
-                return f'{named} the robot drives on the floor {driven}'
-            if sim is not False:
-                return f'{named} the parameter use_sim_time of the node patrol is {sim}'
-            if timeout_s != wait_s:
-                return f'{named} the parameter timeout_s of the node patrol is {timeout_s}'
+            of_patrol = f'{named} the parameter {{}} of the node patrol is'
+            right = all_of(
+                driven == floor or f'{named} the robot drives on the floor {driven}, not {floor}',
+                expect(sim, False, of_patrol.format('use_sim_time')),
+                expect(timeout_s, wait_s, of_patrol.format('timeout_s')),
+            )
+            if right is not True:
+                return right
         return True
 
     hint = '<param from="$(dirname)/../config/$(var floor).yaml"/>'
@@ -122,17 +125,14 @@ def launched_with_robot(workspace, arguments):
     These, use_sim_time and timeout_s, are None if a program is missing or has died.
     """
     command = f'{LAUNCH}patrol.launch.xml {arguments}'
-    with Bench() as bench, workspace.start(command, 'both') as both:
-
-        def text():
-            return '\n'.join(both.lines)
-
-        bench.wait(lambda: DRIVES in text() or DIED in text() or not both.running, 20)
-        if started(text()) != ['patrol', 'robot'] or DIED in text():
-            return text(), None, None
-        request = GetParameters.Request(names=['use_sim_time', 'timeout_s'])
-        answer = bench.call('/patrol/get_parameters', GetParameters, request, limit_s=10)
-        if answer is None:
-            return text(), None, None
-        sim, timeout = answer.values
-        return text(), sim.bool_value, timeout.double_value
+    answer = None
+    with Bench() as bench, Program(workspace.start(command, 'both')) as both:
+        bench.wait(lambda: both.says(DRIVES) or both.says(DIED) or not both.running, 20)
+        if started('\n'.join(both.lines)) == ['patrol', 'robot'] and not both.says(DIED):
+            request = GetParameters.Request(names=['use_sim_time', 'timeout_s'])
+            answer = bench.call('/patrol/get_parameters', GetParameters, request, limit_s=10)
+        text = '\n'.join(both.lines)
+    if answer is None:
+        return text, None, None
+    sim, timeout = answer.values
+    return text, sim.bool_value, timeout.double_value

@@ -1,7 +1,9 @@
 """Of the project: the student's tests, which test right programs and wrong ones."""
 
+from functools import partial
+
 from helpers.checks.lessons.build_a_robot_program.shared import tasks
-from helpers.checks.points import cached
+from helpers.checks.points import cached, needs
 from helpers.patrol import PACKAGE
 from helpers.trials import planted, run_tests
 
@@ -173,17 +175,16 @@ def judged_tests(workspace, tests, name, right, wrong, hint):
         return True
 
     def catches(bug):
-        def test():
-            if not all(runs()[version].passes for version in ('yours', 'ours')):
-                return 'not judged: your tests must first pass for the right ones'
-            return runs()[bug].fails or f'pytest: {runs()[bug].says}'
-
-        return test
+        needs(passes_for_right_ones, 'not judged: your tests must first pass for the right ones')
+        return runs()[bug].fails or f'pytest: {runs()[bug].says}'
 
     kind = 'programs' if name == 'logic' else 'nodes'
     return [
         (f'they pass for two right {kind}', passes_for_right_ones, hint),
-        *((f'they fail for one that {bug}', catches(bug), WHAT_TO_TEST[bug]) for bug in wrong),
+        *(
+            (f'they fail for one that {bug}', partial(catches, bug), WHAT_TO_TEST[bug])
+            for bug in wrong
+        ),
     ]
 
 

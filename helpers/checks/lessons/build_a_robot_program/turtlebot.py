@@ -8,7 +8,13 @@ from rclpy.time import Time
 
 from helpers.checks.bench import Bench, must_have
 from helpers.checks.builds import build
-from helpers.checks.lessons.build_a_robot_program.shared import DRIVES, tasks
+from helpers.checks.lessons.build_a_robot_program.shared import (
+    DRIVES,
+    is_driven_at_most,
+    tasks,
+)
+from helpers.checks.points import expect
+from helpers.checks.programs import Program
 from helpers.patrol import LAUNCH, SIM, launched, module, printed
 from helpers.robot import TURTLEBOT3, Floor
 from helpers.workspace import DIED, started
@@ -78,7 +84,7 @@ def the_guard(workspace):
         must_have(node, 'publisher', 'stop')
         node.stop()
         bench.wait(lambda: heard)
-        return speeds(heard) == [(0.0, 0.0)] or f'stop() publishes {speeds(heard) or "nothing"}'
+        return expect(speeds(heard), [(0.0, 0.0)], 'stop() publishes (m/s, rad/s)')
 
     send = 'TwistStamped(twist=twist), and header.stamp = self.get_clock().now().to_msg()'
     dog = "Watchdog(self, self.stop, 'command'), and its seen() for each command"
@@ -109,32 +115,23 @@ def a_turtlebot(workspace):
         path = 'install/patrol_pkg/share/patrol_pkg/config/small.yaml'
         workspace.write(path, 'patrol:\n  ros__parameters:\n    route: [2.0, 0.5]\n')
         arguments = 'floor:=small robot:=false sim:=true timeout:=60.0'
-        robot, end = launched(
-            workspace,
-            arguments,
-            SMALL,
-            1,
-            40,
-            driver=TURTLEBOT3,
-            file='turtlebot3.launch.xml',
-        )
-        fastest = max((command.v for command in robot.record.commands), default=0.0)
+        options = {'driver': TURTLEBOT3, 'file': 'turtlebot3.launch.xml'}
+        robot, end = launched(workspace, arguments, SMALL, 1, 40, **options)
         if robot.bumps:
             return 'it hits something'
         if end != 'SUCCEEDED':
             return end
-        return fastest < 0.2001 or f'it is told to drive {fastest:.2g} m/s'
+        return is_driven_at_most(robot, 0.2, 'a TurtleBot 3 drives at most 0.2 m/s')
 
     def starts_all():
         command = f'{LAUNCH}turtlebot3.launch.xml timeout:=0.7'
-        with Bench() as bench, workspace.start(command, 'all') as program:
-
-            def text():
-                return '\n'.join(program.lines)
-
-            bench.wait(lambda: DRIVES in text() or DIED in text() or not program.running, 20)
-            if started(text()) != ['guard', 'patrol', 'robot']:
-                programs = ' and '.join(started(text())) or 'nothing'
+        with Bench() as bench, Program(workspace.start(command, 'all')) as program:
+            bench.wait(
+                lambda: program.says(DRIVES) or program.says(DIED) or not program.running, 20
+            )
+            found = started('\n'.join(program.lines))
+            if found != ['guard', 'patrol', 'robot']:
+                programs = ' and '.join(found) or 'nothing'
                 return f'it starts {programs}. {printed(workspace, program.lines)}'
             for node in ('patrol', 'guard'):
                 request = GetParameters.Request(names=['timeout_s'])
@@ -142,9 +139,10 @@ def a_turtlebot(workspace):
                 answer = bench.call(service, GetParameters, request, limit_s=10)
                 if answer is None:
                     return f'the node {node} does not answer. {printed(workspace, program.lines)}'
-                timeout_s = answer.values[0].double_value
-                if timeout_s != 0.7:
-                    return f'with timeout:=0.7 the parameter timeout_s of {node} is {timeout_s}'
+                what = f'with timeout:=0.7 the parameter timeout_s of {node} is'
+                waits = expect(answer.values[0].double_value, 0.7, what)
+                if waits is not True:
+                    return waits
         return True
 
     remap = '<remap from="cmd_vel" to="cmd_vel_wanted"/>, in the node patrol'
