@@ -22,6 +22,7 @@ The words of a judge for nodes:
     must_have(node, 'timer')               an attribute is not there yet
     must_define(Driver, '__init__')        a method is not there yet
     override(Driver, PERIOD_S=0.1)         another value for a constant of the notebook
+    with one_cpu():                        an executor that is made here counts one CPU
 
 Those for what a test returns are in points.py: expect, needs, cached, rows.
 """
@@ -29,11 +30,14 @@ Those for what a test returns are in points.py: expect, needs, cached, rows.
 from __future__ import annotations
 
 import math
+import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from unittest import mock
 
 import numpy as np
 import rclpy
@@ -384,6 +388,20 @@ def override(written: type | Callable, **constants: object) -> None:
     was written. The process ends with the check, and with it what was changed.
     """
     vars(sys.modules[written.__module__]).update(constants)
+
+
+@contextmanager
+def one_cpu() -> Iterator[None]:
+    """Let what is made here see a computer with one CPU.
+
+    A MultiThreadedExecutor without a number of threads then gets one, as on a small robot.
+    """
+    with (
+        mock.patch.object(os, 'sched_getaffinity', return_value={0}),
+        mock.patch.object(os, 'cpu_count', return_value=1),
+        warnings.catch_warnings(action='ignore'),  # rclpy warns about a single thread
+    ):
+        yield
 
 
 def _kind_of(value: object) -> str:
