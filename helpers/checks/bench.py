@@ -22,6 +22,7 @@ The words of a judge for nodes:
     must_have(node, 'timer')               an attribute is not there yet
     must_define(Driver, '__init__')        a method is not there yet
     override(Driver, PERIOD_S=0.1)         another value for a constant of the notebook
+    with one_cpu() as counted:             an executor that is made here counts one CPU
 
 Those for what a test returns are in points.py: expect, needs, cached, rows.
 """
@@ -29,11 +30,14 @@ Those for what a test returns are in points.py: expect, needs, cached, rows.
 from __future__ import annotations
 
 import math
+import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from unittest import mock
 
 import numpy as np
 import rclpy
@@ -384,6 +388,29 @@ def override(written: type | Callable, **constants: object) -> None:
     was written. The process ends with the check, and with it what was changed.
     """
     vars(sys.modules[written.__module__]).update(constants)
+
+
+@contextmanager
+def one_cpu() -> Iterator[list]:
+    """Let what is made here see a computer with one CPU. Yield a list: was the number asked for?
+
+    A MultiThreadedExecutor without a number of threads then gets one, as on a small robot.
+    """
+    counted: list = []
+
+    def allowed(pid: int) -> set[int]:
+        counted.append(pid)
+        return {0}
+
+    def count() -> int:
+        return len(allowed(0))
+
+    with (
+        mock.patch.object(os, 'sched_getaffinity', allowed),
+        mock.patch.object(os, 'cpu_count', count),
+        warnings.catch_warnings(action='ignore'),  # rclpy warns about a single thread
+    ):
+        yield counted
 
 
 def _kind_of(value: object) -> str:

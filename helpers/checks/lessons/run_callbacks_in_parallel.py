@@ -1,16 +1,18 @@
 """What the tasks of the lesson "Run callbacks in parallel" are judged by."""
 
+import itertools
 import threading
 import time
+from contextlib import nullcontext
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from std_msgs.msg import Int32, String
 
-from helpers.checks.bench import Bench, must_define, must_have
-from helpers.checks.errors import Failed
-from helpers.checks.points import cached
+from helpers.checks.bench import Bench, must_define, must_have, one_cpu
+from helpers.checks.errors import Failed, NeverEnds
+from helpers.checks.points import all_of, cached, expect, rows
 from helpers.checks.tasks import Tasks
 from helpers.ros import ros_session
 from helpers.trials import callbacks_at_once
@@ -34,15 +36,14 @@ def a_subscriber_with_a_group(SlowSubscriber, DEPTH, CALLBACK_S):
             executor.spin_once(timeout_sec=CALLBACK_S / 2)  # nothing heard: it waits no longer
             took_s = time.monotonic() - begun_s
             subscription = node.subscription
-            depth, handlers = subscription.qos_profile.depth, len(subscription.event_handlers)
         if subscription.callback_group is not group:
             return 'its subscription is in another group'
-        if depth != DEPTH:
-            return f'its depth is {depth}'
-        if handlers:
+        if handlers := len(subscription.event_handlers):
             return f'it has {handlers} event handlers: event_callbacks=QUIET takes them away'
-        slow = took_s >= CALLBACK_S
-        return slow or 'no callback slept for CALLBACK_S seconds when a message came'
+        return all_of(
+            expect(subscription.qos_profile.depth, DEPTH, 'its depth is'),
+            took_s >= CALLBACK_S or 'no callback slept for CALLBACK_S seconds when a message came',
+        )
 
     made = 'super().__init__(name), then self.subscription = self.create_subscription(...).'
     passed = 'Pass on the group that __init__ gets.'
@@ -55,34 +56,29 @@ def a_subscriber_with_a_group(SlowSubscriber, DEPTH, CALLBACK_S):
 
 @tasks.add
 def four_combinations(combination, THREADS):
-    def is_combination(letter, *kinds, at_once):
+    def make(letter):
+        with one_cpu():
+            return combination(letter)
+
+    def is_combination(letter, executor, group, at_once):
         with ros_session():
-            made = combination(letter)
-            if [type(thing) for thing in made] != [*kinds]:
-                names = ' and '.join(map(name_of, made))
-                return f'combination({letter!r}) gives {names}'
-        found = callbacks_at_once(lambda: combination(letter))
-        text = f'with {letter}, {found} callbacks ran at the same time, not {at_once}'
-        return found == at_once or text
+            names = [name_of(thing) for thing in make(letter)]
+        if names != (right := [executor.__name__, group.__name__]):
+            return expect(names, right, f'combination({letter!r}) gives')
+        found = callbacks_at_once(lambda: make(letter))
+        return expect(found, at_once, f'callbacks that run at the same time with {letter}:')
 
     single, multi = SingleThreadedExecutor, MultiThreadedExecutor
     exclusive, reentrant = MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
-    threads = 'MultiThreadedExecutor(num_threads=THREADS)'
-
-    return [
-        (
-            'combination A',
-            lambda: is_combination('A', single, exclusive, at_once=1),
-            'The first row of the table.',
-        ),
-        (
-            'combination B',
-            lambda: is_combination('B', single, reentrant, at_once=1),
-            'Are () there after both names?',
-        ),
-        ('combination C', lambda: is_combination('C', multi, exclusive, at_once=1), threads),
-        ('combination D', lambda: is_combination('D', multi, reentrant, at_once=THREADS), threads),
-    ]
+    hint = 'Look at its row of the table. Are there () after both names, and num_threads=THREADS?'
+    return rows(
+        is_combination,
+        hint,
+        ('combination A', 'A', single, exclusive, 1),
+        ('combination B', 'B', single, reentrant, 1),
+        ('combination C', 'C', multi, exclusive, 1),
+        ('combination D', 'D', multi, reentrant, THREADS),
+    )
 
 
 def name_of(thing):
@@ -93,65 +89,71 @@ def name_of(thing):
 
 @tasks.add
 def camera_and_battery(TwoTopics, make_my_executor):
-    def called(*topics):
+    def called(*topics, cpus=one_cpu):
         """Send messages while the first picture is worked on. Return the topics of the calls."""
-        gate, calls = threading.Event(), []
-
-        def call(topic):
-            calls.append(topic)
-            if topic == 'camera':  # the camera works until the gate opens
-                gate.wait(timeout=30)
-
+        calls = []
         with Bench() as bench:
-            executor, node = make_my_executor(), TwoTopics()
+            with cpus():
+                executor = make_my_executor()
+            node, gate = TwoTopics(), bench.gate()
             found = {made.topic_name.strip('/'): made for made in node.subscriptions}
             for topic in ('camera', 'battery'):
                 if topic not in found:
                     raise Failed(f'there is no subscription on {topic}')
-                found[topic].callback = lambda _, topic=topic: call(topic)
+                without_event_handlers(node, found[topic])
+            found['camera'].callback = lambda _: (calls.append('camera'), gate.hold())
+            found['battery'].callback = lambda _: calls.append('battery')
             bench.spin(node, executor=executor)
             for topic in topics:
                 bench.say(topic, Int32())
-            tried = [*calls]
-            gate.set()
-        return tried
+            return [*calls]
 
     def battery_is_heard(*topics):
         heard, wanted = called(*topics).count('battery'), topics.count('battery')
-        return heard == wanted or f'meanwhile {heard} of {wanted} battery messages were received'
+        if heard == wanted:
+            return True
+        found = f'meanwhile {heard} of {wanted} battery messages were received'
+        needs_cpus = called(*topics, cpus=nullcontext).count('battery') == wanted
+        return f'on a computer with one CPU, {found}' if needs_cpus else found
 
     def one_picture():
         pictures = called('camera', 'camera', 'camera').count('camera')
-        return pictures == 1 or f'it worked on {pictures} pictures at the same time'
+        return expect(pictures, 1, 'pictures that it worked on at the same time:')
 
     hint = 'Which callback blocks which group? How many threads are still free?'
+    more = 'camera', 'camera', 'battery', 'camera', 'battery'
     return [
-        (
-            'the battery is received while the camera works',
-            lambda: battery_is_heard('camera', 'battery'),
+        *rows(
+            battery_is_heard,
             hint,
-        ),
-        (
-            'even when more pictures wait',
-            lambda: battery_is_heard('camera', 'camera', 'battery', 'camera', 'battery'),
-            hint,
+            ('the battery is received while the camera works', 'camera', 'battery'),
+            ('even when more pictures wait', *more),
         ),
         ('the camera works on one picture at a time', one_picture, 'Which group forbids two?'),
     ]
+
+
+def without_event_handlers(node, subscription):
+    """Take them away: if all threads are held, those of a Reentrant group are never quiet."""
+    for handler in subscription.event_handlers:
+        node.remove_waitable(handler)
+    subscription.event_handlers.clear()
 
 
 @tasks.add
 def wait_for_the_small_one(UnequalSubscriber):
     def finish_in_order(threads):
         with Bench() as bench:
-            node = bench.spin(UnequalSubscriber(), threads=threads)
+            node = UnequalSubscriber()
+            node.small_one_done = LateEvent(node.finished)
+            bench.spin(node, threads=threads)
             bench.say('number', Int32(data=0))
             if node.finished:
                 return 'number 0 finished before number 1 came'
             if node.small_one_done.is_set():
                 return 'number 0 does not wait'
             bench.say('number', Int32(data=1))
-        return node.finished == [1, 0] or f'they finished in the order {node.finished}'
+        return expect(node.finished, [1, 0], 'they finished in the order')
 
     def sets_the_event():
         with ros_session():
@@ -170,21 +172,37 @@ def wait_for_the_small_one(UnequalSubscriber):
     ]
 
 
+class LateEvent(threading.Event):
+    """An Event after whose set() another thread goes on first, until it has finished something."""
+
+    def __init__(self, finished):
+        super().__init__()
+        self.finished = finished
+
+    def set(self):
+        """Set it, and let another thread finish, if none has: 1 s at most."""
+        super().set()
+        end_s = time.monotonic() + 1
+        while not self.finished and time.monotonic() < end_s:
+            time.sleep(SWITCH_S)
+
+
 @tasks.add
 def take_a_lock(LockingSubscriber):
-    forty = cached(lambda: hear_numbers(LockingSubscriber, 40, 'count'))
+    forty, fewer = two_trials(LockingSubscriber, 'count')
 
-    def counts(count, trial):
-        found = trial.node.read('count')
-        return found == count or f'the counter is too {"low" if found < count else "high"}'
+    def counts(trial, messages):
+        found = trial().values['count']
+        if found != messages:
+            return f'the counter is too {"low" if found < messages else "high"}'
+        return trial().never_goes_back
 
-    block = 'Read and write in one block.'
     return [
-        ('40 messages: the counter shows 40', lambda: counts(40, forty()), block),
-        (
-            '24 messages: the counter shows 24',
-            lambda: counts(24, hear_numbers(LockingSubscriber, 24, 'count')),
-            block,
+        *rows(
+            counts,
+            'Read and write in one block.',
+            ('40 messages: the counter shows 40', forty, 40),
+            ('24 messages: the counter shows 24', fewer, 24),
         ),
         (
             'the work still overlaps',
@@ -196,35 +214,48 @@ def take_a_lock(LockingSubscriber):
 
 @tasks.add
 def an_odometer(Odometer):
-    forty = cached(lambda: hear_numbers(Odometer, 40, 'total', 'longest'))
+    forty, fewer = two_trials(Odometer, 'total', 'longest')
 
-    def shows(count, trial):
+    def shows(trial, count):
         right = {'total': sum(range(count)), 'longest': count - 1}
-        wrong = [name for name in right if trial.node.read(name) != right[name]]
-        return not wrong or f'after {count} distances, wrong: self.{" and self.".join(wrong)}'
+        wrong = [name for name in right if trial().values[name] != right[name]]
+        if wrong:
+            return f'after {count} distances, wrong: self.{" and self.".join(wrong)}'
+        return trial().never_goes_back
 
+    compare = 'Compare with LockingSubscriber. super()?'
+    reads = 'max(a, b) reads, too: keep it in the lock.'
+    overlaps = 'What is inside the lock? In which group?'
     return [
-        ('40 distances', lambda: shows(40, forty()), 'Compare with LockingSubscriber. super()?'),
-        (
-            '24 distances',
-            lambda: shows(24, hear_numbers(Odometer, 24, 'total', 'longest')),
-            'max(a, b) reads, too: keep it in the lock.',
-        ),
-        (
-            'the work still overlaps',
-            lambda: work_overlaps(forty()),
-            'What is inside the lock? In which group?',
-        ),
+        ('40 distances', lambda: shows(forty, 40), compare),
+        ('24 distances', lambda: shows(fewer, 24), reads),
+        ('the work still overlaps', lambda: work_overlaps(forty()), overlaps),
     ]
 
 
+def two_trials(node_class, *names):
+    """Let a node hear 0 to 39, and another one 23 to 0: the longest comes first then."""
+
+    @cached
+    def forty():
+        return hear_numbers(node_class, range(40), names)
+
+    @cached
+    def fewer():
+        forty()  # what it raises is found again, without another wait
+        return hear_numbers(node_class, range(23, -1, -1), names)
+
+    return forty, fewer
+
+
 def work_overlaps(trial):
-    if len(trial.at_work) != 40:
-        return f'self.work() was called {len(trial.at_work)} times for 40 messages'
+    calls = len(trial.at_work)
+    if calls != 40:
+        return expect(calls, 40, 'for 40 messages, calls of self.work():')
     return max(trial.at_work) > 1 or 'the calls of self.work() came one after the other'
 
 
-# --- Threads that switch at the worst moments: after each read, and after a lock is released
+# --- Threads that switch at the worst moments
 
 SWITCH_S = 0.005
 
@@ -251,28 +282,49 @@ class SlowLock:
         self.release()
 
 
-def read_slowly(name):
-    """Return a property that is read slowly, so that another thread reads it meanwhile, too."""
-
-    def read(node):
-        value = node.read(name)
-        time.sleep(SWITCH_S)
-        return value
-
-    return property(read, lambda node, value: vars(node).update({name: value}))
-
-
 class Trial:
-    """A node of the student that has heard numbers, and how many were at work at each call."""
+    """What a node of the student did with numbers: `values`, and how many were `at_work` each time.
 
-    def __init__(self, node, at_work):
-        self.node, self.at_work = node, at_work
+    Its numbers only grow. `went_back` has what was written over a larger one.
+    """
+
+    def __init__(self):
+        self.values, self.at_work, self.went_back = {}, [], []
+
+    @property
+    def never_goes_back(self):
+        """True, or a text that says what was written over what."""
+        return (
+            not self.went_back or f'a late thread writes over a newer number: {self.went_back[0]}'
+        )
+
+    def watch(self, name):
+        """Return a property whose number is read slowly, and whose every second write is late.
+
+        So other threads read it meanwhile, and write before.
+        """
+        turns = itertools.count()
+
+        def read(node):
+            if name not in self.values:
+                raise AttributeError(f'there is no self.{name} yet')
+            value = self.values[name]
+            time.sleep(SWITCH_S)
+            return value
+
+        def write(node, value):
+            time.sleep(2 * SWITCH_S * (next(turns) % 2))
+            if value < self.values.get(name, value):
+                self.went_back.append(f'self.{name} was {self.values[name]}, and is {value}')
+            self.values[name] = value
+
+        return property(read, write)
 
 
-def hear_numbers(node_class, count, *names):
-    """Let a node hear numbers in eight threads, which switch whenever it reads `names`."""
+def hear_numbers(node_class, numbers, names):
+    """Let a node hear numbers in eight threads, which switch when it reads or writes `names`."""
     must_define(node_class, '__init__')
-    working, at_work = [], []
+    trial, working = Trial(), []
 
     class Tried(node_class):
         def __init__(self):
@@ -281,24 +333,22 @@ def hear_numbers(node_class, count, *names):
                 if type(value) in (type(threading.Lock()), type(threading.RLock())):
                     setattr(self, name, SlowLock(value))
 
-        def read(self, name):
-            if name not in vars(self):
-                raise AttributeError(f'there is no self.{name} yet')
-            return vars(self)[name]
-
         def work(self):
             working.append(self)
-            at_work.append(len(working))
+            trial.at_work.append(len(working))
             super().work()
             working.pop()
 
     for name in names:
-        setattr(Tried, name, read_slowly(name))
+        setattr(Tried, name, trial.watch(name))
     with Bench() as bench:
         node = bench.spin(Tried(), threads=8)
-        must_have(node, 'finished')
-        numbers = [Int32(data=number) for number in range(count)]
-        bench.say('number', *numbers, qos=100, at_once=True)
-        if not bench.wait(lambda: len(node.finished) == count, 8):
-            raise Failed(f'of {count} callbacks, {len(node.finished)} finished')
-    return Trial(node, at_work)
+        must_have(node, 'finished', *names)
+        messages = [Int32(data=number) for number in numbers]
+        bench.say('number', *messages, qos=100, at_once=True)
+        if not bench.wait(lambda: len(node.finished) == len(messages), 8):
+            found = f'of {len(messages)} callbacks, {len(node.finished)} finished'
+            if place := bench.line_of_callback():
+                raise NeverEnds(f'{found}: the others wait. Is a lock given back? {place}')
+            raise Failed(found)
+    return trial

@@ -3,6 +3,7 @@
 from geometry_msgs.msg import Twist
 
 from helpers.checks.bench import Bench
+from helpers.checks.points import expect, rows
 from helpers.checks.tasks import Tasks
 from helpers.robot import Floor, Robot
 from helpers.ros import ros_session
@@ -39,8 +40,8 @@ def through_the_door(speed):
             robot.drive(0.5, seconds=3)
         if robot.bumps:
             return 'it hit a wall'
-        through = robot.pose.y > BEHIND_THE_WALL_M
-        return through or 'it does not come to the other side of the wall'
+        is_through = robot.pose.y > BEHIND_THE_WALL_M
+        return is_through or 'it does not come to the other side of the wall'
 
     hint = 'Speed is distance divided by time: 1.75 m in 3.5 s.'
     return [('the robot goes through the door, and hits nothing', goes_through, hint)]
@@ -54,15 +55,17 @@ def a_first_node(HandDriver):
             driver = bench.spin(HandDriver())
             driver.on_key(forward, turn)
             bench.wait(lambda: commands)
+        call = f'on_key({forward}, {turn})'
         if not commands:
-            return f'on_key({forward}, {turn}) published nothing on cmd_vel'
-        x, z = commands[-1].linear.x, commands[-1].angular.z
-        return (x, z) == (forward, turn) or (
-            f'on_key({forward}, {turn}) published linear.x = {x}, angular.z = {z}'
-        )
+            return f'{call} published nothing on cmd_vel'
+        found = commands[-1].linear.x, commands[-1].angular.z
+        return expect(found, (forward, turn), f'{call} published (linear.x, angular.z) =')
 
-    return [
-        ('it drives forward', lambda: publishes(0.5, 0.0), 'command.linear.x = forward'),
-        ('it drives back', lambda: publishes(-0.5, 0.0), 'command.linear.x = forward'),
-        ('it turns', lambda: publishes(0.0, 1.2), 'The same for angular.z: it is turn.'),
-    ]
+    hint = 'command.linear.x = forward, and the same for angular.z: it is turn.'
+    return rows(
+        publishes,
+        hint,
+        ('it drives forward', 0.5, 0.0),
+        ('it drives back', -0.5, 0.0),
+        ('it turns', 0.0, 1.2),
+    )
