@@ -1,4 +1,4 @@
-"""What the tasks of the lesson "Record a bag" are judged by, and its picture of a bag."""
+"""What the tasks of the lesson "Record a bag" are judged by."""
 
 import math
 import shutil
@@ -22,8 +22,10 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import LaserScan, Range
 from std_msgs.msg import Bool
 
-from helpers.checks.bench import Bench
+from helpers.checks.bench import Bench, scan
 from helpers.checks.errors import Failed, sentence
+from helpers.checks.points import all_of, expect, rows
+from helpers.checks.programs import Program
 from helpers.checks.tasks import Tasks
 
 tasks = Tasks()
@@ -42,62 +44,55 @@ def write_the_command_that_records(RECORD, workspace):
         with Bench() as bench:
             wanted = [bench.publisher(topic, kind) for topic, kind in TOPICS.items()]
             bench.publisher('/battery', Bool)
-            with workspace.start(f'cd tried; {RECORD}') as recorder:
+            with Program(workspace.start(f'cd tried; {RECORD}')) as recorder:
                 # It has looked for all topics then: to load a message's class can take seconds.
-                bench.wait(lambda: is_recording(recorder) or not recorder.running, 30)
+                bench.wait(lambda: recorder.says('Recording...') or not recorder.running, 30)
                 bench.wait(lambda: all(map(is_heard, wanted)) or not recorder.running)
         if not (tried / 'crash').exists():
-            said = what_it_printed(recorder)
+            said = recorder.error
             raise Failed(f'there is no bag in the folder crash. The command printed: {said}')
         with AnyReader([tried / 'crash']) as bag:
             return sorted(connection.topic for connection in bag.connections)
 
     def records_all():
-        topics = recorded_topics()
-        return topics == sorted(TOPICS) or f'the bag has these topics: {", ".join(topics)}'
+        return expect(recorded_topics(), sorted(TOPICS), 'the topics in the bag are')
 
     hint = 'After --topics come the topics, with spaces between them.'
     return [('it records the four topics into crash', records_all, hint)]
-
-
-def is_recording(process):
-    return any('Recording...' in line for line in process.lines)
 
 
 def is_heard(publisher):
     return publisher.get_subscription_count() > 0
 
 
-def what_it_printed(process):
-    """Return the line that says what was wrong, else the last one."""
-    lines = [line.strip() for line in process.lines if line.strip()]
-    errors = [line for line in lines if 'error' in line.lower()]
-    return [*(errors or lines[-1:]), 'nothing'][0]
-
-
 @tasks.add
 def read_one_topic(read):
-    def reads(topic, kind, right):
-        rows = [
-            (5, '/a', Bool(data=True)),
-            (6, '/b', stamped(Range, 1, range=2.0)),
-            (6, '/a_b', Bool()),
-            (7, '/a', Bool()),
-            (9, '/a', Bool(data=True)),
-        ]
-        with bag_of(rows) as path:
+    recorded = [
+        (5, '/a', Bool(data=True)),
+        (6, '/b', stamped(Range, 1, range=2.0)),
+        (6, '/a_b', Bool()),
+        (7, '/a', Bool()),
+        (9, '/a', Bool(data=True)),
+    ]
+
+    def reads(topic, kind):
+        right = [(time_ns, message) for time_ns, name, message in recorded if name == topic]
+        with bag_of(recorded) as path:
             found = read(path, topic, kind)
-        for _, message in found:
-            if not isinstance(message, kind):
-                return f'of {topic} it returned a message of the class {type(message).__name__}'
-        times = [recorded_ns for recorded_ns, _ in found]
-        return times == right or f'{topic} was recorded at {right}; it returned {times}'
+        messages = [message for _, message in found]
+        others = {type(message).__name__ for message in messages} - {kind.__name__}
+        times, right_times = ([time_ns for time_ns, _ in each] for each in (found, right))
+        return all_of(
+            not others or f'of {topic} it returns messages of the class {", ".join(others)}',
+            expect(times, right_times, f'of {topic} it returns those that were recorded at'),
+            messages == [message for _, message in right] or f'of {topic} it returns other values',
+        )
 
     hint = 'if connection.topic == topic: then deserialize_message(data, kind).'
     return [
-        ('three messages of /a', lambda: reads('/a', Bool, [5, 7, 9]), hint),
-        ('one of /b', lambda: reads('/b', Range, [6]), hint),
-        ('none of /c', lambda: reads('/c', Bool, []), hint),
+        ('three messages of /a', lambda: reads('/a', Bool), hint),
+        ('one of /b', lambda: reads('/b', Range), hint),
+        ('none of /c', lambda: reads('/c', Bool), hint),
     ]
 
 
@@ -105,9 +100,8 @@ def read_one_topic(read):
 def age_of_a_result(age_s):
     def computes(stamp_s, recorded_s, right):
         found = age_s(round(recorded_s * 1e9), stamped(Range, stamp_s).header)
-        return abs(found - right) < 1e-3 or (
-            f'{stamp_s} s, recorded at {recorded_s} s: {found:g} s'
-        )
+        case = f'of the stamp {stamp_s} s, recorded at {recorded_s} s, it returns'
+        return expect(found, right, case, within=1e-3, unit='s')
 
     hint = 'Time.from_msg(header.stamp).nanoseconds is the stamp in nanoseconds.'
     return [
@@ -124,18 +118,11 @@ def what_it_believed(at_bump):
         rows += [(10 * n + 7, '/bumper', Bool(data=n >= first_bump)) for n in range(5)]
         with bag_of(sorted(rows, key=lambda row: row[0])) as path:
             found = at_bump(path)
+        found = tuple(found) if isinstance(found, list) else found
         right = (7.0 - first_bump, 5.0 - first_bump)
-        if isinstance(found, tuple | list) and tuple(found) == right:
-            return True
-        return (
-            f'in a bag of five scans, the last /wall before the first bump says {right[0]} m and '
-            f'the last /scan {right[1]} m; it returned {found}'
-        )
+        return expect(found, right, 'of the last /wall and /scan (m) until the bump it returns')
 
-    hint = (
-        'next(ns for ns, bump in ... if bump.data); then a list of what came until then, and its '
-        '[-1].'
-    )
+    hint = 'next(ns for ns, bump in ... if bump.data); then a list of what came until then: [-1].'
     return [
         ('a bump in the middle of a bag', lambda: finds(2), hint),
         ('a bump at its end', lambda: finds(4), hint),
@@ -156,19 +143,22 @@ def save_what_is_whole(salvage, half):
 
     def are_same(found, right):
         if not isinstance(found, list | tuple):
-            return f'it returned {found!r}'
-        if not found:
-            return 'of the whole messages it returned none'
+            return f'it returns {found!r}, not a list'
+        if not found:  # how many the half file has differs from run to run
+            return 'of the whole messages it returns none'
         for number, (saved, message) in enumerate(zip(found, right, strict=False)):
-            if tuple(saved) != message:
-                parts = zip(('topic', 'log_time', 'data'), saved, message, strict=False)
-                other = [name for name, part, wanted in parts if part != wanted]
-                if not other:
-                    return f'message {number} of its list has {len(saved)} parts, not three'
-                return f'message {number} of its list has another {" and ".join(other)}'
-        return len(found) == len(right) or (
-            f'the file has {len(right)} whole messages; it returned {len(found)}'
-        )
+            what = f'message {number} of its list'
+            if len(saved) != 3:
+                return f'{what} has {len(saved)} parts, not three'
+            topic, log_time, data = saved
+            same = all_of(
+                expect(topic, message[0], f'{what} has the topic'),
+                expect(log_time, message[1], f'{what} has the log_time'),
+                data == message[2] or f'{what} has other data',
+            )
+            if same is not True:
+                return same
+        return expect(len(found), len(right), 'the number of whole messages that it returns is')
 
     hint = 'A try around the for loop; except Exception: pass. isinstance(record, records.Message).'
     return [
@@ -200,9 +190,8 @@ def fix_the_brake(FreshBrake):
             bench.say('/clock', Clock(clock=stamp(now_s)))
             bench.say('scan', *(ahead(distance, stamp_s) for stamp_s, distance in scans))
         found = [twist.linear.x for twist in commands]
-        return found == right or (
-            f'at {now_s} s, scans (stamp, distance) {scans}: it commands {found}'
-        )
+        case = f'at {now_s} s, scans (stamp, distance) {scans}: it commands'
+        return expect(found, right, case)
 
     def has_depth_1():
         speeds = []
@@ -213,7 +202,7 @@ def fix_the_brake(FreshBrake):
             bench.say('scan', *(ahead(metres, now_s) for metres in (3.0, 2.0, 0.1)), at_once=True)
             bench.spin(brake)
             bench.quiet()
-        return speeds == [0.0] or f'of three scans that waited, it acted on {len(speeds)}'
+        return expect(speeds, [0.0], 'after scans of 3, 2 and 0.1 m that waited it commands')
 
     hint = 'Look only if Duration(seconds=-0.1) <= age <= Duration(seconds=0.5).'
     fresh, old = [(99.9, 2), (100, 0.3)], [(59, 2), (59.8, 2)]
@@ -246,22 +235,21 @@ def write_the_command_that_plays(PLAY, workspace):
         played = sorted(topic for topic, messages in heard.items() if messages)
         if not played:
             return f'it plays nothing. The command printed: {said}'
-        return played == ['/clock', '/scan'] or f'it plays {", ".join(played)}'
+        return expect(played, ['/clock', '/scan'], 'it plays')
 
-    return [
-        ('it plays /scan and /clock, and nothing else', plays, '--clock, and --topics /scan'),
-    ]
+    hint = '--clock, and --topics /scan'
+    return [('it plays /scan and /clock, and nothing else', plays, hint)]
 
 
 def play(bench, workspace, command):
     """Let a command play a bag to its end. Return what it printed."""
-    with workspace.start(command) as player:
-        if not bench.wait(lambda: not player.running, 40):
-            raise Failed(f'the player does not end. It printed: {what_it_printed(player)}')
-        if player.wait() != 0:
-            raise Failed(f'the command failed. It printed: {what_it_printed(player)}')
+    with Program(workspace.start(command)) as player:
+        if not player.has_ended(40):
+            raise Failed(f'the player does not end. It printed: {player.error}')
+        if player.exit_code() != 0:
+            raise Failed(f'the command failed. It printed: {player.error}')
     bench.quiet()
-    return what_it_printed(player)
+    return player.error
 
 
 @tasks.add
@@ -272,21 +260,29 @@ def write_the_judge(Judge):
             judge = bench.spin(Judge())
             for topic, value in messages:
                 bench.say(topic, ahead(value) if topic == 'scan' else forwards(value))
-        found = judge.commands
-        return found == right or f'after {messages} it has noted {found}'
+        return expect(judge.commands, right, f'after {messages} it has noted')
+
+    def loses_none():
+        """Let ten commands wait for a judge that does not spin yet."""
+        speeds = [number / 4 for number in range(10)]
+        with Bench() as bench:
+            judge = Judge()
+            bench.say('cmd_vel', *map(forwards, speeds), qos=20, at_once=True)
+            bench.spin(judge)
+            bench.quiet()
+        found = [speed for _, speed in judge.commands]
+        return expect(found, speeds, 'of ten commands that waited it has noted')
 
     early = [('cmd_vel', 0.5), ('scan', 2.0), ('cmd_vel', 0.25), ('cmd_vel', 0.0)]
     newest = [('scan', 3.0), ('scan', 0.5), ('cmd_vel', 0.0)]
+    blind, ahead_of_it = [('scan', math.nan), ('cmd_vel', 0.0)], 'distance_ahead(scan)'
     hint = 'Two subscriptions. One callback keeps the distance, the other one appends.'
     return [
         ('a command before any scan', lambda: notes(early[:1], [(None, 0.5)]), hint),
         ('two at 2 m', lambda: notes(early, [(None, 0.5), (2.0, 0.25), (2.0, 0.0)]), hint),
         ('the newest scan counts', lambda: notes(newest, [(0.5, 0.0)]), hint),
-        (
-            'a scan that does not say it',
-            lambda: notes([('scan', math.nan), ('cmd_vel', 0.0)], [(None, 0.0)]),
-            'distance_ahead(scan)',
-        ),
+        ('a scan that does not say it', lambda: notes(blind, [(None, 0.0)]), ahead_of_it),
+        ('ten commands that wait', loses_none, 'The depth is 10.'),
     ]
 
 
@@ -295,7 +291,7 @@ ANOTHER_GOOD = [(1.5, 0.0), (1.1, 0.3), (0.25, 0.5), (0.1, 0.0)]
 BAD = {
     'it never drives': [(2.0, 0.0), (1.2, 0.0), (0.2, 0.0)],
     'it says nothing': [],
-    'it drives slowly, and only near the wall': [(2.0, 0.0), (0.6, 0.1), (0.2, 0.0)],
+    'it drives slowly, and only near the wall': [(2.0, 0.0), (0.9, 0.1), (0.2, 0.0)],
     'it drives at once, and knows no scan': [(None, 0.5), (0.2, 0.0)],
     'it stops at 0.2 m only': [(2.0, 0.5), (0.24, 0.5), (0.2, 0.0)],
     'it stops, then goes on': [*GOOD, (0.11, 0.5)],
@@ -317,17 +313,12 @@ def write_the_assertions(check_commands):
         return accepts(commands) is not True or f'your test accepts {commands}'
 
     hint = 'any(...) for what must happen, and all(...) for what must hold each time.'
+    exactly = 'Exactly 0.25 m is not nearer.'
+    bad = [(f'it fails: {name}', commands) for name, commands in BAD.items()]
     return [
         ('a good brake passes', lambda: accepts(GOOD), hint),
-        (
-            'another good brake passes',
-            lambda: accepts(ANOTHER_GOOD),
-            'Exactly 0.25 m is not nearer.',
-        ),
-        *(
-            (f'it fails: {name}', lambda commands=commands: refuses(commands), hint)
-            for name, commands in BAD.items()
-        ),
+        ('another good brake passes', lambda: accepts(ANOTHER_GOOD), exactly),
+        *rows(refuses, hint, *bad),
     ]
 
 
@@ -338,24 +329,34 @@ def match_by_stamps(Synchroniser):
         synchroniser = Synchroniser(size, slop_s)
         for name, stamp_s in arrivals:
             synchroniser.add(name, stamped(LaserScan if name == 'scan' else Range, stamp_s))
-        for scan, wall in synchroniser.pairs:
-            if not isinstance(scan, LaserScan) or not isinstance(wall, Range):
-                return 'a pair is not (scan, wall)'
-        found = [(seconds_of(scan), seconds_of(wall)) for scan, wall in synchroniser.pairs]
-        return found == right or f'size {size}, slop {slop_s} s, {arrivals}: pairs {found}'
+        for pair in synchroniser.pairs:
+            if [type(message) for message in pair] != [LaserScan, Range]:
+                names = ', '.join(type(message).__name__ for message in pair)
+                return f'a pair is ({names}), not (LaserScan, Range)'
+        found = [(seconds_of(seen), seconds_of(wall)) for seen, wall in synchroniser.pairs]
+        return expect(found, right, f'size {size}, slop {slop_s} s, {arrivals}: the pairs are')
 
     def scans_then(size, walls, right):
         arrivals = [('scan', n) for n in range(1, 6)] + [('wall', n) for n in walls]
         return matches(size, 0.3, arrivals, right)
 
+    def uses_each_once():
+        wall_in_between = [('scan', 3.0), ('wall', 3.0), ('scan', 3.1)]
+        return all_of(
+            scans_then(9, [3.0, 3.1, 3.2], [(3, 3.0)]),
+            matches(9, 0.3, wall_in_between, [(3.0, 3.0)]),
+        )
+
     hint = 'del own[: -self.size]; min(other, key=lambda m: abs(stamp_s(m) - stamp_s(message))).'
     near = [('wall', 1.0), ('scan', 1.5), ('scan', 1.1), ('wall', 1.4)]
+    half = [('scan', 2.0), ('wall', 2.5)]
     two_near = [('scan', 1.8), ('scan', 2.1), ('wall', 2.0)]
     return [
         ('the nearest scan', lambda: scans_then(9, [2.1, 4.9], [(2, 2.1), (5, 4.9)]), hint),
         ('of two that fit, the nearest', lambda: matches(9, 0.3, two_near, [(2.1, 2.0)]), hint),
         ('none that is too far away', lambda: scans_then(9, [2.5, 9.0], []), hint),
-        ('none is used twice', lambda: scans_then(9, [3, 3.1, 3.2], [(3, 3)]), 'remove(...) both.'),
+        ('exactly slop_s away', lambda: matches(9, 0.5, half, [(2.0, 2.5)]), 'At most is <=.'),
+        ('none is used twice', uses_each_once, 'remove(...) both.'),
         ('old messages are removed', lambda: scans_then(2, [1, 3, 4], [(4, 4)]), hint),
         ('whichever comes first', lambda: matches(5, 0.3, near, [(1.1, 1.0), (1.5, 1.4)]), hint),
     ]
@@ -366,7 +367,7 @@ def hear_the_laser(LASER_QOS, workspace, scans):
     def hears():
         path = workspace.path / 'laser'
         shutil.rmtree(path, ignore_errors=True)
-        write_bag(path, [(ns, '/scan', scan) for ns, scan in scans], [best_effort()])
+        write_bag(path, [(ns, '/scan', heard) for ns, heard in scans], [best_effort()])
         heard = []
         with Bench() as bench:
             listener = Node('listener')
@@ -376,7 +377,7 @@ def hear_the_laser(LASER_QOS, workspace, scans):
         return bool(heard) or 'it receives no scan'
 
     def is_deep():
-        return LASER_QOS.depth == 100 or f'its depth is {LASER_QOS.depth}'
+        return expect(LASER_QOS.depth, 100, 'its depth is')
 
     hint = 'reliability=ReliabilityPolicy.NAME, as that of the laser.'
     return [('it receives scans', hears, hint), ('its depth is 100', is_deep, 'depth=100')]
@@ -391,7 +392,7 @@ def ask_the_bag_for_the_type(speeds):
         with bag_of(rows) as path:
             found = speeds(path)
         kind = type(messages[0]).__name__
-        return list(found) == right or f'of {kind} with {right} m/s it returns {found}'
+        return expect([*found], right, f'of {kind} messages it returns the speeds (m/s)')
 
     def refuses():
         for message in (Bool(data=True), Range(), Odometry()):
@@ -453,10 +454,8 @@ def seconds_of(message):
 
 def ahead(metres, stamp_s=1.0):
     """Return a scan with something at this distance ahead."""
-    scan = stamped(LaserScan, stamp_s, ranges=[0.2] * 80 + [float(metres)] * 21 + [7.0] * 80)
-    scan.angle_min, scan.angle_increment = -math.pi / 2, math.pi / 180
-    scan.range_min, scan.range_max = 0.1, 8.0
-    return scan
+    ranges = [0.2] * 80 + [metres] * 21 + [7.0] * 80
+    return scan(ranges, limits=(0.1, 8.0), stamp=stamp(stamp_s))
 
 
 def forwards(speed):
