@@ -19,8 +19,8 @@ def test_a_point_is_right_or_says_what_was_found(right):
     points = ('it turns', lambda: right, 'Turn.'), ('it stops', lambda: 'it drives on', 'Stop.')
     assert sent(*points) == [
         ('points', [('it turns', 'Turn.'), ('it stops', 'Stop.')]),
-        ('point', (True, '', False)),
-        ('point', (False, 'it drives on', False)),
+        ('point', (True, '', None)),
+        ('point', (False, 'it drives on', None)),
     ]
 
 
