@@ -81,7 +81,7 @@ class Judge:
     own_domain: bool
 
     def points(self, answer: Sequence[object]) -> Sequence[Test]:
-        """Return the points of an answer. This runs in the sandbox, which is a copy of the kernel."""
+        """Return the points of an answer. This runs in the sandbox, a copy of the kernel."""
         if self.own_domain:
             change_domain_id()
         return self.function(*answer)
