@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from helpers.checks.errors import Failed, NeverEnds, WithoutHint
+from helpers.checks.errors import Failed, NeverEnds
 from helpers.checks.points import all_of, cached, expect, judge_points, needs, rows
 
 
@@ -19,8 +19,8 @@ def test_a_point_is_right_or_says_what_was_found(right):
     points = ('it turns', lambda: right, 'Turn.'), ('it stops', lambda: 'it drives on', 'Stop.')
     assert sent(*points) == [
         ('points', [('it turns', 'Turn.'), ('it stops', 'Stop.')]),
-        ('point', (True, '', False)),
-        ('point', (False, 'it drives on', False)),
+        ('point', (True, '', None)),
+        ('point', (False, 'it drives on', None)),
     ]
 
 
@@ -134,7 +134,7 @@ def test_a_hint_for_another_mistake_is_not_shown():
         needs(lambda: 'Line 7: a name is missing')
 
     def differs():
-        raise WithoutHint('the program has ended')
+        raise Failed('the program has ended', hint='')
 
     points = ('it drives', lacks_the_build, 'Drive.'), ('it stops', differs, 'Stop.')
     assert sent(*points)[1:] == [

@@ -9,9 +9,11 @@ import pytest
 from support.kernel import Kernel
 
 from helpers.checks import tasks as module
-from helpers.checks.errors import sentence
+from helpers.checks.errors import Failed, sentence
+from helpers.checks.points import needs
 from helpers.checks.tasks import NOT_TRIED, Tasks
 from helpers.checks.verdict import AGAIN, Point, Verdict, bundle
+from helpers.ros import graph_environment
 
 
 @pytest.fixture
@@ -44,6 +46,30 @@ def test_hints_appear_at_the_second_wrong_try(capsys, lesson):
     assert 'Hint' not in str(tried(capsys, Tasks(), second=False))
     hint = '    Hint: Count the threads.'
     assert tried(capsys, lesson, second=False) == [*first, hint, f'Task 1: 1 of 2. {AGAIN}']
+
+
+def test_a_hint_that_does_not_fit_is_not_shown(capsys, lesson):
+    def built():
+        raise Failed('a comma is missing', hint='Look at line 3.')
+
+    def installed():
+        needs(built, 'it is not built')
+
+    points = ('it builds', built, 'Is src there?'), ('it is there', installed, 'Name the file.')
+    for _ in range(2):
+        lines = judged(capsys, lesson, *points)
+    assert [line for line in lines if 'Hint' in line] == ['    Hint: Look at line 3.']
+
+
+def test_a_check_may_have_a_domain_of_its_own(capsys, lesson):
+    def is_own():
+        return graph_environment()['ROS_DOMAIN_ID'] != kernels or 'it is that of the kernel'
+
+    kernels = graph_environment()['ROS_DOMAIN_ID']
+    point = 'the domain is another one', is_own, ''
+    assert 'that of the kernel' in str(judged(capsys, lesson, point))
+    assert '[ok]' in judged(capsys, lesson, point, own_domain=True)[0]
+    assert graph_environment()['ROS_DOMAIN_ID'] == kernels
 
 
 def test_a_second_run_prints_the_same(capsys, lesson):

@@ -19,11 +19,14 @@ WITHOUT_TEXT = {
 
 
 class Failed(Exception):  # noqa: N818 - a verdict, and no error
-    """What a check has found: raised by the bench, shown as it is."""
+    """What a check has found: raised by the bench, shown as it is.
 
+    `hint` takes the place of the hint of the point, which may not fit: '' shows none.
+    """
 
-class WithoutHint(Failed):
-    """What a check has found, if it is not the mistake that the hint of the point is for."""
+    def __init__(self, found: str = '', hint: str | None = None) -> None:
+        super().__init__(found)
+        self.hint = hint
 
 
 class NeverEnds(Failed):

@@ -11,6 +11,9 @@ A test returns True, or a text that says what the student's code did instead. An
 None, a tuple or an empty text, is a mistake of the check: the task is not judged, and the verdict
 names the line. What a test raises was found, too, and is shown with the student's line.
 
+A hint is shown at the second wrong try, unless the line of the student says more. A test that finds
+what its hint does not fit raises `Failed(found, hint='')`, or gives another hint there.
+
 The words of this module, for each judge:
 
     expect(found, right, 'it returns')   True, or 'it returns 3, not 4'
@@ -37,7 +40,7 @@ from numbers import Real
 
 import numpy as np
 
-from helpers.checks.errors import Failed, NeverEnds, WithoutHint, place_of, sentence
+from helpers.checks.errors import Failed, NeverEnds, place_of, sentence
 from helpers.notebook import frames, own_line, places
 
 Test = tuple[str, Callable[[], object], str]
@@ -75,10 +78,11 @@ def all_of(*results: bool | str) -> bool | str:
 
 
 def needs(point: Callable[[], object], otherwise: str = '') -> None:
-    """Raise WithoutHint if an earlier point is not right. Call it at the beginning of a test.
+    """Raise Failed if an earlier point is not right. Call it at the beginning of a test.
 
     `point` is the test of that point, which should be `cached`. `otherwise` says what is missing,
-    'it is not built'; without it, what the earlier point has found is said again.
+    'it is not built'; without it, what the earlier point has found is said again. No hint is
+    shown: that of the point is for another mistake.
     """
     try:
         found = _result(point)
@@ -87,7 +91,7 @@ def needs(point: Callable[[], object], otherwise: str = '') -> None:
     except Failed as failed:
         found = str(failed)
     if found is not True:
-        raise WithoutHint(otherwise or found)
+        raise Failed(otherwise or found, hint='')
 
 
 def cached(function: Callable[[], object]) -> Callable[[], object]:
@@ -154,9 +158,9 @@ def _value(value: object, unit: str) -> str:
 def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
     """Judge the points one by one. This runs in the sandbox.
 
-    It sends ('points', [(what, hint), ...]), then ('point', (ok, found, says_all)) for each: with
-    `says_all` its hint would be for another mistake. If the check itself is wrong it sends
-    ('mistake', text), and no more.
+    It sends ('points', [(what, hint), ...]), then ('point', (ok, found, hint)) for each, where the
+    hint is None if that of the point is right. If the check itself is wrong it sends ('mistake',
+    text), and no more.
     """
     failures: list[str] = []
     threading.excepthook = lambda error: failures.append(
@@ -171,7 +175,7 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
     send(('points', [(what, hint) for what, _, hint in tests]))
     for number, (what, test, _) in enumerate(tests):
         failures.clear()
-        never_ends = says_all = False
+        never_ends, hint = False, None
         try:
             result = _result(test)
             ok, found = (False, result) if isinstance(result, str) else (True, '')
@@ -181,9 +185,10 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
         except BaseException as error:  # whatever a student's code raises is an answer, not right
             ok, found = False, sentence(error)
             never_ends = isinstance(error, NeverEnds)
-            says_all = isinstance(error, WithoutHint) or (
-                bool(place_of(error)) and not isinstance(error, Failed)
-            )
+            if isinstance(error, Failed):
+                hint = error.hint
+            elif place_of(error):
+                hint = ''  # the line says more
         if failures and not ok:
             found = found if found[-1:] in ('', '.', '!', '?') else f'{found}.'
             found = f'{found} {failures[0]}'.strip()
@@ -195,7 +200,7 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
             ]
             if left and ok:
                 ok, found = False, _still_runs(left[0])
-        send(('point', (ok, found, says_all)))
+        send(('point', (ok, found, hint)))
         if never_ends:
             break
 

@@ -47,12 +47,12 @@ def manifest(workspace: Workspace, folder: str) -> Package:
     """
     path = workspace.file(folder)
     if not (path / 'package.xml').is_file():
-        raise Failed(f'there is no package {folder}')
+        raise Failed(f'there is no package {folder}', hint='')
     try:
         return parse_package(path)
     except InvalidPackage as error:
         reason = re.sub(r"^Error\(s\) in package '.*?':", '', ' '.join(str(error).split()))
-        raise Failed(f'package.xml cannot be read: {reason.strip()}') from None
+        raise Failed(f'package.xml cannot be read: {reason.strip()}', hint='') from None
 
 
 def needed(package: Package, moment: str) -> set[str]:

@@ -48,6 +48,7 @@ from helpers.checks.sandbox import Ending, Sandbox
 from helpers.checks.verdict import Point, Verdict, bundle
 from helpers.lesson import check_call, earlier_name
 from helpers.notebook import names_of, own_line, somebody_watches
+from helpers.ros import change_domain_id
 
 CPU_LIMIT_S = 5.0  # of one point: an endless loop uses it up
 LIMIT_S = 30.0  # of one point by the clock
@@ -77,6 +78,13 @@ class Judge:
     limit_s: float
     cpu_s: float
     about: Callable[..., str] | None
+    own_domain: bool
+
+    def points(self, answer: Sequence[object]) -> Sequence[Test]:
+        """Return the points of an answer. This runs in the sandbox, a copy of the kernel."""
+        if self.own_domain:
+            change_domain_id()
+        return self.function(*answer)
 
 
 class Tasks:
@@ -96,6 +104,7 @@ class Tasks:
         limit_s: float = LIMIT_S,
         cpu_s: float = CPU_LIMIT_S,
         about: Callable[..., str] | None = None,
+        own_domain: bool = False,
     ) -> Callable:
         """Register a function as the judge of the next task: `@tasks.add`.
 
@@ -103,7 +112,9 @@ class Tasks:
         of its points may use `cpu_s` seconds of CPU and `limit_s` seconds of the clock:
         `@tasks.add(limit_s=90)`. If one needs more, those after it are not tried. A build is none
         of its CPU, but takes its time. If a task is another one for each student, `about` gets the
-        answer and says which.
+        answer and says which. With `own_domain` the nodes and programs of the check are in a domain
+        of their own, so that what runs in the student's terminals changes no verdict. Without it,
+        they hear these terminals.
 
         Raises ValueError if the lesson has a task of this name.
         """
@@ -112,7 +123,9 @@ class Tasks:
             task = name or function.__name__
             if task in self.judges:
                 raise ValueError(f'This lesson has two tasks that are called {task}.')
-            self.judges[task] = Judge(function, len(self.judges) + 1, limit_s, cpu_s, about)
+            self.judges[task] = Judge(
+                function, len(self.judges) + 1, limit_s, cpu_s, about, own_domain
+            )
             return function
 
         return register if function is None else register(function)
@@ -131,7 +144,7 @@ class Tasks:
         verdict.note = _reason_not_to_judge(attempt, arguments, answer)
         if not verdict.note:
             attempt.arguments = arguments
-            hints = _judge(verdict, lambda: judge.function(*answer), judge.cpu_s, judge.limit_s)
+            hints = _judge(verdict, lambda: judge.points(answer), judge.cpu_s, judge.limit_s)
             attempt.failed = 0 if verdict.solved else attempt.failed + 1
             if attempt.failed > 1:
                 verdict.add_hints(hints)
@@ -171,7 +184,7 @@ class Tasks:
             return
         answer = [eval(argument, names) for argument in attempt.arguments]
         verdict = Verdict(task, judge.number, of='solution')
-        _judge(verdict, lambda: judge.function(*answer), judge.cpu_s, judge.limit_s)
+        _judge(verdict, lambda: judge.points(answer), judge.cpu_s, judge.limit_s)
         _show(verdict)
 
     def _judge_of(self, task: str) -> Judge:
@@ -229,9 +242,9 @@ def _judge(
                 verdict.points = []  # those that were tried count for nothing
                 verdict.note = f'This task cannot be judged: {content}.'
             else:
-                verdict.points[tried].ok, verdict.points[tried].found, says_all = content
-                if says_all:
-                    hints[tried] = ''  # a hint for another mistake misleads
+                verdict.points[tried].ok, verdict.points[tried].found, hint = content
+                if hint is not None:
+                    hints[tried] = hint  # that of the point would be for another mistake
                 tried += 1
             running.update(time.monotonic() - started)
     verdict.seconds = time.monotonic() - started

@@ -2,7 +2,7 @@
 
 from helpers.ros.connections import NOT_OF_A_LESSON, nearly
 from helpers.ros.conversions import START_NS, STATUS, quaternion, seconds_of, stamp_of, yaw_of
-from helpers.ros.domain import one_process_at_a_time, remove_dead_segments
+from helpers.ros.domain import change_domain_id, one_process_at_a_time, remove_dead_segments
 from helpers.ros.executors import spin_each, spun
 from helpers.ros.program import run_program
 from helpers.ros.session import (
@@ -20,6 +20,7 @@ __all__ = [
     'START_NS',
     'STATUS',
     'Session',
+    'change_domain_id',
     'current_session',
     'find',
     'frames',

@@ -32,19 +32,32 @@ def reserve_domain_id() -> int:
     """
     global _domain_id
     if _domain_id is None:
-        from domain_coordinator import domain_id
-
-        try:
-            _domain_id = _reserved.enter_context(domain_id())
-            # For the ros2 command, which looks where this user's kernels are.
-            variables = domain_variables(_domain_id, 'LOCALHOST')
-            _reserved.enter_context(recorded(variables, 'reserved'))
-        except RuntimeError as error:
-            raise RuntimeError(
-                'All 100 ROS domain ids of this machine are in use: '
-                'shut down the kernels that you no longer need, then run this cell again.'
-            ) from error
+        _domain_id = _reserve()
+        # For the ros2 command, which looks where this user's kernels are.
+        _reserved.enter_context(recorded(domain_variables(_domain_id, 'LOCALHOST'), 'reserved'))
     return _domain_id
+
+
+def change_domain_id() -> None:
+    """Let `reserve_domain_id` return another id from now on, also in a copy of a kernel.
+
+    The kernel and its terminals keep theirs, so neither hears the other. Open no session before.
+    Raises RuntimeError if all ids are taken.
+    """
+    global _domain_id
+    _domain_id = _reserve()  # and no record: no terminal shall join it
+
+
+def _reserve() -> int:
+    from domain_coordinator import domain_id
+
+    try:
+        return _reserved.enter_context(domain_id())
+    except RuntimeError as error:
+        raise RuntimeError(
+            'All 100 ROS domain ids of this machine are in use: '
+            'shut down the kernels that you no longer need, then run this cell again.'
+        ) from error
 
 
 @contextlib.contextmanager

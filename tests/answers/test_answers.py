@@ -230,3 +230,26 @@ def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson):
             ('solution', True)
         ], said
         judge(kernel, right, f'{task} right', cells)
+
+
+IN_TERMINALS = """
+from helpers.ros import ros_session
+
+for program in ('listener', 'talker'):
+    run = f'source install/setup.bash\\nros2 run hello_pkg {program}'
+    workspace.start(run, f'one more {program}')
+with ros_session() as session:
+    session.wait_until(lambda: session.node.count_subscribers('/topic'))
+    session.wait_until(lambda: session.node.count_publishers('/topic'))
+"""
+
+
+@pytest.mark.parametrize('lesson', ['make_a_package'])
+def test_what_runs_in_a_terminal_changes_no_verdict(lesson, open_lesson):
+    tasks = read_tasks(lesson)
+    with open_lesson(lesson, 'other_arguments') as opened:
+        said = opened.kernel.run(IN_TERMINALS)
+        for task in ('a_slow_listener', 'callbacks_in_parallel', 'other_arguments'):
+            _, cells = tasks[task]
+            said += run_all(opened.kernel, cells['solution'], cells['check'])
+            assert [verdict['solved'] for verdict in opened.kernel.verdicts] == [True], said

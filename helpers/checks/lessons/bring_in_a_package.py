@@ -1,14 +1,17 @@
 """What the tasks of the lesson "Bring in a package" are judged by."""
 
+import json
 import math
 import re
+import shlex
 
 from helpers.checks.builds import builds
-from helpers.checks.points import cached
+from helpers.checks.errors import Failed
+from helpers.checks.points import cached, expect, needs, rows
 from helpers.checks.programs import manifest, needed
 from helpers.checks.tasks import Tasks
 from helpers.trials import imports
-from helpers.workspace import error_in, run_rosdep
+from helpers.workspace import error_in, first_error, run_rosdep
 
 tasks = Tasks()
 check = tasks.check
@@ -16,7 +19,8 @@ check = tasks.check
 
 @tasks.add
 def clone_it(workspace, commands):
-    def clone():
+    @cached
+    def is_cloned():
         """Run the commands with an empty src, unless it has a clone that was changed."""
         is_clone = 'test -d src/brake/.git && git -C src/brake remote -v | grep -q server/brake'
         printed = ''
@@ -24,20 +28,18 @@ def clone_it(workspace, commands):
             workspace.terminal('rm -rf src brake && mkdir src')
             printed = workspace.terminal(commands)
         if not workspace.file('src/brake/.git').is_dir():
-            return ' '.join(['there is no clone src/brake.', *printed.splitlines()[-1:]])
+            return f'there is no clone src/brake. {last_of(printed)}'.strip()
         server = workspace.terminal('git -C src/brake remote get-url origin')
-        return (
-            server.removesuffix('.git').endswith('server/brake') or 'it is not of server/brake.git'
-        )
+        is_right = server.removesuffix('.git').endswith('server/brake')
+        return is_right or 'it is not of server/brake.git'
 
     def is_jazzy():
-        if not workspace.file('src/brake/.git').is_dir():
-            return 'there is no clone'
+        needs(is_cloned, 'there is no clone')
         branch = workspace.terminal('git -C src/brake branch --show-current')
         return branch == 'jazzy' or f'it is on the branch {branch}'
 
     return [
-        ('it is cloned into src', clone, 'git clone -b BRANCH ADDRESS'),
+        ('it is cloned into src', is_cloned, 'git clone -b BRANCH ADDRESS'),
         ('it is the branch of Jazzy', is_jazzy, 'The option -b takes a branch.'),
     ]
 
@@ -57,7 +59,7 @@ def name_the_dependencies(workspace):
 
     def nothing_else():
         if not names('run') - given:
-            return 'it names none at all'
+            raise Failed('it names none at all', hint='')
         others = sorted((names('run') | names('build')) - of_ros - keys - given)
         return not others or f'named, and not needed: {", ".join(others)}'
 
@@ -77,37 +79,48 @@ def name_the_dependencies(workspace):
 
 @tasks.add
 def write_the_rules(workspace, rules):
-    resolved = cached(
-        lambda: resolve(workspace, rules, 'ubuntu:noble', 'opensuse:15.5', 'fedora:40')
-    )
+    systems = 'ubuntu:noble', 'opensuse:15.5', 'fedora:40'
+
+    @cached
+    def resolved():
+        """Return the lines that rosdep says of the two keys, for each system."""
+        keys = 'rosdep resolve python3-numpy python3-yaml'
+        commands = '; echo -----; '.join(f'{keys} --os={system}' for system in systems)
+        parts = run_rosdep(workspace, rules, commands).split('-----\n')
+        return dict(zip(systems, map(str.splitlines, parts), strict=True))
 
     def resolves(system, *wanted):
         lines = resolved()[system]
         names = [line for line in lines if not line.startswith('#')]
         return names == [*wanted] or f'rosdep: {lines[-1] if lines else "nothing"}'
 
-    hint = 'A key with a colon; below it, two spaces, the system, a colon, and [the name].'
-    numpy = 'python3-numpy'
-    return [
-        ('ubuntu', lambda: resolves('ubuntu:noble', numpy, 'python3-yaml'), hint),
-        ('opensuse', lambda: resolves('opensuse:15.5', numpy, 'python3-PyYAML'), hint),
-        ('fedora', lambda: resolves('fedora:40', numpy, 'python3-pyyaml'), hint),
-    ]
+    return rows(
+        resolves,
+        'A key with a colon; below it, two spaces, the system, a colon, and [the name].',
+        ('ubuntu', 'ubuntu:noble', 'python3-numpy', 'python3-yaml'),
+        ('opensuse', 'opensuse:15.5', 'python3-numpy', 'python3-PyYAML'),
+        ('fedora', 'fedora:40', 'python3-numpy', 'python3-pyyaml'),
+    )
 
 
 @tasks.add(limit_s=90)
 def build_what_you_need(workspace, commands):
-    def leaves_gazebo_out():
-        workspace.terminal(f'rm -rf build install log\n{commands}')
+    built = cached(lambda: workspace.terminal(f'rm -rf build install log\n{commands}'))
+
+    @cached
+    def left_out():
+        printed = built()
+        if not workspace.file('build').is_dir():
+            raise Failed(f'colcon builds nothing. {last_of(printed)}'.strip(), hint='')
         return not workspace.file('build/brake_gazebo').exists() or 'colcon tried to build it'
 
-    left_out = cached(leaves_gazebo_out)
-
     def is_built(module):
-        # What else was built when a package failed, is chance.
-        if left_out() is not True:
-            return 'the build ends at brake_gazebo'
-        return imports(workspace, module)
+        if workspace.file('build/brake_gazebo').exists():
+            # What else was built when a package failed, is chance.
+            needs(left_out, 'the build ends at brake_gazebo')
+        needs(left_out)
+        found = imports(workspace, module)
+        return found is True or first_error(built()) or found
 
     hint = 'colcon build --packages-up-to NAME'
     finds = 'brake is built, and finds what it imports'
@@ -120,26 +133,28 @@ def build_what_you_need(workspace, commands):
 
 @tasks.add(limit_s=90)
 def install_the_files(workspace):
-    built = cached(lambda: builds(workspace, 'brake'))
+    # With what it needs, which is not there if the task before was not solved.
+    built = cached(lambda: builds(workspace, 'brake_tools', 'brake'))
 
     def is_installed(file):
-        if built() is not True:
-            return 'it is not built'
+        needs(built, 'it is not built')
         return workspace.file(f'install/brake/share/brake/{file}').is_file() or 'it is not there'
 
     pair = "One pair: ('share/' + package_name + '/FOLDER', ['FOLDER/FILE'])"
     commas = 'A comma after each pair. Paths start at the package folder.'
-    config, start = 'config/brake.yaml', 'launch/brake.launch.xml'
-    return [
-        ('it builds', built, commas),
-        ('config/brake.yaml is installed', lambda: is_installed(config), pair),
-        ('the launch file is installed', lambda: is_installed(start), pair),
-    ]
+    files = rows(
+        is_installed,
+        pair,
+        ('config/brake.yaml is installed', 'config/brake.yaml'),
+        ('the launch file is installed', 'launch/brake.launch.xml'),
+    )
+    return [('it builds', built, commas), *files]
 
 
 @tasks.add(limit_s=90)
 def slow_down(workspace, links, change):
     file = 'src/brake/brake/config/brake.yaml'
+    given = 'speed: 1.0\n'  # as the colleague has written it
 
     def installed():
         installed_file = workspace.file('install/brake/share/brake/config/brake.yaml')
@@ -147,51 +162,53 @@ def slow_down(workspace, links, change):
             return []
         return installed_file.read_text().partition('#')[0].split()
 
-    def links_are_made():
-        workspace.write(file, 'speed: 1.0')
+    @cached
+    def is_built():
+        workspace.write(file, given)
         printed = workspace.terminal(f'rm -rf build/brake* install/brake*\n{links}')
-        if 'Finished <<< brake' not in printed.splitlines():
-            return 'brake is not built'
+        return 'Finished <<< brake' in printed.splitlines() or 'brake is not built'
+
+    def is_linked():
+        needs(is_built)
         workspace.write(file, 'speed: 0.5')
-        if not installed():
+        found = installed()
+        workspace.write(file, given)
+        if not found:
             return 'config/brake.yaml is not installed'
-        return installed() == ['speed:', '0.5'] or f'in src it is 0.5, in install {installed()[-1]}'
+        return found == ['speed:', '0.5'] or f'in src it is 0.5, in install {found[-1]}'
 
-    linked = cached(links_are_made)
-
-    def change_counts(before):
-        if linked() == 'brake is not built':
-            return linked()
-        workspace.write(file, f'speed: {before}')
+    def changes():
+        needs(is_built)
         workspace.terminal(change)
-        return installed() == ['speed:', '0.3'] or f'installed is: {" ".join(installed())}'
+        if installed() == ['speed:', '0.3']:
+            return True  # and the robot drives with it
+        found = f'installed is: {" ".join(installed())}'
+        workspace.write(file, given)
+        return found
 
     link_hint = 'colcon build --symlink-install ...'
     return [
-        ('with LINKS, a change takes effect at once', linked, link_hint),
-        ('CHANGE turns 1.0 into 0.3', lambda: change_counts('1.0'), "echo 'speed: 0.3' > FILE"),
-        ('CHANGE turns 0.6 into 0.3', lambda: change_counts('0.6'), 'Write the whole file.'),
+        ('with LINKS, a change takes effect at once', is_linked, link_hint),
+        ('CHANGE turns 1.0 into 0.3', changes, "echo 'speed: 0.3' > FILE"),
     ]
 
 
 @tasks.add(limit_s=90)
 def make_an_overlay(workspace, commands):
-    def make():
+    def has_one_package():
         printed = workspace.terminal(f'rm -rf overlay\n{commands}')
         if not workspace.file('overlay/src').is_dir():
             return 'there is no folder overlay/src'
         names = 'colcon list --names-only --base-paths src 2>&1'
-        packages = workspace.terminal(f'cd overlay && {names}')
-        if packages == 'brake_tools':
+        packages = workspace.terminal(f'cd overlay && {names}').split()
+        if packages == ['brake_tools']:
             return True
-        return f'its packages: {" ".join(packages.split()) or "none"}. {last_of(printed)}'.strip()
-
-    made = cached(make)
+        return f'its packages: {" ".join(packages) or "none"}. {last_of(printed)}'.strip()
 
     def is_hidden():
-        count = workspace.terminal('colcon list --names-only 2>&1 | grep -c brake_tools')
         if not workspace.file('overlay').is_dir():
             return 'there is no folder overlay'
+        count = workspace.terminal('colcon list --names-only 2>&1 | grep -c brake_tools')
         return count == '1' or f'the underlay finds brake_tools {count} times'
 
     def has_both():
@@ -204,10 +221,22 @@ def make_an_overlay(workspace, commands):
         return folders == right or f'found: {", ".join(folders)}'
 
     return [
-        ('it has brake_tools alone', made, 'cp -r src/brake/brake_tools overlay/src'),
+        ('it has brake_tools alone', has_one_package, 'cp -r src/brake/brake_tools overlay/src'),
         ('the underlay does not see it', is_hidden, 'touch overlay/COLCON_IGNORE'),
         ('its setup.bash finds both workspaces', has_both, 'source it before cd overlay'),
     ]
+
+
+AS_BRAKE = """
+import json
+from math import nan
+from brake_tools.speed import nearest_ahead, safe_speed
+
+def drive(distance):
+    return float(safe_speed(nearest_ahead([distance] * 181), SPEED))
+
+print('\\nspeeds:', json.dumps([drive(distance) for distance in DISTANCES]))
+"""
 
 
 @tasks.add(limit_s=90)
@@ -215,32 +244,23 @@ def fix_the_function(workspace):
     built = cached(lambda: build_overlay(workspace))
 
     def returns(right, speed, *distances):
-        if built() is not True:
-            return built()
-        lines = workspace.terminal(f"""
-            source overlay/install/setup.bash
-            python -c 'from math import nan; from brake_tools.speed import safe_speed
-for distance in {distances}: print(float(safe_speed(distance, {speed})))'
-        """).splitlines()
-        if lines == [str(value) for value in right]:
-            return True
-        if any('Traceback' in line or 'Error: ' in line for line in lines):
-            return error_in(lines)
-        return f'{", ".join(lines[-5:])} for the distances {distances}'
+        """Ask for a speed as brake does, which looks for the nearest distance first."""
+        needs(built)
+        code = AS_BRAKE.replace('SPEED', str(speed)).replace('DISTANCES', str([*distances]))
+        lines = run_in_overlay(workspace, code)
+        said = [line for line in lines if line.startswith('speeds: ')]
+        if not said:
+            raise Failed(error_in(lines), hint='')
+        found = json.loads(said[-1].removeprefix('speeds: '))
+        return expect(found, right, f'for the distances {[*distances]} it returns')
 
     first, second = [0.0, 0.0, 0.4, 0.4, 0.8], [0.0, 0.5, 1.0]
+    order = 'Three returns, the nearest case first.'
+    not_a_number = 'NaN >= 0.5 is false, and so is NaN < 0.5. Which test does NaN pass by?'
     return [
-        (
-            'it is right for 0.8 m/s',
-            lambda: returns(first, 0.8, 0.1, 0.49, 0.5, 0.99, 1.0),
-            'Three returns, the nearest case first.',
-        ),
+        ('it is right for 0.8 m/s', lambda: returns(first, 0.8, 0.1, 0.49, 0.5, 0.99, 1.0), order),
         ('it is right for 1 m/s', lambda: returns(second, 1.0, 0.2, 0.8, 3.0), 'speed / 2'),
-        (
-            'it is 0.0 if the distance is NaN',
-            lambda: returns([0.0], 1.0, math.nan),
-            'NaN >= 0.5 is false, and so is NaN < 0.5. Which test does NaN pass by?',
-        ),
+        ('it is 0.0 if the distance is NaN', lambda: returns([0.0], 1.0, math.nan), not_a_number),
     ]
 
 
@@ -248,13 +268,12 @@ for distance in {distances}: print(float(safe_speed(distance, {speed})))'
 def create_a_package(workspace, commands):
     folder = 'overlay/src/speed_table'
 
-    def create():
+    @cached
+    def created():
         printed = workspace.terminal(f'rm -rf {folder}\n{commands}')
         if workspace.file(folder).is_dir():
             return True
         return f'there is no folder {folder}. {last_of(printed)}'.strip()
-
-    created = cached(create)
 
     def package():
         created()
@@ -285,64 +304,60 @@ def create_a_package(workspace, commands):
     ]
 
 
+ASKED = """
+from brake_tools import speed
+speed.safe_speed = lambda distance_m, speed: f"{distance_m:g} m at {speed:g} m/s"
+from speed_table.table import main
+main()
+"""
+
+
 @tasks.add(limit_s=90)
 def fill_it(workspace):
-    def prints_speeds():
-        built = build_overlay(workspace)
-        if built is not True:
-            return built
-        run = 'source overlay/install/setup.bash\nros2 run speed_table table'
-        lines = workspace.terminal(run).splitlines()
-        if any('Traceback' in line for line in lines):
-            return error_in(lines)
-        return lines == ['0.0', '0.4', '0.8'] or f'the last lines are: {" | ".join(lines[-3:])}'
+    built = cached(lambda: build_overlay(workspace))
 
-    printed = cached(prints_speeds)
+    def prints_speeds():
+        needs(built)
+        run = 'source overlay/install/setup.bash\nros2 run speed_table table'
+        return prints(workspace.terminal(run).splitlines(), '0.0', '0.4', '0.8')
 
     def asks_safe_speed():
         """Run it with a `safe_speed` that returns what it is asked."""
-        printed()  # it builds
-        lines = workspace.terminal("""
-            source overlay/install/setup.bash
-            python -c 'from brake_tools import speed
-speed.safe_speed = lambda distance_m, speed: f"{distance_m:g} m at {speed:g} m/s"
-from speed_table.table import main
-main()'
-        """).splitlines()
-        if any('Traceback' in line for line in lines):
-            return error_in(lines)
-        right = ['0.4 m at 0.8 m/s', '0.8 m at 0.8 m/s', '2 m at 0.8 m/s']
-        return lines == right or f'it asks: {" | ".join(lines[-3:])}'
+        needs(built)
+        asked = '0.4 m at 0.8 m/s', '0.8 m at 0.8 m/s', '2 m at 0.8 m/s'
+        lines = run_in_overlay(workspace, ASKED)
+        if not first_error(lines) and not any(' m at ' in line for line in lines):
+            return 'it prints, and does not ask safe_speed'
+        return prints(lines, *asked)
+
+    def prints(lines, *right):
+        if error := first_error(lines):
+            raise Failed(error, hint='')
+        return expect(lines, [*right], 'it prints')
 
     speed_hint = 'from brake_tools.speed import safe_speed'
     return [
-        ('it prints 0.0, 0.4 and 0.8', printed, speed_hint),
+        ('it prints 0.0, 0.4 and 0.8', prints_speeds, speed_hint),
         ('it asks safe_speed', asks_safe_speed, 'print(safe_speed(0.4, 0.8))'),
     ]
 
 
-# --- rosdep
-
-
-def resolve(workspace, rules, *systems):
-    """Return what rosdep says of the two keys of `write_the_rules` on each system, as lines."""
-    resolve_keys = 'rosdep resolve python3-numpy python3-yaml'
-    commands = '; echo -----; '.join(f'{resolve_keys} --os={system}' for system in systems)
-    parts = run_rosdep(workspace, rules, commands).split('-----\n')
-    return {system: part.splitlines() for system, part in zip(systems, parts, strict=True)}
-
-
-# --- What is built
+# --- The overlay
 
 
 def build_overlay(workspace):
     """Build the overlay in a terminal that has sourced the underlay. Return True, or the error."""
     build = 'cd overlay\ncolcon build --base-paths src 2>&1'
     printed = workspace.terminal(f'source install/setup.bash\n{build}')
-    if re.search(r'Failed +<<<|Aborted', printed) is None:
-        return True
-    errors = re.findall(r'^\w*[Ee]rror: .*', printed, re.MULTILINE)
-    return f'the build fails: {errors[0] if errors else last_of(printed)}'
+    if re.search(r'Failed +<<<|Aborted', printed):
+        raise Failed(f'the build fails: {error_in(printed)}', hint='')
+    return True
+
+
+def run_in_overlay(workspace, code):
+    """Run Python in a terminal that has sourced the overlay. Return the lines that it prints."""
+    run = f'python -c {shlex.quote(code)}'
+    return workspace.terminal(f'source overlay/install/setup.bash\n{run}').splitlines()
 
 
 def last_of(printed):

@@ -1,15 +1,17 @@
 """What the tasks of the lesson "Launch a system" are judged by."""
 
+import contextlib
 import os
 import re
 import signal
 import time
 
 from helpers.checks.builds import builds
-from helpers.checks.points import cached
-from helpers.checks.programs import launch, manifest, needed
+from helpers.checks.errors import Failed
+from helpers.checks.points import all_of, cached, needs
+from helpers.checks.programs import Program, launch, manifest, needed
 from helpers.checks.tasks import Tasks
-from helpers.workspace import error_in, error_of_launch, started, wait_until
+from helpers.workspace import error_of_launch, first_error, started, wait_until
 
 tasks = Tasks()
 check = tasks.check
@@ -19,7 +21,7 @@ IMPORTED = 'geometry_msgs', 'rclpy', 'sensor_msgs', 'std_srvs'
 OWN_SPEEDS = '[one.driver]: I drive at 0.3 m/s', '[two.driver]: I drive at 0.6 m/s'
 
 
-@tasks.add(limit_s=60)
+@tasks.add(limit_s=60, own_domain=True)
 def one_file(workspace, file):
     text = cached(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
     hint = '<node pkg=... exec="driver">, in it <param name=... value=.../>, and then </node>.'
@@ -29,23 +31,21 @@ def one_file(workspace, file):
     ]
 
 
-@tasks.add(limit_s=60)
+@tasks.add(limit_s=60, own_domain=True)
 def the_same_in_yaml(workspace, file):
     text = cached(lambda: run(workspace, file, *ROBOT_AND_DRIVER, programs=2))
     hint = 'Below "param:" write "- name: speed", and below "name" write "value: 0.4".'
+    each = '- node: for each.'
     return [
         ('the driver drives the robot at 0.4 m/s', lambda: says(text(), *ROBOT_AND_DRIVER), hint),
-        (
-            'two programs are started',
-            lambda: starts(text(), 'driver', 'robot'),
-            '- node: for each.',
-        ),
+        ('two programs are started', lambda: starts(text(), 'driver', 'robot'), each),
     ]
 
 
-@tasks.add(limit_s=60)
+@tasks.add(limit_s=60, own_domain=True)
 def a_file_for_all_floors(workspace, file):
-    def declares():
+    @cached
+    def declared():
         said = workspace.terminal(f'ros2 launch -s {file}')
         pairs = dict(re.findall(r"'(\w+)':\*?\n.*\n *\(default: '(.*)'\)", said))
         if pairs == {'floor': 'corridor', 'speed': '0.4', 'driver': 'true'}:
@@ -54,29 +54,23 @@ def a_file_for_all_floors(workspace, file):
             return said.splitlines()[-1]
         return f'the arguments with a default are {pairs or "none"}'
 
-    declared = cached(declares)
+    def launched(arguments, *lines, programs):
+        needs(declared, 'they are not declared as the task says')
+        return run(workspace, f'{file} {arguments}', *lines, programs=programs)
 
     def starts_without():
-        if declared() is not True:
-            return 'they are not declared as the task says'
-        text = run(workspace, file, *ROBOT_AND_DRIVER, programs=2)
+        text = launched('', *ROBOT_AND_DRIVER, programs=2)
         if started(text) == ['robot']:
             return 'only the robot is started: with driver:=true the driver must start'
         return says(text, *ROBOT_AND_DRIVER)
 
     def passes_on():
-        if declared() is not True:
-            return 'they are not declared as the task says'
         lines = 'on the floor empty', 'I drive at 0.2 m/s'
-        return says(run(workspace, f'{file} floor:=empty speed:=0.2', *lines, programs=2), *lines)
+        return says(launched('floor:=empty speed:=0.2', *lines, programs=2), *lines)
 
     def drives_by_hand():
-        if declared() is not True:
-            return 'they are not declared as the task says'
-        line = 'on the floor rooms'
-        text = run(workspace, f'{file} driver:=false floor:=rooms', line, programs=1)
-        said = says(text, line)
-        return starts(text, 'robot') if said is True else said
+        text = launched('driver:=false floor:=rooms', 'on the floor rooms', programs=1)
+        return all_of(says(text, 'on the floor rooms'), starts(text, 'robot'))
 
     by_hand = 'with driver:=false only the robot starts'
     return [
@@ -87,9 +81,13 @@ def a_file_for_all_floors(workspace, file):
     ]
 
 
-@tasks.add(limit_s=60)
+@tasks.add(limit_s=60, own_domain=True)
 def one_robot_with_a_name(workspace, file):
-    def launch_two():
+    speed = 'I drive at 0.25 m/s'
+    lines = 'floor corridor', f'[ada.driver]: {speed}', f'[bo.driver]: {speed}'
+
+    @cached
+    def text():
         """Launch it in another folder, with other parameters, as two robots."""
         include = (
             '<include file="$(dirname)/one.launch.xml"><arg name="name" value="{}"/></include>'
@@ -100,18 +98,20 @@ def one_robot_with_a_name(workspace, file):
         workspace.write('.tried/config/driver.yaml', '/**: {ros__parameters: {speed: 0.25}}')
         return run(workspace, '.tried/launch/two.launch.xml', *lines, programs=4)
 
-    lines = ['floor corridor', *(f'[{name}.driver]: I drive at 0.25 m/s' for name in ('ada', 'bo'))]
-    text = cached(launch_two)
-    hint = '<group>, push_ros_namespace with $(var name), and only then the two nodes; in the '
-    hint += 'driver <param from="$(dirname)/../config/driver.yaml"/>.'
+    def drives():
+        other_speed = 'I drive at' in text() and speed not in text()
+        return says(text(), *lines, hint=parameters if other_speed else None)
+
+    hint = '<group>, push_ros_namespace with $(var name), and only then the two nodes.'
+    parameters = 'In the driver: <param from="$(dirname)/../config/driver.yaml"/>.'
     both = ['driver', 'robot'] * 2
     return [
-        ('each driver has a robot, and the parameters', lambda: says(text(), *lines), hint),
+        ('each driver has a robot, and the parameters', drives, hint),
         ('a robot and a driver, each once', lambda: starts(text(), *both), hint),
     ]
 
 
-@tasks.add(limit_s=60)
+@tasks.add(limit_s=60, own_domain=True)
 def two_robots(workspace, file):
     lines = [f'[{name}.driver]: I drive' for name in ('one', 'two')]
     text = cached(lambda: run(workspace, file, *lines, programs=4))
@@ -123,7 +123,7 @@ def two_robots(workspace, file):
     ]
 
 
-@tasks.add(limit_s=60)
+@tasks.add(limit_s=60, own_domain=True)
 def a_speed_for_each(workspace, file):
     def own_speeds():
         return says(run(workspace, file, *OWN_SPEEDS, programs=4), *OWN_SPEEDS)
@@ -132,7 +132,7 @@ def a_speed_for_each(workspace, file):
     return [('each robot has its speed', own_speeds, hint)]
 
 
-@tasks.add(limit_s=60)
+@tasks.add(limit_s=60, own_domain=True)
 def start_it_again(workspace, file):
     def comes_back():
         log, text = guarded(workspace, f'{file} speed:=0.4', kill=True)
@@ -177,71 +177,71 @@ rclpy.spin(node)
 """
 
 
-@tasks.add(limit_s=120)
+@tasks.add(limit_s=120, own_domain=True)
 def a_camera_that_waits(workspace):
-    ros2_run = 'source install/setup.bash\nros2 run'
+    def start(words, name):
+        run = f'source install/setup.bash\n{words} --ros-args -r __ns:=/{name}'
+        return Program(workspace.start(run, f'{words} in {name}'))
+
+    def start_camera(name):
+        return start('ros2 run fleet_pkg camera', name)
 
     @cached
-    def seen():
-        """Return how it waits and turns and, tried meanwhile, how it gives up."""
+    def tried():
+        """Try both at once, because the second one waits for 5 s. Return the two results."""
         workspace.write('.tried/silent.py', SILENT)
-        space = '--ros-args -r __ns:=/silent'
         with (
-            workspace.start(f'python3 .tried/silent.py {space}', 'a silent robot') as silent,
-            workspace.start(f'{ros2_run} fleet_pkg camera {space}', 'its camera') as camera,
+            start('exec python3 .tried/silent.py', 'silent') as silent,
+            start_camera('silent') as camera,
         ):
-            return waits_and_turns(), gives_up(camera, silent)
+            tests = cached(waits_and_turns), cached(lambda: gives_up(camera, silent))
+            for test in tests:
+                with contextlib.suppress(Failed):
+                    test()
+        return tests
 
     def waits_and_turns():
         """Start it before the robot, and a second time after it."""
-        space = '--ros-args -r __ns:=/tried'
-        with workspace.start(f'{ros2_run} fleet_pkg camera {space}', 'the camera') as camera:
+        with start_camera('tried') as camera:
 
             def has_waited():
                 return sum('I wait for' in line for line in camera.lines) >= 3
 
             wait_until(lambda: has_waited() or not camera.running, 12)
             if not camera.running:
-                return f'before there is a robot it ends: {error_in(camera.lines)}'
+                raise ended('before there is a robot it ends', camera)
             if not has_waited():
                 return 'before there is a robot it does not say again and again that it waits'
             begun_s = time.monotonic()
-            with workspace.start(f'{ros2_run} simulated_robot robot {space}', 'the robot') as robot:
-                wait_until(lambda: any('drives on' in line for line in robot.lines), 25)
+            with start('ros2 run simulated_robot robot', 'tried') as robot:
+                wait_until(lambda: robot.says('drives on'), 25)
                 # A slow machine gets more time.
                 limit_s = max(4.0, 3 * (time.monotonic() - begun_s))
                 turned = turns(camera, limit_s)
                 if turned is not True:
                     return turned
-                late_camera = f'{ros2_run} fleet_pkg camera {space}'
-                with workspace.start(late_camera, 'a late camera') as late:
+                with start_camera('tried') as late:
                     return turns(late, limit_s)
 
-    hint = 'while not self.client.wait_for_service(timeout_sec=1.0): log. Then call_async, and '
-    hint += 'rclpy.spin_until_future_complete(self, future, timeout_sec=5.0).'
+    hint = 'while not self.client.wait_for_service(timeout_sec=1.0): log. Only then call_async.'
+    late = 'After timeout_sec=5.0, future.done() says whether the answer has come.'
     return [
-        ('it turns the camera, whichever starts first', lambda: seen()[0], hint),
-        (
-            'it asks once, and gives up if no answer comes',
-            lambda: seen()[1],
-            'After timeout_sec=5.0, future.done() says whether the answer has come.',
-        ),
+        ('it turns the camera, whichever starts first', lambda: tried()[0](), hint),
+        ('it asks once, and gives up if no answer comes', lambda: tried()[1](), late),
     ]
 
 
-@tasks.add(limit_s=90)
+@tasks.add(limit_s=90, own_domain=True)
 def install_the_files(workspace):
-    def build():
+    @cached
+    def built():
         workspace.terminal('rm -rf build install')
         # As a launch file in Python leaves it.
         workspace.write('src/fleet_pkg/launch/__pycache__/robot.launch.pyc', '')
         return builds(workspace, 'fleet_pkg')
 
-    built = cached(build)
-
     def is_installed():
-        if built() is not True:
-            return 'it is not built'
+        needs(built, 'it is not built')
         share = workspace.file('install/fleet_pkg/share/fleet_pkg')
         source = workspace.file('src/fleet_pkg')
         files = [*source.glob('launch/*.launch.*'), *source.glob('config/*.yaml')]
@@ -250,8 +250,7 @@ def install_the_files(workspace):
         return not absent or f'share/fleet_pkg has no {", no ".join(absent)}'
 
     def is_launched():
-        if built() is not True:
-            return 'it is not built'
+        needs(built, 'it is not built')
         words = 'fleet_pkg two_robots.launch.xml'
         try:
             return says(run(workspace, words, *OWN_SPEEDS, programs=4), *OWN_SPEEDS)
@@ -340,19 +339,26 @@ def run(workspace, words, *lines, programs):
     return re.sub(r'(?m)^\[\S+-\d+\] .*', '', text)
 
 
-def says(text, *lines):
-    """Return whether a launch has printed the lines, or what it did instead, and its error."""
+def says(text, *lines, hint=None):
+    """Return whether a launch has printed the lines, or what it did instead, and its error.
+
+    `hint` takes the place of the hint of the point, if there is no error.
+    """
     if all(line in text for line in lines):
         return True
+    error = error_of_launch(text)
     parts = [f'started: {", ".join(started(text)) or "nothing"}']
     parts += sorted(set(re.findall(r'\[[\w.]+\]: I drive.*', text)))
-    parts += [error] if (error := error_of_launch(text)) else []
-    return '; '.join(parts)
+    found = '; '.join([*parts, error] if error else parts)
+    raise Failed(found, hint='' if error else hint)
 
 
 def starts(text, *names):
-    programs = started(text)
-    return programs == sorted(names) or f'started: {", ".join(programs) or "nothing"}'
+    """Return whether a launch has started these programs, and no other."""
+    if started(text) == sorted(names):
+        return True
+    found = f'started: {", ".join(started(text)) or "nothing"}'
+    raise Failed(found, hint='' if error_of_launch(text) else None)
 
 
 # --- A program that is started again
@@ -396,33 +402,42 @@ def turns(camera, limit_s):
     """Wait until a camera has logged that it turned, and has ended without an error."""
 
     def has_turned():
-        return any('Turned: True' in line for line in camera.lines)
+        return camera.says('Turned: True')
 
     wait_until(lambda: has_turned() or not camera.running, limit_s)
     if not camera.running and not has_turned():
-        return f'beside a robot it ends: {error_in(camera.lines)}'
+        raise ended('beside a robot it ends', camera)
     if not has_turned():
         if camera.lines and 'I wait for' in camera.lines[-1]:
-            return 'the robot is there, and it still waits: has the service another name?'
+            found = 'the robot is there, and it still waits: has the service another name, or does '
+            found += 'nobody spin while it waits for the answer?'
+            raise Failed(found, hint='')
         said = ' / '.join(camera.lines[-3:]) or 'nothing'
-        return f'the robot is there, and it does not log "Turned: True". Its last lines: {said}'
-    if not wait_until(lambda: not camera.running, limit_s):
-        return 'it has turned the camera, and does not end'
-    return camera.wait() == 0 or f'it ends with an error: {error_in(camera.lines)}'
+        found = f'the robot is there, and it does not log "Turned: True". Its last lines: {said}'
+        raise Failed(found, hint='rclpy.spin_until_future_complete(self, future, timeout_sec=5.0)')
+    if not camera.has_ended(limit_s):
+        raise Failed('it has turned the camera, and does not end', hint='')
+    if camera.exit_code() != 0:
+        raise ended('it ends with an error', camera)
+    return True
 
 
 def gives_up(camera, silent):
     """Wait until a camera has ended, whose robot is asked and never answers."""
-    wait_until(lambda: 'asked' in silent.lines or not camera.running, 30)
-    if 'asked' not in silent.lines:
-        return f'it never asks: {error_in(camera.lines)}'
+    wait_until(lambda: silent.says('asked') or not camera.running, 30)
+    if not silent.says('asked'):
+        raise ended('it never asks', camera)
     # Five seconds, and what a slow machine needs for the end of a program.
-    if not wait_until(lambda: not camera.running, 15):
+    if not camera.has_ended(15):
         return 'no answer comes, and it waits for ever'
     asked = silent.lines.count('asked')
     if asked != 1:
-        return f'it asks {asked} times: {error_in(camera.lines)}'
-    if camera.wait() != 0:
-        return f'no answer comes, and it ends: {error_in(camera.lines)}'
-    said = any('Turned: False' in line for line in camera.lines)
-    return said or 'no answer comes, and it does not log "Turned: False"'
+        return f'it asks {asked} times: {camera.error}'
+    if camera.exit_code() != 0:
+        return f'no answer comes, and it ends: {camera.error}'
+    return camera.says('Turned: False') or 'no answer comes, and it does not log "Turned: False"'
+
+
+def ended(what, camera):
+    """Return that a camera has ended, and why. With an error no other hint is needed."""
+    return Failed(f'{what}: {camera.error}', hint='' if first_error(camera.lines) else None)

@@ -11,7 +11,7 @@ import numpy as np
 from geometry_msgs.msg import Twist
 
 from helpers.checks.bench import Bench, scan
-from helpers.checks.errors import Failed, WithoutHint
+from helpers.checks.errors import Failed
 from helpers.checks.points import all_of, cached, expect, needs, rows
 from helpers.checks.programs import manifest
 from helpers.checks.tasks import Tasks
@@ -90,7 +90,7 @@ class Compiled:
         words = r'r\.data\(\)|\b[nab]\b'
         call = re.sub(words, lambda word: str(values[word[0]]), self._call)
         if not lines and EMPTY in output:
-            raise WithoutHint(f'{call} reads the value of a std::optional that is empty')
+            raise Failed(f'{call} reads the value of a std::optional that is empty', hint='')
         found = lines[-1].removeprefix('= ') if lines else 'nothing: it crashed, or never ended'
         return found == right or f'{call} is {found}, not {right}'
 

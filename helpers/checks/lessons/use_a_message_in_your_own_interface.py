@@ -9,7 +9,8 @@ from sensor_msgs.msg import Image
 
 from helpers.checks.bench import Bench
 from helpers.checks.builds import builds
-from helpers.checks.points import cached
+from helpers.checks.errors import Failed, sentence
+from helpers.checks.points import all_of, cached, expect
 from helpers.checks.programs import manifest, needed, sourced
 from helpers.checks.tasks import Tasks
 from helpers.robot import ROOMS, Robot
@@ -24,23 +25,20 @@ BOTH = '<depend>NAME</depend> counts for the build and for the run.'
 @tasks.add
 def the_service_file(workspace, file):
     def has(part, right):
-        service = parse_service_file('custom_interfaces', str(workspace.file(file)))
+        try:
+            service = parse_service_file('custom_interfaces', str(workspace.file(file)))
+        except Exception as error:  # it has no type of its own: a separator, a type, a name
+            raise Failed(sentence(error), hint='') from None
         fields = [f'{field.type} {field.name}' for field in getattr(service, part).fields]
         return fields == [right] or f'the {part} is {", ".join(fields) or "empty"}'
 
+    request, response = 'float32 deg_turn', 'sensor_msgs/Image camera_image'
+    line = 'The type, a space, the name.'
     of_package = 'A type without a package is one of your own package. Otherwise package/Type, '
     of_package += 'without msg.'
     return [
-        (
-            'the request is right',
-            lambda: has('request', 'float32 deg_turn'),
-            'The type, a space, the name.',
-        ),
-        (
-            'the response is right',
-            lambda: has('response', 'sensor_msgs/Image camera_image'),
-            of_package,
-        ),
+        ('the request is right', lambda: has('request', request), line),
+        ('the response is right', lambda: has('response', response), of_package),
     ]
 
 
@@ -54,15 +52,15 @@ def what_it_depends_on(workspace):
         return 'rosidl_interface_packages' in groups or said
 
     def names(moment, name):
-        return lambda: is_named(workspace, package, moment, name)
+        return is_named(workspace, package, moment, name)
 
     line = 'One line <TAG>NAME</TAG>. The tag is in the text above the task.'
     return [
-        ('the generators are named', names('build', GENERATORS), line),
-        ('the runtime is named', names('run', RUNTIME), line),
+        ('the generators are named', lambda: names('build', GENERATORS), line),
+        ('the runtime is named', lambda: names('run', RUNTIME), line),
         ('it is in the group of interface packages', is_member, line),
-        ('sensor_msgs is named to build it', names('build', 'sensor_msgs'), BOTH),
-        ('sensor_msgs is named to run it', names('run', 'sensor_msgs'), BOTH),
+        ('sensor_msgs is named to build it', lambda: names('build', 'sensor_msgs'), BOTH),
+        ('sensor_msgs is named to run it', lambda: names('run', 'sensor_msgs'), BOTH),
     ]
 
 
@@ -77,12 +75,15 @@ def the_server(CameraServer):
     def turns(degrees):
         with Bench() as bench:
             robot = Robot(ROOMS)
-            bench.spin(CameraServer(robot))
+            node = bench.spin(CameraServer(robot))
             request = service_type().Request(deg_turn=degrees)
             response = bench.call('turn_camera', service_type(), request)
             if response is None:
                 return no_answer(bench)
-            return is_picture(response.camera_image, robot, degrees)
+            return all_of(
+                is_picture(response.camera_image, robot, degrees),
+                expect(node.get_name(), 'camera', 'the name of the node is'),
+            )
 
     hint = 'create_service(type, name, callback). The callback gets request and response.'
     return [
@@ -105,15 +106,17 @@ def the_client(ask, pixels):
     first = cached(lambda: asks(30.0))
 
     def asks_again():
-        first()  # what it raises is raised again, without another call
+        first()  # what it raises is raised again, without another call that waits
         return asks(120.0)
 
     def has_pixels(height, width):
         wanted = np.arange(height * width * 3, dtype=np.uint8).reshape(height, width, 3)
         image = Image(height=height, width=width, step=3 * width, data=wanted.tobytes())
         array = pixels(image)
-        wrong = f'{height} by {width} gives the wrong array: {np.shape(array)}'
-        return np.array_equal(array, wanted) or wrong
+        size = f'{height} by {width}'
+        if np.shape(array) != wanted.shape:
+            return f'{size} gives the wrong array: {np.shape(array)}'
+        return np.array_equal(array, wanted) or f'{size} has its bytes at other places'
 
     ask_hint = 'node.create_client, client.call_async(TurnCamera.Request(...)), future.done.'
     shape_hint = '.reshape(image.height, image.width, 3)'
@@ -148,7 +151,7 @@ def a_message_of_two_packages(workspace):
     def has_fields():
         kind = manifest(workspace, f'src/{package}').get_build_type()
         if kind != 'ament_cmake':
-            return f'its build_type is {kind}'
+            raise Failed(f'its build_type is {kind}, not ament_cmake', hint='')
         built = builds(workspace, package)
         if built is not True:
             return built
@@ -156,21 +159,22 @@ def a_message_of_two_packages(workspace):
         code += 'print(json.dumps(Sighting.get_fields_and_field_types()))'
         said = sourced(workspace, f"python -c '{code}'").splitlines()[-1]
         if not said.startswith('{'):
-            return said
+            raise Failed(said, hint='')
         fields = [f'{kind} {name}' for name, kind in json.loads(said).items()]
         right = ['nav_msgs/Path way', 'sequence<sensor_msgs/Image> pictures']
         return fields == right or f'its fields are, in this order: {", ".join(fields)}'
 
     def names(moment, *wanted):
-        return lambda: is_named(workspace, package, moment, *wanted)
+        return is_named(workspace, package, moment, *wanted)
 
+    both = 'nav_msgs', 'sensor_msgs'
     whole = 'Which line of the error says what was not found? Steps 1 and 2.'
     line = 'The lines of step 1, one by one.'
     return [
         ('it builds, and has the two fields', has_fields, whole),
-        ('both packages are named to build it', names('build', 'nav_msgs', 'sensor_msgs'), BOTH),
-        ('both packages are named to run it', names('run', 'nav_msgs', 'sensor_msgs'), BOTH),
-        ('the runtime of interfaces is named', names('run', RUNTIME), line),
+        ('both packages are named to build it', lambda: names('build', *both), BOTH),
+        ('both packages are named to run it', lambda: names('run', *both), BOTH),
+        ('the runtime of interfaces is named', lambda: names('run', RUNTIME), line),
     ]
 
 

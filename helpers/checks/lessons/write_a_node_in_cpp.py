@@ -14,7 +14,7 @@ from std_msgs.msg import Float32
 
 from helpers.checks.bench import RELIABLE, Bench, scan
 from helpers.checks.builds import build
-from helpers.checks.errors import Failed, WithoutHint
+from helpers.checks.errors import Failed
 from helpers.checks.points import all_of, cached, expect, needs
 from helpers.checks.programs import Program
 from helpers.checks.tasks import Tasks
@@ -95,7 +95,7 @@ def the_nearest_range(workspace):
             program.wait()
         of = f'of {", ".join(map(str, ranges)) or "no beam"}'
         if any(EMPTY in line for line in program.lines):
-            raise WithoutHint(f'{of}: {READS_EMPTY}')
+            raise Failed(f'{of}: {READS_EMPTY}', hint='')
         found = program.lines[-2] if len(program.lines) > 1 else 'no line'
         with suppress(ValueError):
             found = f'{float(found):g}'
@@ -164,9 +164,9 @@ class Heard:
     problem: str = ''
 
     def first(self, count):
-        """Return the first answers. Raises WithoutHint if there are fewer."""
+        """Return the first answers. Raises Failed if there are fewer."""
         if len(self.answers) < count:
-            raise WithoutHint(self.problem)
+            raise Failed(self.problem, hint='')
         return self.answers[:count]
 
 
@@ -356,13 +356,13 @@ def a_node_of_your_own(workspace):
     def is_called_brake():
         names = heard().names
         if heard().problem and not names:
-            raise WithoutHint(heard().problem)
+            raise Failed(heard().problem, hint='')
         return 'brake' in names or f'its name is {" ".join(names) or "not to be seen"}'
 
     def has_depth_1():
         handled = (tried() or ['nothing'])[-1]
         if EMPTY in ' '.join(tried()):
-            raise WithoutHint(f'of no known beam {READS_EMPTY}')
+            raise Failed(f'of no known beam {READS_EMPTY}', hint='')
         return handled == '1' or f'three scans came while it was busy: it handles {handled}, not 1'
 
     nearer = 'Is the nearer limit tested first?'
@@ -396,7 +396,7 @@ def another_robot(workspace, ARGUMENTS):
     def started():
         """Start the brake. Return the topics that it uses, and what it prints."""
         if isinstance(ARGUMENTS, str):
-            raise WithoutHint('ARGUMENTS is one text: write several, in ( )')
+            raise Failed('ARGUMENTS is one text: write several, in ( )', hint='')
         if not workspace.file('install/brake/lib/brake/brake').exists():
             install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake')
         topics = set()
