@@ -138,6 +138,6 @@ def test_a_hint_for_another_mistake_is_not_shown():
 
     points = ('it drives', lacks_the_build, 'Drive.'), ('it stops', differs, 'Stop.')
     assert sent(*points)[1:] == [
-        ('point', (False, 'Line 7: a name is missing', True)),
-        ('point', (False, 'the program has ended', True)),
+        ('point', (False, 'Line 7: a name is missing', '')),
+        ('point', (False, 'the program has ended', '')),
     ]
