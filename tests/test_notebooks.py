@@ -77,6 +77,9 @@ def test_each_answer_can_still_be_made_from_its_task(lesson):
 
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
 def test_each_equal_mutant_has_a_reason_and_is_made_by_a_rule(lesson):
+    file = ANSWERS / f'{lesson.name}.yaml'
+    if not file.exists() or not any(key.endswith(f' {EQUAL}') for key in answers_of(file)):
+        return
     stale = [f'{task}: {old}' for task, of in of_lesson(lesson.name).items() for old in of.stale]
     assert not stale, f'No rule makes these any more, below `equal:` of {lesson.name}.yaml: {stale}'
 

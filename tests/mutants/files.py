@@ -107,13 +107,14 @@ def _pieces(lines: Lines, kind: str) -> list[tuple[int, int]]:
             for at, line in enumerate(lines)
             if re.search(r';\s*(//.*)?$|\}\s*$', line) and _balanced(line) and _is_code(line)
         ]
+        pieces = [one for one in pieces if re.search(r'[;}]\s*$', lines[one[1] - 1])]
     return sorted({*pieces})
 
 
 @rule
 def a_line_gone(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
     for begin, end in _pieces(lines, kind):
-        if not written.isdisjoint(range(begin, end)) and end - begin < len(lines):
+        if begin in written:
             yield _with(lines, begin, count=end - begin)
 
 
@@ -132,11 +133,8 @@ def lines_in_the_other_order(lines: Lines, written: set[int], kind: str) -> Iter
 def a_line_twice(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
     if kind in ('c++', 'commands'):
         for begin, end in _pieces(lines, kind):
-            if (
-                end - begin == 1
-                and begin in written
-                and not lines[begin].strip().startswith('return')
-            ):
+            is_call = re.match(r'\s*(?!return)[\w.:>-]+(\(| = )', lines[begin])
+            if end - begin == 1 and begin in written and (kind == 'commands' or is_call):
                 yield _with(lines, begin, lines[begin], lines[begin])
 
 
@@ -213,7 +211,7 @@ def another_word_of_c(lines: Lines, written: set[int], kind: str) -> Iterator[Li
         if not _is_code(line) or line.strip().startswith(('#', 'template')):
             continue
         for found in C_TOKEN.finditer(line):
-            alone = found.start() == 0 or line[found.start() - 1] == ' '
+            alone = line[found.start() - 1 : found.end() + 1] == f' {found[0]} '
             for word, *others in C_WORDS:
                 if found[0] == word and (alone or word.isalpha() or word in ('++', '--')):
                     for other in others:

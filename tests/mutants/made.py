@@ -29,6 +29,7 @@ class Mutant:
     rule: str
     source: str = field(repr=False)
     solution: str = field(repr=False)
+    number: int = 0  # of those with the same rule, and the same lines around the change
 
     @property
     def difference(self) -> str:
@@ -44,7 +45,7 @@ class Mutant:
         lines = (one.splitlines() for one in (self.solution, self.source))
         near = [*difflib.unified_diff(*lines, lineterm='', n=1)][2:]
         text = '\n'.join(line[0] + line[1:].strip() for line in near if not line.startswith('@@'))
-        return blake2s(f'{self.rule}\n{text}'.encode(), digest_size=3).hexdigest()
+        return blake2s(f'{self.rule} {self.number}\n{text}'.encode(), digest_size=3).hexdigest()
 
 
 def mutants_of(solution: str, starters: Iterable[str], known: Iterable[str] = ()) -> list[Mutant]:
@@ -54,13 +55,17 @@ def mutants_of(solution: str, starters: Iterable[str], known: Iterable[str] = ()
     among them.
     """
     seen = {_program(source) for source in (solution, *known)}
-    found = []
+    found: dict[str, Mutant] = {}
     for rule, source in _made(solution, written_lines(solution, starters)):
         program = _program(source)
         if program is not None and program not in seen:
             seen.add(program)
-            found.append(Mutant(rule, source, solution))
-    return found
+            mutant, number = Mutant(rule, source, solution), 0
+            while mutant.id in found:
+                number += 1
+                mutant = Mutant(rule, source, solution, number)
+            found[mutant.id] = mutant
+    return [*found.values()]
 
 
 def drawn(mutants: list, count: int | None, seed: int) -> list:

@@ -36,6 +36,7 @@ ENDS_WORK = {
     'set', 'set_result', 'notify', 'notify_all', 'succeed', 'canceled', 'abort', 'put', 'release',
     'cancel', 'publish', 'publish_feedback', 'append', 'reset', 'clear',
 }  # fmt: skip
+ONCE_IS_ENOUGH = {'set', 'clear', 'cancel', 'notify', 'notify_all', 'join', 'shutdown', 'add_node'}
 EXECUTORS = ('SingleThreadedExecutor', 'MultiThreadedExecutor')
 GROUPS = ('MutuallyExclusiveCallbackGroup', 'ReentrantCallbackGroup')
 LIFECYCLE = ('on_configure', 'on_activate', 'on_deactivate', 'on_cleanup', 'on_shutdown')
@@ -109,15 +110,32 @@ def behind_the_next_one(program: Program) -> Made:
 
 
 def _order_says_nothing(program: Program, first: cst.CSTNode, second: cst.CSTNode) -> bool:
-    """Return whether two statements only give names a value, and none with a name of the other."""
+    """Return whether two statements only give names a value, and none with a name of the other.
+
+    Of one that gives a name a new object, the other may do what it wants, if it has not this name.
+    """
     assigned = [_assigned(program, one) for one in (first, second)]
+    for names, one, other in zip(assigned, (first, second), (second, first), strict=True):
+        if names and _is_new(program, one) and not _mentions(program, other, names):
+            return True
     if not all(assigned):
         return False
     return not any(
-        re.search(rf'\b{re.escape(name)}\b', program.code(other))
+        _mentions(program, other, names)
         for names, other in zip(assigned, (second, first), strict=True)
-        for name in names
     )
+
+
+def _mentions(program: Program, one: cst.CSTNode, names: list[str]) -> bool:
+    return any(re.search(rf'\b{re.escape(name)}\b', program.code(one)) for name in names)
+
+
+def _is_new(program: Program, one: cst.CSTNode) -> bool:
+    """Return whether a statement gives a name a number, an empty list, or a new object."""
+    assign = only(one, cst.Assign)
+    value = program.code(assign.value) if assign else 'f()'
+    plain = r"[\d.]+|None|True|False|\[\]|\{\}|'\w*'"
+    return bool(re.fullmatch(rf'{plain}|(\w+\.)?[A-Z]\w*\(\)', value))
 
 
 def _assigned(program: Program, one: cst.CSTNode) -> list[str]:
@@ -443,7 +461,10 @@ def an_attribute_of_the_class(program: Program) -> Made:
 def twice(program: Program) -> Made:
     """What should happen once happens twice."""
     for block, at, one in program.statements():
-        if call_in(one) or only(one, cst.AugAssign):
+        call = call_in(one)
+        name = name_of(call.func) if call else ''
+        again = call and name not in ONCE_IS_ENOUGH and not name.startswith('wait')
+        if again or only(one, cst.AugAssign):
             yield program.put(block, at, one, one.with_changes(leading_lines=[]))
 
 

@@ -74,6 +74,8 @@ class Judge:
     def __init__(self, name: str) -> None:
         self._name = name
         self._lesson: Lesson | None = None
+        self._folder = tempfile.TemporaryDirectory(prefix='kernels-')
+        self._opened = 0
 
     def close(self) -> None:
         if self._lesson is not None:
@@ -83,6 +85,12 @@ class Judge:
     def _at(self, task: str) -> Lesson:
         if self._lesson is None:
             self._lesson = Lesson(self._name)
+            # Two kernels that start at once may choose the same port. A file is nobody else's.
+            self._opened += 1
+            self._lesson.kernel.config.KernelManager.transport = 'ipc'
+            self._lesson.kernel.config.KernelManager.connection_file = (
+                f'{self._folder.name}/{self._opened}.json'
+            )
             self._lesson.kernel.__enter__()
         if self._lesson.reached < 0 or not self._lesson.is_behind(task):
             self._lesson.kernel.timeout = 600  # what stands above may build a workspace

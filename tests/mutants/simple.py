@@ -18,7 +18,7 @@ OPERATORS = {
     cst.AddAssign: cst.SubtractAssign, cst.SubtractAssign: cst.AddAssign,
 }  # fmt: skip
 COMPARISONS = {
-    '<': ['<=', '>'], '<=': ['<', '>='], '>': ['>=', '<'], '>=': ['>', '<='], '==': ['!=', '>='],
+    '<': ['<=', '>'], '<=': ['<', '>='], '>': ['>=', '<'], '>=': ['>', '<='], '==': ['!='],
     '!=': ['=='], 'is': ['is not'], 'is not': ['is'], 'in': ['not in'], 'not in': ['in'],
 }  # fmt: skip
 KINDS = (
@@ -127,16 +127,22 @@ def another_number(program: Program) -> Made:
         if isinstance(node, cst.Float):
             others = [value * 2, value / 2] if value else [0.1]
         elif value >= 10:
-            others = [1] if _is_depth(program, node) else [1, value + 1]
+            others = [1, value + 1]
+        if _may_be_more(program, node):
+            others = [1] if value > 1 else []
         for other in others:
             code = repr(other)
             yield program.changed(node, f'({code})' if code.startswith('-') else code)
 
 
-def _is_depth(program: Program, node: cst.CSTNode) -> bool:
-    """Return whether a number is the depth of a queue: one more of it is as good."""
-    call = program.above(node, cst.Call)
-    return call is not None and name_of(call.func) in ('create_publisher', 'create_subscription')
+def _may_be_more(program: Program, node: cst.CSTNode) -> bool:
+    """Return whether more is as good: a number of threads, the depth of a queue."""
+    argument, call = program.parent(node), program.above(node, cst.Call)
+    if not isinstance(argument, cst.Arg) or call is None:
+        return False
+    if argument.keyword:
+        return argument.keyword.value == 'num_threads'
+    return name_of(call.func) in ('create_publisher', 'create_subscription')
 
 
 @rule
@@ -146,7 +152,8 @@ def another_text(program: Program) -> Made:
         if isinstance(program.parent(node), cst.Expr) or not isinstance(value, str):
             continue
         if value and not re.search(r'\s', value):
-            yield program.changed(node, repr(f'{value}_2'))
+            is_set = isinstance(program.parent(node), cst.ComparisonTarget) and len(value) > 1
+            yield program.changed(node, repr(value[:-1] if is_set else f'{value}_2'))
 
 
 @rule
