@@ -121,7 +121,7 @@ def entry_of(mutant: Mutant) -> tuple[str, str]:
 def _as_lines(old: list[str], new: list[str]) -> tuple[str, str]:
     """Return both as texts, where new lines are indented by what the first old line has."""
     indent = len(old[0]) - len(old[0].lstrip()) if old else 0
-    return '\n'.join(old).strip(), '\n'.join(line[indent:] for line in new).rstrip()
+    return ' '.join(' '.join(old).split()), '\n'.join(line[indent:] for line in new).rstrip()
 
 
 def _from_to(old: list[str], new: list[str]) -> tuple[str, str]:
