@@ -74,8 +74,12 @@ test-tools: set_up ## test an installation from nothing, a new lesson, two machi
 test-packages: set_up ## build and test the packages that learners end with: LESSON="09 12"
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/packages $(lesson) $(PYTEST_ARGS)
 
-test-answers: set_up ## let each check judge the answers in tests/answers: LESSON=02, TASK=3
-	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) tests/answers $(lesson) $(if $(TASK),--task "$(TASK)") $(PYTEST_ARGS)
+test-answers: set_up ## let each check judge the answers in tests/answers: LESSON=02, TASK=3, SEED=7 (of mutants)
+	@$(PYTHON) -m pytest -n $(WORKERS) $(slow) tests/answers $(lesson) $(if $(TASK),--task "$(TASK)") $(if $(SEED),--seed "$(SEED)") $(PYTEST_ARGS)
+
+mutants: set_up ## judge wrong answers that rules make: LESSON=05, TASK=2, SEED=7, COUNT=40 (all), JOBS=2, LIST=yes
+	@$(PYTHON) tests/mutants --lesson "$(LESSON)" --task "$(TASK)" $(if $(SEED),--seed "$(SEED)") \
+		$(if $(COUNT),--count "$(COUNT)") $(if $(JOBS),--jobs "$(JOBS)") $(if $(filter yes,$(LIST)),--list)
 
 test-browser: ## test JupyterLab and the site in Chromium
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
@@ -110,11 +114,11 @@ set_up:
 	@mkdir -p .jupyter && tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
-test test-ros2 test-tools test-packages test-answers test-browser test-classroom test-hub notebooks lesson task soak bench lint: groups := test
+test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub notebooks lesson task soak bench lint: groups := test
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present class test test-ros2 test-tools test-packages test-answers test-browser test-classroom test-hub image lab-container hub handout grade update notebooks \
+.PHONY: help lab present class test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub image lab-container hub handout grade update notebooks \
 	lesson task site soak bench release lint lock licences clean set_up
 
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None

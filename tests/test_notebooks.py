@@ -4,7 +4,8 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from support.answers import LEAST, answers_of, source_of
+from mutants.lessons import of_lesson
+from support.answers import EQUAL, LEAST, answers_of, source_of
 
 from helpers.lesson import code_of_solution, lessons
 from tools.lessons import rules, tables
@@ -46,13 +47,14 @@ def test_lesson_00_shows_the_tasks_that_there_are():
 def test_each_task_has_answers_that_try_its_check(lesson):
     file = ANSWERS / f'{lesson.name}.yaml'
     answers = answers_of(file) if file.exists() else {}
-    wanted = {f'{task.name} {kind}' for task in lesson.tasks for kind in ('wrong', 'right')}
-    differ = ', '.join(sorted(answers.keys() ^ wanted))
+    wanted = {f'{task.name} {kind}' for task in lesson.tasks for kind in LEAST}
+    may_be = {f'{task.name} {EQUAL}' for task in lesson.tasks}
+    differ = ', '.join(sorted((answers.keys() - may_be) ^ wanted))
     assert not differ, (
         f'tests/answers/{file.name} lacks these, or has too many: {differ}. The top of '
         'tests/answers/test_answers.py says how answers are written.'
     )
-    few = [key for key, given in answers.items() if len(given) < LEAST[key.split()[1]]]
+    few = [key for key, given in answers.items() if len(given) < LEAST.get(key.split()[1], 1)]
     assert not few, f'{file.name} has too few answers below {", ".join(few)}: {LEAST} are wanted.'
 
 
@@ -71,6 +73,15 @@ def test_each_answer_can_still_be_made_from_its_task(lesson):
                 except ValueError as error:
                     problems.append(f'Below `{task.name} {kind}:` of {file.name}. {error}')
     assert not problems, '\n'.join(problems)
+
+
+@pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
+def test_each_equal_mutant_has_a_reason_and_is_made_by_a_rule(lesson):
+    file = ANSWERS / f'{lesson.name}.yaml'
+    if not file.exists() or not any(key.endswith(f' {EQUAL}') for key in answers_of(file)):
+        return
+    stale = [f'{task}: {old}' for task, of in of_lesson(lesson.name).items() for old in of.stale]
+    assert not stale, f'No rule makes these any more, below `equal:` of {lesson.name}.yaml: {stale}'
 
 
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])

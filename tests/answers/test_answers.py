@@ -16,126 +16,36 @@ whatever lies between, and a space is any white space. The solution must have ea
 once. If it has not, the starter is edited, which must. New lines are indented as the line in which
 the old text begins. An answer that has little in common with both is given as a whole, as text.
 
+A few mutants are drawn for each lesson, and judged as wrong answers: those of `make mutants`. One
+that differs from the solution, but not in what the task asks for, stands in the file as well:
+
+    a_driver equal:
+    - self.speed = 0.5: self.speed = 1 / 2
+      because: it is the same number
+
 YAML wants quotes around text that begins with a quote, a bracket or another sign of its own, or
 that has a colon with a space behind it, or a # with a space before it.
 """
 
-import os
-import shutil
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from mutants.lessons import drawn_of_lesson
 from support.answers import LEAST, answers_of, source_of
-from support.kernel import NOTEBOOKS, Kernel
-
-from helpers.lesson import check_call, code_of_solution, path_of, read
+from support.judged import Cells, Lesson, read_tasks, run_all
+from support.kernel import Kernel
 
 HERE = Path(__file__).parent
-KEEP_NAMES = 'get_ipython().names_before = dict(get_ipython().user_ns)'
-PUT_NAMES_BACK = """
-def put_back(names, before):
-    names.clear()
-    names.update(before)
-
-
-put_back(get_ipython().user_ns, get_ipython().names_before)
-"""
-Cells = dict[str, list[str]]  # of a task, by their tag
-
 FILES = sorted(HERE.glob('*.yaml'))
-
-
-def builds(check: str) -> bool:
-    """Return whether a check builds, clones or starts programs."""
-    _, arguments = check_call(check)
-    return arguments[:1] == ['workspace']
-
-
-def read_tasks(name: str) -> dict[str, tuple[list[str], Cells]]:
-    """Return for each task of a lesson, by its name, the cells above it, and its own."""
-    path = path_of(name, NOTEBOOKS)
-    lesson = read(path.read_text(encoding='utf-8'), path.name)
-    of_tasks = {cell.id for task in lesson.tasks for cell in task.cells}
-    found, above = {}, []
-    tasks = iter(lesson.tasks)
-    task = next(tasks, None)
-    for cell in lesson.code_cells():
-        if cell.id not in of_tasks:
-            above.append(cell.source)
-        elif cell is task.cells[-1]:
-            found[task.name] = (
-                above,
-                {
-                    'exercise': [one.source for one in task.exercises],
-                    'check': [one.source for one in task.checks],
-                    'solution': [code_of_solution(one.source) for one in task.solutions],
-                },
-            )
-            above, task = [], next(tasks, None)
-    return found
-
-
-class Lesson:
-    """A lesson in a kernel: its tasks are judged in their order, in one pass through its cells.
-
-    `go_to` runs the cells above a task, with the solutions of the tasks before it, and `go_on`
-    leaves the task as if only its solution had been written.
-    """
-
-    def __init__(self, name: str) -> None:
-        self.name, self.kernel = name, Kernel()
-        self._tasks = read_tasks(name)
-        self._names = [*self._tasks]
-        self._folder: Path | None = None  # of its workspace
-        self.reached = -1  # the place of the task whose cells are `cells`
-        self.cells: Cells = {}
-
-    def is_behind(self, task: str) -> bool:
-        """Return whether the lesson has reached a task, or a later one."""
-        return self.reached >= self._names.index(task)
-
-    def go_to(self, task: str) -> None:
-        """Run the cells above a task."""
-        while not self.is_behind(task):
-            if self.cells:
-                # Some solutions change the files that their starters have written.
-                run_all(self.kernel, self.cells['exercise'], self.cells['solution'])
-                # What a check builds is used by the cells below it.
-                run_all(self.kernel, filter(builds, self.cells['check']))
-            self._reach_next()
-
-    @contextmanager
-    def undone(self) -> Iterator[None]:
-        """Undo what cells do to files of the workspace and to names of the kernel."""
-        self.kernel.run(KEEP_NAMES)
-        with tempfile.TemporaryDirectory() as aside:
-            kept = Path(aside, 'kept')
-            if self._folder:
-                shutil.copytree(self._folder, kept, symlinks=True)
-            yield
-            if self._folder:
-                for path in self._folder.iterdir():
-                    (shutil.rmtree if path.is_dir() and not path.is_symlink() else os.remove)(path)
-                shutil.copytree(kept, self._folder, symlinks=True, dirs_exist_ok=True)
-        self.kernel.run(PUT_NAMES_BACK)
-
-    def _reach_next(self) -> None:
-        """Run the cells above the next task."""
-        self.reached += 1
-        above, self.cells = self._tasks[self._names[self.reached]]
-        run_all(self.kernel, above)
-        path = self.kernel.run("print(globals()['workspace'].path)") if self._folder is None else ''
-        if path.startswith('/'):
-            self._folder = Path(path.strip())
-
-
-def run_all(kernel: Kernel, *sources: list[str]) -> str:
-    """Run cells, and return what they print."""
-    return ''.join(kernel.run(source) for group in sources for source in group)
+MUTANTS = 3  # of a lesson
+WHY = {
+    'wrong': 'This answer stands below `{}:`, and its check says something else.',
+    'mutant': 'A rule of tests/mutants has made this wrong answer, `{}`, and its check takes it: '
+    'CONTRIBUTING.md says what follows.',
+}
 
 
 def made(answers: list, key: str, cells: Cells) -> list[str]:
@@ -162,10 +72,10 @@ def judge(kernel: Kernel, sources: list[str], key: str, cells: Cells) -> None:
             said += run_all(kernel, cells['check'])
             solved = [verdict['solved'] for verdict in kernel.verdicts]
             # A name that the answer does not define is an error of the cell, not a verdict.
-            if solved != [kind == 'right'] and not (kind == 'wrong' and not solved):
+            if solved != [kind == 'right'] and not (kind != 'right' and not solved):
                 pytest.fail(
-                    f'This answer stands below `{key}:`, and its check says something else.\n'
-                    f'{source}\n\nThe check said:\n{said}',
+                    f'{WHY.get(kind, WHY["wrong"]).format(key)}\n{source}\n\n'
+                    f'The check said:\n{said}',
                     pytrace=False,
                 )
 
@@ -205,12 +115,14 @@ def open_lesson():
 @pytest.mark.parametrize(
     ('lesson', 'task'), [(path.stem, task) for path in FILES for task in read_tasks(path.stem)]
 )
-def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson):
+def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson, request):
     answers, tasks = answers_of(HERE / f'{lesson}.yaml'), read_tasks(lesson)
     # Before the cells above the task have run: that takes a while.
     wrong, right = (
         made(answers.get(f'{task} {kind}', []), f'{task} {kind}', tasks[task][1]) for kind in LEAST
     )
+    seed = request.config.option.seed
+    mutants = [one.source for one in drawn_of_lesson(lesson, MUTANTS, seed).get(task, [])]
     with open_lesson(lesson, task) as opened:
         kernel, cells = opened.kernel, opened.cells
         run_all(kernel, cells['exercise'])
@@ -221,6 +133,9 @@ def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson):
             f'The starter must be wrong. Its check said:\n{said}'
         )
         judge(kernel, wrong, f'{task} wrong', cells)
+        if mutants:
+            print(f'Mutants are drawn with SEED={seed}.')
+            judge(kernel, mutants, f'{task} mutant', cells)
         # What a right answer builds stays, so the solution comes after the wrong ones.
         run_all(kernel, cells['exercise'])
         started = time.monotonic()

@@ -9,6 +9,7 @@ from pathlib import Path
 import yaml
 
 LEAST = {'wrong': 5, 'right': 3}  # answers of a task
+EQUAL = 'equal'  # mutants of a task that no check need notice: they may be there
 
 
 def answers_of(path: Path) -> dict[str, list]:
@@ -24,6 +25,21 @@ def answers_of(path: Path) -> dict[str, list]:
             f'{path.name}, line {where.line + 1}: {error.problem}. YAML wants quotes around some '
             'texts: the top of tests/answers/test_answers.py says which.'
         ) from None
+
+
+def equal_of(answers: dict[str, list], task: str) -> list[tuple[str | dict[str, str], str]]:
+    """Return the mutants of a task that are equal to its solution: each with its reason.
+
+    Raises ValueError with one sentence if one has no reason.
+    """
+    found = []
+    for entry in answers.get(f'{task} {EQUAL}', []):
+        edits = dict(entry) if isinstance(entry, dict) else {}
+        reason = edits.pop('because', '')
+        if not edits or not reason.strip():
+            raise ValueError(f'A mutant below `{task} {EQUAL}:` needs a line `because:`: {entry}')
+        found.append((edits, reason))
+    return found
 
 
 def source_of(answer: str | dict[str, str], *sources: str) -> str:

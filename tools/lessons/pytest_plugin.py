@@ -38,6 +38,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default='',
         help='of one lesson: only the answers of these tasks, by number or name',
     )
+    parser.addoption(
+        '--seed', type=int, default=1, help='draws the mutants that the answers have among them'
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
