@@ -16,8 +16,9 @@ whatever lies between, and a space is any white space. The solution must have ea
 once. If it has not, the starter is edited, which must. New lines are indented as the line in which
 the old text begins. An answer that has little in common with both is given as a whole, as text.
 
-A few mutants are drawn for each lesson, and judged as wrong answers: those of `make mutants`. One
-that differs from the solution, but not in what the task asks for, stands in the file as well:
+With a seed, a few mutants are drawn for each lesson and judged as wrong answers, as `make mutants`
+does with all of them. One that differs from the solution, but not in what the task asks for, stands
+in the file as well:
 
     a_driver equal:
     - self.speed = 0.5: self.speed = 1 / 2
@@ -122,7 +123,8 @@ def test_check_judges_right_and_wrong_answers(lesson, task, open_lesson, request
         made(answers.get(f'{task} {kind}', []), f'{task} {kind}', tasks[task][1]) for kind in LEAST
     )
     seed = request.config.option.seed
-    mutants = [one.source for one in drawn_of_lesson(lesson, MUTANTS, seed).get(task, [])]
+    drawn = drawn_of_lesson(lesson, MUTANTS, seed) if seed else {}
+    mutants = [one.source for one in drawn.get(task, [])]
     with open_lesson(lesson, task) as opened:
         kernel, cells = opened.kernel, opened.cells
         run_all(kernel, cells['exercise'])

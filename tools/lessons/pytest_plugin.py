@@ -39,7 +39,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         help='of one lesson: only the answers of these tasks, by number or name',
     )
     parser.addoption(
-        '--seed', type=int, default=1, help='draws the mutants that the answers have among them'
+        '--seed', type=int, default=0, help='draws mutants among the answers; 0 draws none'
     )
 
 
