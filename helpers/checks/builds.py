@@ -7,6 +7,10 @@ import shutil
 from helpers.checks.errors import Failed
 from helpers.workspace import BuildResult, Workspace, why_it_failed
 
+# In what the assertion of the standard library of C++ prints, if the value of an empty optional is
+# read. A judge builds with _GLIBCXX_ASSERTIONS.
+EMPTY_OPTIONAL = 'is_engaged()'
+
 
 def build(workspace: Workspace, *packages: str, anew: bool = False) -> BuildResult:
     """Build packages. Raises Failed with the first error of the build.

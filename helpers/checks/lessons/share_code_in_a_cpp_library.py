@@ -11,6 +11,7 @@ import numpy as np
 from geometry_msgs.msg import Twist
 
 from helpers.checks.bench import Bench, scan
+from helpers.checks.builds import EMPTY_OPTIONAL
 from helpers.checks.errors import Failed
 from helpers.checks.points import all_of, cached, expect, needs, rows
 from helpers.checks.programs import manifest
@@ -55,7 +56,6 @@ int main(int count, char ** word) try {
   show("refused");
 }
 """
-EMPTY = '_M_is_engaged'  # the assertion of an optional
 
 
 class Compiled:
@@ -89,7 +89,7 @@ class Compiled:
         values = {'r.data()': f'{{{", ".join(numbers)}}}', 'n': len(numbers), 'a': a, 'b': b}
         words = r'r\.data\(\)|\b[nab]\b'
         call = re.sub(words, lambda word: str(values[word[0]]), self._call)
-        if not lines and EMPTY in output:
+        if not lines and EMPTY_OPTIONAL in output:
             raise Failed(f'{call} reads the value of a std::optional that is empty', hint='')
         found = lines[-1].removeprefix('= ') if lines else 'nothing: it crashed, or never ended'
         return found == right or f'{call} is {found}, not {right}'

@@ -13,7 +13,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Float32
 
 from helpers.checks.bench import RELIABLE, Bench, scan
-from helpers.checks.builds import build
+from helpers.checks.builds import EMPTY_OPTIONAL, build
 from helpers.checks.errors import Failed
 from helpers.checks.points import all_of, cached, expect, needs
 from helpers.checks.programs import Program
@@ -29,7 +29,6 @@ LATE_S = 1.0  # for an answer to another of these
 STOP_S = 5  # until the last command of a program is here
 START_S = 8  # for a program to start and be known to the others
 CALLS_MY_SPIN = 'brake.cpp calls spin, not my_spin: run the cell above this task again'
-EMPTY = '_M_is_engaged'  # the assertion of a std::optional
 READS_EMPTY = 'it reads the value of a std::optional that is empty'
 
 
@@ -94,7 +93,7 @@ def the_nearest_range(workspace):
         with workspace.run('scan_tools', 'try_nearest', *numbers) as program:
             program.wait()
         of = f'of {", ".join(map(str, ranges)) or "no beam"}'
-        if any(EMPTY in line for line in program.lines):
+        if any(EMPTY_OPTIONAL in line for line in program.lines):
             raise Failed(f'{of}: {READS_EMPTY}', hint='')
         found = program.lines[-2] if len(program.lines) > 1 else 'no line'
         with suppress(ValueError):
@@ -192,7 +191,7 @@ def hear(workspace, program, kind, topic, *distances, pause_s=0.0):
             bench.wait(lambda: names_of_others(bench.tester), START_S)
             heard.names = names_of_others(bench.tester)
         except Failed as failed:
-            heard.problem = READS_EMPTY if running.says(EMPTY) else str(failed)
+            heard.problem = READS_EMPTY if running.says(EMPTY_OPTIONAL) else str(failed)
             running.end(signal.SIGKILL)  # a callback without an end would hear no Ctrl+C
     return heard
 
@@ -337,7 +336,8 @@ def a_node_of_your_own(workspace):
     def stops_without_a_distance():
         return all_of(
             brakes(heard(), (2, 0.5), (math.nan, 0.0), (3, 0.5), after=3),
-            not any(EMPTY in line for line in tried()) or f'of no known beam {READS_EMPTY}',
+            not any(EMPTY_OPTIONAL in line for line in tried())
+            or f'of no known beam {READS_EMPTY}',
         )
 
     def stops_at_ctrl_c():
@@ -361,7 +361,7 @@ def a_node_of_your_own(workspace):
 
     def has_depth_1():
         handled = (tried() or ['nothing'])[-1]
-        if EMPTY in ' '.join(tried()):
+        if EMPTY_OPTIONAL in ' '.join(tried()):
             raise Failed(f'of no known beam {READS_EMPTY}', hint='')
         return handled == '1' or f'three scans came while it was busy: it handles {handled}, not 1'
 
