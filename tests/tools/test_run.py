@@ -379,13 +379,15 @@ def test_the_versions_of_what_draws_count(tmp_path):
 @pytest.mark.usefixtures('no_kernel')
 def test_tables_and_links_change_nothing_else(lesson):
     """What another notebook says of a lesson changes a line of text there, and no output."""
-    block = '<!-- made by `make notebooks`: timetable -->\n\n'
+    head = '| lesson | you can then | minutes |\n|---|---|---|'
+    gone = '| 02 It is gone | lose it | 40 |'
+    block = f'<!-- made by `make notebooks`: map of nodes -->\n\n{head}\n{gone}\n\n<!-- end -->'
     notebook = nbformat.read(lesson, as_version=4)
-    notebook.cells[0].source += f'\n\n{block}| from | minutes | |\n|---|---|---|\n<!-- end -->'
+    notebook.cells[0].source += f'\n\n{block}'
     texts = {'notebooks/00_try_it.ipynb': text_of(clean(notebook))}
     (after,) = tables.updated(texts).values()
     lines = set(texts['notebooks/00_try_it.ipynb'].splitlines()) ^ set(after.splitlines())
-    assert [line.strip() for line in lines] == [r'"| 0:00 | | End |\n",']
+    assert [line.strip() for line in lines] == [rf'"{gone}\n",']
     notebook = nbformat.reads(after, as_version=4)
     now = outputs.made_from(notebook, lesson.parents[1])
     assert outputs.is_made_from(notebook, now)

@@ -30,6 +30,7 @@ BESIDE = {
     'tests/answers/{name}.yaml': TEMPLATE.with_suffix('.yaml'),
     'helpers/checks/lessons/{name}.py': TEMPLATE.with_suffix('.py'),
 }
+OF_NO_LESSON = 'tests/', 'classroom/tests/', 'tools/lessons/new.py', 'tools/lessons/template'
 EXAMPLE = 'make lesson NAME=count_the_losses'
 
 
@@ -204,12 +205,12 @@ def _path(stem: str) -> str:
 
 
 def _code(root: Path) -> tables.Texts:
-    """Return the texts of the code and the data that git knows, but those of this tool."""
+    """Return the texts of code and data that git knows, but those of this tool and of tests."""
     texts = {}
     for path in _git(root, 'ls-files', '-z').split('\0'):
         is_code = Path(path).suffix in ('.py', '.yaml', '.sh', '.toml')
-        is_history = path == 'helpers/lesson/earlier.py' or path.startswith('tools/lessons/')
-        if is_code and not is_history and (root / path).is_file():
+        left_out = path == 'helpers/lesson/earlier.py' or path.startswith(OF_NO_LESSON)
+        if is_code and not left_out and (root / path).is_file():
             texts[path] = (root / path).read_text(encoding='utf-8')
     return texts
 

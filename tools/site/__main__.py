@@ -6,6 +6,7 @@ Sphinx and myst-nb make the pages from the saved outputs: nothing runs. What the
 in .site/pages: the documents, and the notebooks as `page.py` changes them.
 """
 
+import os
 import re
 import shutil
 import sys
@@ -23,6 +24,7 @@ from helpers.lesson import (
     START,
     Lesson,
     lessons,
+    with_slugs,
 )
 from helpers.notebook import LOOK_CSS
 from helpers.replay import level
@@ -41,6 +43,7 @@ DOCUMENTS = (
     'ros2/README',
     'tools/UPGRADING',
 )
+MARKDOWN_LINK = re.compile(r'\[(?P<text>[^\]\n]*)\]\((?P<path>[\w./]+)\.md(?:#[\w-]*)?\)')
 LINK = re.compile(r'\]\((?:\.\./)?([\w./]+)\)')
 CONTENTS = """
 ```{{toctree}}
@@ -72,7 +75,8 @@ def prepare(pages: Path) -> None:
     shutil.copytree(FOLDER / PICTURES, notebooks / PICTURES)
     for name in DOCUMENTS:
         (pages / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(ROOT / f'{name}.md', pages / f'{name}.md')
+        text = (ROOT / f'{name}.md').read_text(encoding='utf-8')
+        (pages / f'{name}.md').write_text(_as_page(text, Path(name).parent), encoding='utf-8')
     for file in _linked(pages):
         (pages / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, pages / file)
@@ -84,6 +88,19 @@ def prepare(pages: Path) -> None:
     parts = _parts(known)
     toctrees = (CONTENTS.format(part=part, pages='\n'.join(parts[part])) for part in parts)
     (pages / 'index.md').write_text(_first_page() + ''.join(toctrees), encoding='utf-8')
+
+
+def _as_page(text: str, folder: Path) -> str:
+    """Return a document whose links lead to headings as the site calls them, and to pages only.
+
+    `folder` is that of the document in the checkout.
+    """
+
+    def without_link(found: re.Match) -> str:
+        is_page = os.path.normpath(folder / found['path']) in DOCUMENTS
+        return found[0] if is_page else found['text']
+
+    return MARKDOWN_LINK.sub(without_link, with_slugs(text))
 
 
 def _linked(pages: Path) -> set[str]:
