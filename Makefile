@@ -9,7 +9,7 @@ lab: set_up ## open JupyterLab on the first notebook: PORT=8890, BROWSER=no, OUT
 	@exec $(PYTHON) -m tools.lab $(if $(filter yes,$(OUTPUTS)),--outputs) $(server) -- $(LAB_ARGS)
 
 update: set_up ## bring newer lessons, keep what you have written: FROM=ros2_notebooks.tar.gz
-	@$(PYTHON) -m classroom.update $(if $(FROM),"$(FROM)")
+	@$(PYTHON) -m classroom.update $(if $(FROM),"$(FROM)") && tools/set_up.sh
 
 site: set_up ## write the lessons as a web site into site/, to read offline
 	@tools/set_up.sh site
@@ -111,7 +111,7 @@ release: set_up ## make handout, site and image of a tagged commit, and say what
 	@tools/release.sh
 
 set_up:
-	@mkdir -p .jupyter && tools/set_up.sh $(groups)
+	@tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
 test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub notebooks lesson task soak bench lint: groups := test

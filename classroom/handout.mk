@@ -7,10 +7,10 @@ lab: set_up ## open JupyterLab on the first notebook: PORT=8890, BROWSER=no
 	@exec $(PYTHON) -m tools.lab $(server) -- $(LAB_ARGS)
 
 update: set_up ## bring newer lessons, keep what you have written: FROM=ros2_notebooks.tar.gz
-	@$(PYTHON) -m classroom.update $(if $(FROM),"$(FROM)")
+	@$(PYTHON) -m classroom.update $(if $(FROM),"$(FROM)") && tools/set_up.sh
 
 set_up:
-	@mkdir -p .jupyter && tools/set_up.sh
+	@tools/set_up.sh
 
 .PHONY: help lab update set_up
 

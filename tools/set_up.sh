@@ -1,7 +1,7 @@
 #!/bin/sh
 # Make .venv and install tools/locks/requirements.lock into it, this project, and its `ros2` command. If
-# .venv is up to date, this does nothing. After an interruption the next call repairs what the last
-# one left.
+# .venv is up to date, this does nothing. A new environment grows beside it, in .venv.new, and takes its
+# place when it is complete: whatever fails or ends this before, what worked still works.
 # usage: tools/set_up.sh [--python 3.12] [GROUP...]
 # A group of pyproject.toml adds its lock. Later calls keep it up to date.
 set -eu
@@ -11,6 +11,18 @@ if [ "${1-}" = --python ]; then
     wanted_version=$2
     shift 2
 fi
+
+say() { printf '%s\n' "$*" >&2; }
+fail() {
+    say "$*"
+    exit 1
+}
+ours() { # PATH: another user may have made it, or the same user as root
+    [ -w "$1" ] || fail "$PWD/$1 is another user's: take it with \`sudo chown -R \"\$(id -u)\" \"$PWD\"\`, then try again."
+}
+[ -w . ] || [ -d .jupyter ] || fail "The folder $PWD cannot be written: copy it to one of your own, then try again."
+mkdir -p .jupyter # JupyterLab's state: see tools/environment.mk
+ours .jupyter
 
 # On NFS only a file that is open for writing can be locked. Not this script: no second one could
 # start meanwhile.
@@ -25,28 +37,28 @@ for group in $groups; do
         *" $group "*) ;;
         *) [ -f ".venv/with_$group" ] || continue ;;
     esac
-    locks="$locks $(lock_of "$group")" with="$with .venv/with_$group"
+    locks="$locks $(lock_of "$group")" with="$with $group"
 done
 
 # The stamp is written last. It holds all that .venv depends on, so that a changed lock, a moved
 # folder and a Python that went away or became another one are noticed.
-wanted() {
-    version=$(.venv/bin/python -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null) || return 0
+wanted() { # FOLDER
+    version=$("$1/bin/python" -I -S -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2> /dev/null) || return 0
     printf '%s\n' "Python $version" "$(pwd -P)" \
         "$(cat $locks pyproject.toml ros2/pyproject.toml tools/set_up.sh tools/jupyter/* helpers/robot/prefix/*/*/* 2> /dev/null | cksum)"
 }
 stamp=.venv/set_up.stamp
-have=$(wanted)
+[ -d .venv ] || [ ! -d .venv.old ] || mv .venv.old .venv # ended between the two `mv` at the end
+have=$(wanted .venv)
 [ -z "$have" ] || [ "$have" != "$(cat $stamp 2> /dev/null)" ] || exit 0
+[ -w . ] || fail "The folder $PWD cannot be written: copy it to one of your own, then try again."
+[ ! -d .venv ] || ours .venv
+rm -rf .venv.new .venv.old
 
 case $(uname -sm)-$(getconf GNU_LIBC_VERSION 2> /dev/null) in
     'Linux x86_64-glibc 2.'[3-9][0-9]* | 'Linux x86_64-glibc 2.2'[89]*) ;;
-    *)
-        echo 'The ROS 2 packages are for x86-64 Linux with glibc 2.28 or newer only: environment.md says what to do on other machines.' >&2
-        exit 1
-        ;;
+    *) fail 'The ROS 2 packages are for x86-64 Linux with glibc 2.28 or newer only: environment.md says what to do on other machines.' ;;
 esac
-. tools/uv.sh
 
 # The versions for which every pinned package has a wheel, newest first: tools/lock.sh found them.
 versions=$(sed -n 's/^# Every wheel exists for Python //p' "$learners")
@@ -57,11 +69,30 @@ case " $versions " in
     *) fail "Not every pinned package has a wheel for Python $wanted_version." ;;
 esac
 
-# An environment that was complete once takes what has changed in the lock. Any other is made anew.
+# What is there already, if it was complete once, in this folder, with a Python that still fits.
 kept=$(printf '%s\n' "$have" | head -n 2)
 version=$(printf '%s\n' "$kept" | sed -n 's/^Python //p')
 case " $versions " in *" ${version:-none} "*) ;; *) kept= ;; esac
-if [ -z "$kept" ] || [ "$(head -n 2 $stamp 2> /dev/null)" != "$kept" ]; then
+[ "$(head -n 2 $stamp 2> /dev/null)" = "$kept" ] || kept=
+
+asked=$*
+give_up() { # MESSAGE: a lesson can go on with what is there; a command that needs a group cannot
+    rm -rf .venv.new
+    if [ -z "$kept" ] || [ -n "$asked" ]; then fail "$1"; fi
+    say "$1 Until then you have the packages of before."
+    exit 0
+}
+. tools/uv.sh
+
+if [ -n "$kept" ]; then
+    # The same files under second names: this takes a second, and no room.
+    cp -al .venv .venv.new 2> /dev/null || { rm -rf .venv.new && cp -a .venv .venv.new; } ||
+        give_up "The environment could not be copied: $(what_to_check UV_DEFAULT_INDEX)"
+    # What uv installs for a folder of another name. An environment of version 0.3 does not say so.
+    { sed '/^relocatable/d' .venv/pyvenv.cfg && echo 'relocatable = true'; } > .venv.new/pyvenv.new
+    mv .venv.new/pyvenv.new .venv.new/pyvenv.cfg
+    rm -f .venv.new/set_up.stamp
+else
     # The newest release of CPython on the machine. Without one uv fetches it.
     python=
     list=$("$uv" python list --only-installed 2> /dev/null) || :
@@ -69,44 +100,47 @@ if [ -z "$kept" ] || [ "$(head -n 2 $stamp 2> /dev/null)" != "$kept" ]; then
         python=$(printf '%s\n' "$list" | sed -n "s/^cpython-$version\.[0-9]*-linux-x86_64-gnu  *//p" | sed 's/ -> .*//; q')
         [ -z "$python" ] || break
     done
-    echo "Making .venv with ${python:=${versions%% *}}" >&2
-    rm -rf .venv
-    "$uv" venv --quiet --no-project --python "$python" .venv ||
-        fail "No usable Python ${versions##* } to ${versions%% *} is on the PATH, and uv could not fetch one: install it, for example with \`sudo apt install python3\`, then try again."
+    say "Making .venv with ${python:=${versions%% *}}"
+    "$uv" venv --quiet --no-project --python "$python" --relocatable .venv.new ||
+        fail "No usable Python ${versions##* } to ${versions%% *} is on the PATH, and uv could not fetch one: install it, for example with \`sudo apt install python${versions##* }\`, or check the network, then try again."
 fi
-rm -f $stamp
 
 # A ROS 2 wheel `ros-rclpy` also holds the metadata of an older format, of a package `rclpy`. uv would
 # take that for a package that is not in the lock, and remove rclpy.
-rm -rf .venv/lib/python*/site-packages/*.egg-info
+rm -rf .venv.new/lib/python*/site-packages/*.egg-info
 quiet=
 [ -t 2 ] || quiet=--quiet
-echo "Installing $(sed -n 's/^\([a-z].*\)==.*/\1/p' $locks | sort -u | wc -l) packages, about 215 MB the first time" >&2
+say "Installing $(sed -n 's/^\([a-z].*\)==.*/\1/p' $locks | sort -u | wc -l) packages, about 215 MB the first time"
 # Wheels only, except empy, which has none: one module, from its pinned source, by the pinned setuptools.
-"$uv" pip sync $quiet $no_index --python .venv/bin/python --require-hashes --build-constraints "$learners" \
+"$uv" pip sync $quiet $no_index --python .venv.new/bin/python --require-hashes --build-constraints "$learners" \
     --only-binary :all: --no-binary empy $locks ||
-    fail 'uv could not install requirements.lock: check the network, or name your package index with UV_DEFAULT_INDEX, then try again.'
-"$uv" pip install --quiet --offline --python .venv/bin/python --no-deps --editable . --editable ros2
+    give_up "uv could not install requirements.lock: $(what_to_check UV_DEFAULT_INDEX)"
+"$uv" pip install --quiet --offline --python .venv.new/bin/python --no-deps --editable . --editable ros2
 
 # The wheel of googletest for Python 3.13 holds no sources (ros-gtest-vendor 1.14.9000). That for 3.12
 # holds them, and they are the same for all.
-if [ ! -e .venv/src/gtest_vendor ]; then
-    sed -n '/^ros-gtest-vendor==/,/[^\\]$/p' "$learners" > .venv/gtest.lock
-    mkdir -p .venv/src
+if [ ! -e .venv.new/src/gtest_vendor ]; then
+    sed -n '/^ros-gtest-vendor==/,/[^\\]$/p' "$learners" > .venv.new/gtest.lock
+    mkdir -p .venv.new/src
     {
-        "$uv" pip sync --quiet $no_index --target .venv/gtest --python-version 3.12 \
+        "$uv" pip sync --quiet $no_index --target .venv.new/gtest --python-version 3.12 \
             --python-platform x86_64-manylinux_2_28 --only-binary :all: --require-hashes \
-            .venv/gtest.lock && mv .venv/gtest/src/gtest_vendor .venv/src
+            .venv.new/gtest.lock && mv .venv.new/gtest/src/gtest_vendor .venv.new/src
     } || echo 'The sources of googletest are not there: one test of share_code_in_a_cpp_library needs `sudo apt install libgtest-dev`.' >&2
-    rm -rf .venv/gtest .venv/gtest.lock
+    rm -rf .venv.new/gtest .venv.new/gtest.lock
 fi
 
-mkdir -p .venv/share/jupyter/lab/settings
-mkdir -p .venv/etc/jupyter .venv/etc/ipython
-cp tools/jupyter/overrides.json .venv/share/jupyter/lab/settings
-cp tools/jupyter/bashrc .venv/etc/jupyter
-sed "s|VENV|$PWD/.venv|" tools/jupyter/jupyter_server_config.json > .venv/etc/jupyter/jupyter_server_config.json
-cp tools/jupyter/ipython_config.json .venv/etc/ipython
-[ -z "$with" ] || touch $with
-wanted > .venv/set_up.new
-mv .venv/set_up.new $stamp
+settings=.venv.new/share/jupyter/lab/settings etc=.venv.new/etc
+mkdir -p $settings $etc/jupyter $etc/ipython
+# Removed before: they may be the files of .venv, too.
+rm -f $settings/overrides.json $etc/jupyter/bashrc $etc/jupyter/jupyter_server_config.json $etc/ipython/ipython_config.json
+cp tools/jupyter/overrides.json $settings
+cp tools/jupyter/bashrc $etc/jupyter
+sed "s|VENV|$PWD/.venv|" tools/jupyter/jupyter_server_config.json > $etc/jupyter/jupyter_server_config.json
+cp tools/jupyter/ipython_config.json $etc/ipython
+for group in $with; do : > ".venv.new/with_$group"; done
+wanted .venv.new > .venv.new/set_up.stamp
+
+[ ! -d .venv ] || mv .venv .venv.old
+mv .venv.new .venv
+rm -rf .venv.old

@@ -9,6 +9,18 @@ fail() {
     printf '%s\n' "$*" >&2
     exit 1
 }
+# tools/set_up.sh may go on with what is there.
+command -v give_up > /dev/null || give_up() { fail "$1"; }
+
+what_to_check() { # VARIABLE: what to do if packages do not come; VARIABLE names their index
+    free=$(df -Pm . | sed -n '2s/^.* \([0-9][0-9]*\)  *[0-9][0-9]*%.*/\1/p')
+    proxy=${HTTPS_PROXY:-${https_proxy:-${ALL_PROXY:-${all_proxy:-}}}}
+    if [ "${free:-1000}" -lt 300 ]; then
+        echo "only $free MB are free in $PWD. Make room for 1 GB, then try again."
+    else
+        echo "check the network${proxy:+ and the proxy $proxy}, or name your package index with $1, then try again."
+    fi
+}
 
 # Only what says where packages come from is taken over from the environment. The rest (PIP_USER,
 # PIP_TARGET, UV_PYTHON, UV_CONSTRAINT, ...) would change what is installed, or where.
@@ -49,10 +61,11 @@ else
                 fail "$without_pip has no pip and no venv: run \`sudo apt install python3-venv\`, then try again."
             [ -n "$any_python" ] ||
                 fail 'No Python is on the PATH: install one, for example with `sudo apt install python3 python3-venv`, then try again.'
-            rm -rf .uv .uv.new
+            rm -rf .uv.new
             PIP_ROOT_USER_ACTION=ignore "$any_python" -I tools/pip.py install --quiet --disable-pip-version-check --no-user --no-deps --no-compile --target .uv.new \
                 --only-binary :all: --require-hashes --requirement tools/locks/requirements-uv.lock ||
-                fail 'pip could not install uv: check the network, or name your package index with PIP_INDEX_URL, then try again.'
+                give_up "pip could not install uv: $(what_to_check PIP_INDEX_URL)"
+            rm -rf .uv
             mv .uv.new .uv
             ;;
     esac

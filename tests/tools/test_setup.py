@@ -3,8 +3,10 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -16,9 +18,7 @@ from helpers.machine import OWNED
 LOCKS = Path('tools/locks')
 BASE_PYTHON = Path(sys._base_executable)
 HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
-COMMANDS = (
-    'cat cksum cp dirname env flock getconf grep head mkdir mv rm sed sh sort tr uname wc touch'
-)
+COMMANDS = 'cat cksum cp df dirname env flock getconf grep head mkdir mv rm sed sh sort tr uname wc'
 
 
 def test_the_locks_name_no_package_index():
@@ -69,7 +69,9 @@ class Checkout:
         header = f'# Every wheel exists for Python 3.14 {HERE}\n'
         file.write_text(header + ''.join(self.pins[name] for name in names or self.pins))
 
-    def start(self, *arguments: str, **environment: str) -> subprocess.Popen:
+    def start(
+        self, *arguments: str, user: int | None = None, **environment: str
+    ) -> subprocess.Popen:
         """Start the set-up offline. As a user may have it: settings of pip only, none of uv."""
         kept = {k: v for k, v in os.environ.items() if not k.startswith(('PIP_', 'UV_'))}
         kept |= {'PIP_NO_INDEX': '1', 'PIP_FIND_LINKS': self.wheels.as_uri()}
@@ -83,11 +85,14 @@ class Checkout:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
+            user=user,
         )
 
-    def set_up(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess:
+    def set_up(
+        self, *arguments: str, user: int | None = None, **environment: str
+    ) -> subprocess.CompletedProcess:
         """Run the set-up to its end."""
-        process = self.start(*arguments, **environment)
+        process = self.start(*arguments, user=user, **environment)
         out, err = process.communicate()
         return subprocess.CompletedProcess(process.args, process.returncode, out, err)
 
@@ -156,19 +161,100 @@ def test_a_group_is_kept_once_it_was_asked_for(checkout):
     assert answer.stderr == ''
 
 
-def test_a_wrong_hash_installs_nothing_and_the_next_call_repairs(checkout):
-    checkout.lock()
-    lock = checkout.root / LOCKS / 'requirements.lock'
-    lock.write_text(re.sub(r'sha256:\w+', f'sha256:{"0" * 64}', lock.read_text()))
-    (checkout.root / '.venv/set_up.stamp').unlink(missing_ok=True)
-    answer = checkout.set_up()
-    assert answer.returncode == 1
-    assert last_line(answer).startswith('uv could not install requirements.lock: check the network')
-    assert checkout.installed() == []
-    assert checkout.stamp() == ''
-    checkout.lock()
+NO_NETWORK = {'PIP_NO_INDEX': '0', 'PIP_INDEX_URL': 'http://127.0.0.1:9/', 'PIP_RETRIES': '0'}
+NO_NETWORK |= {'UV_HTTP_RETRIES': '0', 'PIP_FIND_LINKS': '', 'UV_NO_CACHE': '1'}
+
+
+@pytest.fixture
+def installed(checkout):
+    """A checkout with one of two packages, and a lock that now wants the other."""
+    for folder in checkout.root.glob('.venv*'):
+        shutil.rmtree(folder)
+    checkout.lock('iniconfig')
     assert checkout.set_up().returncode == 0
-    assert checkout.installed() == ALL
+    checkout.lock()
+    return checkout
+
+
+ONE = ['iniconfig', 'ros2-command', 'ros2-notebooks']
+
+
+def test_without_a_network_a_lesson_goes_on_with_the_packages_of_before(installed):
+    before = installed.stamp()
+    for _ in range(2):
+        answer = installed.set_up(**NO_NETWORK)
+        assert answer.returncode == 0
+        assert last_line(answer) == (
+            'uv could not install requirements.lock: check the network, or name your package '
+            'index with UV_DEFAULT_INDEX, then try again. Until then you have the packages of '
+            'before.'
+        )
+        assert (installed.installed(), installed.stamp()) == (ONE, before)
+    assert installed.set_up().returncode == 0
+    assert installed.installed() == ALL
+
+
+def test_without_a_network_a_command_that_needs_more_ends_and_the_rest_works(installed):
+    installed.lock('iniconfig')
+    installed.lock('pluggy', group='site')
+    before = installed.stamp()
+    answer = installed.set_up('site', **NO_NETWORK, HTTPS_PROXY='http://127.0.0.1:9')
+    assert answer.returncode == 1
+    assert 'check the network and the proxy http://127.0.0.1:9, or name' in last_line(answer)
+    answer = installed.set_up(**NO_NETWORK)
+    assert (answer.returncode, answer.stderr) == (0, '')
+    assert (installed.installed(), installed.stamp()) == (ONE, before)
+
+
+def test_a_wrong_hash_installs_nothing(installed):
+    lock = installed.root / LOCKS / 'requirements.lock'
+    lock.write_text(re.sub(r'sha256:\w+', f'sha256:{"0" * 64}', lock.read_text()))
+    answer = installed.set_up()
+    assert last_line(answer).startswith('uv could not install requirements.lock: check the network')
+    assert installed.installed() == ONE
+
+
+@pytest.mark.parametrize('how', [signal.SIGINT, signal.SIGKILL])
+def test_what_was_there_works_after_an_end_in_the_middle(installed, how):
+    process = installed.start()
+    while not (installed.root / '.venv.new/lib').exists():
+        assert process.poll() is None
+        time.sleep(0.001)  # the end may come anywhere after this
+    os.killpg(process.pid, how)
+    process.communicate()
+    assert installed.installed() == ONE
+    answer = installed.set_up()
+    assert answer.returncode == 0, answer.stderr
+    assert installed.installed() == ALL
+    assert not [*installed.root.glob('.venv.*')]
+
+
+def test_what_was_there_works_after_an_end_between_the_two_renames(installed):
+    (installed.root / '.venv').rename(installed.root / '.venv.old')
+    (installed.root / '.venv.new').mkdir()
+    assert installed.set_up(**NO_NETWORK).returncode == 0
+    assert installed.installed() == ONE
+
+
+def test_two_calls_at_once_make_one_environment(installed):
+    two = [installed.start(), installed.start()]
+    answers = [process.communicate()[1] for process in two]
+    assert [process.returncode for process in two] == [0, 0], answers
+    assert '' in answers, 'both did the work'
+    assert installed.installed() == ALL
+
+
+def test_a_command_runs_wherever_the_new_environment_grew(installed):
+    """uv writes the folder of an environment into its commands, unless it may not."""
+    script = installed.root / '.venv/bin/ros2'
+    assert '.venv' not in script.read_text().splitlines()[0]
+    # An environment that version 0.3 has made.
+    (installed.root / '.venv/pyvenv.cfg').write_text(
+        re.sub('relocatable.*\n', '', (installed.root / '.venv/pyvenv.cfg').read_text())
+    )
+    assert installed.set_up().returncode == 0
+    done = subprocess.run([script, '--help'], capture_output=True, text=True)
+    assert 'usage: ros2' in done.stdout, done.stderr
 
 
 def test_a_moved_checkout_is_made_anew(checkout):
@@ -225,10 +311,59 @@ def test_without_a_usable_python_it_says_which(tmp_path, checkout):
 
 
 def test_without_a_network_it_says_what_to_check(tmp_path):
-    nowhere = {'PIP_NO_INDEX': '0', 'PIP_INDEX_URL': 'http://127.0.0.1:9/', 'PIP_RETRIES': '0'}
-    answer = Checkout(tmp_path).set_up(**nowhere)
+    answer = Checkout(tmp_path).set_up(**NO_NETWORK)
     assert answer.returncode == 1
     assert last_line(answer).startswith('pip could not install uv: check the network')
+
+
+as_root = pytest.mark.skipif(os.getuid() != 0, reason='only root becomes another user, or mounts')
+
+
+@as_root
+def test_a_full_disk_is_named(tmp_path, checkout):
+    disk = tmp_path / 'disk'
+    disk.mkdir()
+    subprocess.run(['mount', '-t', 'tmpfs', '-o', 'size=20m', 'tmpfs', disk], check=True)
+    try:
+        full = Checkout(disk)
+        full.wheels = checkout.wheels
+        (disk / 'ballast').write_bytes(b'.' * (full_up_to(disk) - 300_000))
+        answer = full.set_up()
+        assert answer.returncode == 1
+        assert last_line(answer).endswith(
+            f'only 0 MB are free in {full.root}. Make room for 1 GB, then try again.'
+        )
+    finally:
+        subprocess.run(['umount', '--lazy', disk], check=True)
+
+
+def full_up_to(disk: Path) -> int:
+    state = os.statvfs(disk)
+    return state.f_bavail * state.f_frsize
+
+
+@as_root
+def test_what_another_user_owns_is_named(tmp_path_factory):
+    nobody = 65534
+    folder = tmp_path_factory.mktemp('shared')
+    for parent in (folder, folder.parent, folder.parent.parent):
+        parent.chmod(0o755)
+    others = Checkout(folder)
+    answer = others.set_up(user=nobody)
+    assert (answer.returncode, answer.stderr) == (
+        1,
+        f'The folder {others.root} cannot be written: copy it to one of your own, then try again'
+        '.\n',
+    )
+    os.chown(others.root, nobody, nobody)
+    (others.root / '.jupyter').mkdir()
+    answer = others.set_up(user=nobody)
+    assert answer.returncode == 1
+    assert answer.stderr.startswith(f"{others.root}/.jupyter is another user's: take it with")
+    (others.root / '.jupyter').rmdir()
+    (others.root / '.venv').mkdir()
+    answer = others.set_up(user=nobody)
+    assert answer.stderr.startswith(f"{others.root}/.venv is another user's: take it with")
 
 
 def test_another_machine_is_sent_to_environment_md(tmp_path):
