@@ -1,7 +1,8 @@
 // The drive of a robot: one more run under the slider of view.js, with a floor instead of lists.
 
 // Return what walk.js returns of a run: times, seek, scan. And `told`, which steps say something.
-function drive({ step, poses, commands, scans, events, bumps }) {
+function drive({ step, poses, commands, scans, events, bumps, guess, outcome: said }, root) {
+  const kept = guess && memory(root, guess);
   const turn = w => (w ? ` and ${w.toFixed(2)} rad/s` : '');
   const speed = ([, v, w]) => `${v.toFixed(2)} m/s${turn(w)}`;
   const told = one => (one[1] || one[2] ? `The robot is told to drive ${speed(one)}.` : 'The robot is told to stop.');
@@ -53,7 +54,14 @@ function drive({ step, poses, commands, scans, events, bumps }) {
     };
   }
 
+  // With a guess the last sentence says how far it was from what came out.
+  function outcome() {
+    const value = guess && kept.get();
+    return value === null || value === undefined ? said : place.gap(guess, value, guess.outcome).says;
+  }
+
   return {
+    kept, outcome,
     times: steps.map(([ms]) => 1000 * ms),
     told: steps.map(([, said]) => said !== ''),
     ranks: steps.map(([, , rank]) => rank), // what is said while it plays: a stop or an event, above all a bump
@@ -100,6 +108,17 @@ function floor(run, record, svg) {
     ghost.setAttribute('x', Math.min(Math.max(x, half + 8), wide - half - 8).toFixed(1));
     ghost.setAttribute('y', Math.max(y - 6, 30).toFixed(1));
   }
+  const mine = run.kept && place.yours(svg, record.guess);
+  const ended = run.times.at(-1) / 1000; // ms
+  let drawn = () => {};
+
+  // Your robot, once you have put it somewhere: also elsewhere on this page.
+  function guessed() {
+    const value = run.kept.get();
+    mine.node.style.display = value === null ? 'none' : '';
+    if (value !== null) mine.put(value);
+    drawn();
+  }
   const [time, robot, told] = Array.from({ length: 3 }, () => element('span', { class: 'replay-time' }));
 
   function draw(position, us, plays) {
@@ -117,6 +136,8 @@ function floor(run, record, svg) {
     if (plays && counts[1] > hits) ringAt(svg, now, radius);
     [, hits] = counts;
     marks.forEach(([path, parts], i) => path.setAttribute('d', parts.slice(0, counts[i]).join('')));
+    drawn = () => mine?.measure(ms >= (record.bumps[0] ?? ended) - 1 ? now : null);
+    drawn();
     time.textContent = `${(ms / 1000).toFixed(2)} s`;
     robot.textContent = `${v.toFixed(2)} m/s, ${w.toFixed(2)} rad/s`;
     told.textContent = now.told;
@@ -125,6 +146,14 @@ function floor(run, record, svg) {
 
   const node = element('div', { class: 'replay-floor' }, ...(record.name ? [element('b', {}, record.name)] : []), svg,
     row('time', time), row('robot', robot), row('told', told));
+  if (mine) {
+    guessed();
+    document.addEventListener('guess', ({ detail }) => {
+      if (detail.question !== record.guess.question || !svg.isConnected) return;
+      run.kept.see(detail.value);
+      guessed();
+    });
+  }
   draw.always = true; // also between two steps
   return { node, draw };
 }

@@ -7,10 +7,11 @@ from html import escape
 
 from rclpy.subscription import Subscription
 
+from helpers.guesses import Guess
 from helpers.notebook import somebody_watches
 from helpers.replay import Replay, style
 from helpers.robot import Pose, Robot
-from helpers.robot_view.picture import DRIVE_CSS, floor_in_words, floor_picture
+from helpers.robot_view.picture import DRIVE_CSS, floor_in_words, floor_picture, is_lane
 from helpers.robot_view.replay import bumps, outcome, place, replay_drive, seconds
 from helpers.robot_view.scans import ScanRecording
 from helpers.ros import current_session
@@ -28,15 +29,18 @@ CONTROLS = (
 
 
 def watch(
-    robot: Robot, subscription: Subscription | None = None, name: str = ''
+    robot: Robot,
+    subscription: Subscription | None = None,
+    name: str = '',
+    guess: Guess | None = None,
 ) -> ScanRecording | None:
     """Show a robot while this cell runs, and its replay when the session closes.
 
     The replay is also there after an Interrupt, and alone where nobody watches, as under nbval.
 
     With a subscription to the robot's scans one sees, too, which scan its callback works on, how
-    old it is, and which ones wait. `name` is what the replay calls the drive. Returns its
-    recording.
+    old it is, and which ones wait. `name` is what the replay calls the drive. A `guess` of a place
+    is drawn, and the replay measures its gap. Returns the recording.
 
     Raises TypeError for anything but a robot and a subscription, ValueError for one that does not
     hear the scans, RuntimeError where no session is open.
@@ -45,15 +49,17 @@ def watch(
         raise TypeError(f'Only a robot can be watched, not {robot!r}.')
     session = current_session()
     recording = ScanRecording(robot, subscription) if subscription is not None else None
-    view = LiveView(robot, recording)
+    view = LiveView(robot, recording, guess)
 
     def end() -> None:
         # Who has watched sees the robot stay where it stopped.
         opens = 'end' if view.is_shown else 'bump'
         try:
-            shown = replay_drive(robot.record, recording, name, opens)
+            shown = replay_drive(robot.record, recording, name, opens, guess)
         except ValueError:  # interrupted where it does not add up, or heard by several threads
-            shown = replay_drive(robot.record, name=name, opens=opens)
+            shown = replay_drive(robot.record, name=name, opens=opens, guess=guess)
+        if guess is not None:
+            guess.run = shown.runs[0]
         view.stop(shown)
 
     view.start()
@@ -67,8 +73,10 @@ class LiveView:
     To update a display, unlike to make one, needs no cell: it moves, whatever the cell waits for.
     """
 
-    def __init__(self, robot: Robot, recording: ScanRecording | None) -> None:
-        self._record, self._recording = robot.record, recording
+    def __init__(
+        self, robot: Robot, recording: ScanRecording | None, guess: Guess | None = None
+    ) -> None:
+        self._record, self._recording, self._guess = robot.record, recording, guess
         self._display = None
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name='robot view', daemon=True)
@@ -115,6 +123,8 @@ class LiveView:
             seconds(record, now.t_s),
             scan_pose=place(record, scans[-1].t_s) if scans else None,
             ring_s=now.t_s - hit[-1].t_s if hit else None,
+            as_lane=is_lane(record.floor, [row[1:3] for row in poses[::EVERY]]),
+            guess=self._guess,
         )
         told = 'nothing yet'
         if commands:

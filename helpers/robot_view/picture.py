@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from helpers.guesses import Guess
 from helpers.notebook import LOOK
 from helpers.robot import RADIUS_M, RANGE_MAX, Floor, Pose, Scan
 
@@ -21,6 +22,7 @@ WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor
 BEAMS = 40  # of a scan, in a picture
 WALL_M = 0.15  # of an outer wall
+LANE_M, WORDS_M = 0.5, 0.26  # of a lane: to each side of the robot, and beyond for words
 RING, RING_S = 30, 0.4  # pixels, and how long: around a bump, as drive.js draws it
 DRIVE_CSS = Path(__file__).with_name('drive.css')
 ROBOT, WAITING, LOST = LOOK['robot'], LOOK['waiting'], LOOK['lost']
@@ -45,14 +47,17 @@ def floor_picture(
     scan_pose: Pose | None = None,
     later: Later | None = None,
     ring_s: float | None = None,
+    as_lane: bool = False,
+    guess: Guess | None = None,
 ) -> str:
     """Return the SVG: the floor, the path through `points`, the robot at `pose` with its laser.
 
     `scan` was made at `scan_pose`, which is mostly a little behind `pose`. `seconds` are the places
     that get a dot, `bumps` those where it hit something, the last one `ring_s` ago. `later` is what
-    comes after `pose`: drive.js draws it when its time has come.
+    comes after `pose`: drive.js draws it when its time has come. `as_lane` draws only the strip of
+    a corridor, with room above and below it for words. `guess` is one of a place.
     """
-    x, y, right, above = edges(floor)
+    x, y, right, above = lane_edges(floor) if as_lane else edges(floor)
     scale = min((WIDTH - 2 * MARGIN) / (right - x), (HEIGHT - 2 * MARGIN) / (above - y))
     width, height = (scale * size + 2 * MARGIN for size in (right - x, above - y))
     r = max(RADIUS_M, SMALLEST / scale)  # on a large floor the robot is drawn larger than it is
@@ -64,7 +69,7 @@ def floor_picture(
     ring = f'M{start.x - r:.3f} {start.y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} 0'
     ring += f'a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
     parts = [
-        _floor(floor, scale),
+        _lane(floor) if as_lane else _floor(floor, scale),
         f'<path class="fan" d="{fan(scan_pose or pose, scan)}" fill="{ROBOT}" fill-opacity=".16" '
         f'stroke="{ROBOT}" stroke-opacity=".6"/>',
         f'<path class="old" d="" fill="none" stroke="{WAITING}" '
@@ -92,7 +97,9 @@ def floor_picture(
             f'fill="none" stroke="{LOST}" stroke-opacity="{1 - part:.2f}" stroke-width="3" '
             'vector-effect="non-scaling-stroke"/>'
         )
-    left, below = 14 + scale * WALL_M, height - 14 - scale * WALL_M
+    if guess is not None:
+        parts.insert(2, _guess(guess, r, scale))
+    left, below = 14 + scale * WALL_M, height - 14 - scale * (WORDS_M if as_lane else WALL_M)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
         f'width="{width:.0f}" height="{height:.0f}" color="{LOOK["ink"]}" '
@@ -103,6 +110,68 @@ def floor_picture(
         f'stroke="currentColor"/><text x="{left + scale / 2:.0f}" y="{below - 7:.0f}" '
         'text-anchor="middle" fill="currentColor">1 m</text></svg>'
     ).replace('<path ', '<path vector-effect="non-scaling-stroke" ')
+
+
+def _guess(guess: Guess, r: float, scale: float) -> str:
+    """Return the line of a guess and the robot of the student, as place.js draws them."""
+    kind, you = guess.kind.record(), LOOK['you']
+    x, y, yaw = kind['start']
+    turned = f'translate({x} {y}) rotate({math.degrees(yaw):.1f})'
+    drawn = ''
+    if kind['line']:
+        drawn = (
+            f'<path d="M{kind["ahead"] - kind["line"]:.3f} {LANE_M}v-{2 * LANE_M}" '
+            'stroke="currentColor" stroke-width="2" stroke-dasharray="3 6"/>'
+            f'<text transform="translate({kind["ahead"] - kind["line"]:.3f} {-LANE_M}) '
+            f'scale({1 / scale:.5f} -{1 / scale:.5f})" y="18" text-anchor="middle" '
+            f'fill="currentColor">{escape(kind["label"])}</text>'
+        )
+    if guess.value is not None:
+        drawn += (
+            f'<circle class="you" cx="{kind["ahead"] - guess.value:.3f}" r="{r:.3f}" fill="{you}" '
+            f'fill-opacity=".25" stroke="{you}" stroke-width="3" '
+            'vector-effect="non-scaling-stroke"/>'
+            f'<text transform="translate({kind["ahead"] - guess.value:.3f} {-r:.3f}) '
+            f'scale({1 / scale:.5f} -{1 / scale:.5f})" y="18" text-anchor="middle" '
+            f'font-weight="600" fill="{you}">you</text>'
+        )
+    return f'<g transform="{turned}">{drawn}</g>'
+
+
+def is_lane(floor: Floor, poses: Iterable[Sequence[float]] = ()) -> bool:
+    """Return whether a floor is a corridor along x, and a robot (x, y, ...) stays in its strip."""
+    width, height = floor.size_m
+    boxes = any(wall.kind != 'wall' for wall in floor.walls)
+    if boxes or floor.places or not floor.walls or height > width / 2 or floor.start.yaw:
+        return False
+    return all(abs(y - floor.start.y) < LANE_M / 2 for _, y, *_ in poses)
+
+
+def lane_edges(floor: Floor) -> tuple[float, float, float, float]:
+    """Return from where to where a lane is drawn (x, y, x, y in m), with room for words."""
+    x, y, *_ = floor.start
+    (ahead, behind), _ = floor.ranges(x, y, np.array([0.0, math.pi]))
+    return (
+        x - float(behind) - WALL_M,
+        y - LANE_M - WORDS_M,
+        x + float(ahead) + WALL_M,
+        y + LANE_M + WORDS_M,
+    )
+
+
+def _lane(floor: Floor) -> str:
+    x, low, right, high = lane_edges(floor)
+    left, right, low, high = x + WALL_M, right - WALL_M, low + WORDS_M, high - WORDS_M
+    grid = ''.join(f'M{n} {low:.2f}V{high:.2f}' for n in range(math.ceil(left), math.ceil(right)))
+    walls = ''.join(
+        f'M{one:.2f} {low - WALL_M / 2:.2f}h{WALL_M}V{high + WALL_M / 2:.2f}h-{WALL_M}z'
+        for one in (left - WALL_M, right)
+    )
+    return (
+        f'<path d="M{left:.2f} {low:.2f}H{right:.2f}V{high:.2f}H{left:.2f}z" fill="currentColor" '
+        f'fill-opacity=".1"/><path d="{grid}" stroke="currentColor" stroke-opacity=".13"/>'
+        f'<path d="{walls}" fill="{LOOK["ink"]}"/>'
+    )
 
 
 def edges(floor: Floor) -> tuple[float, float, float, float]:
