@@ -26,12 +26,12 @@ function show(root, record) {
   root.querySelector('figure')?.remove();
   root.querySelector('.replay-static').replaceWith(
     ...(record.outcome ? [] : [element('p', { class: 'guess-asks' }, record.asks)]), shown.node, says,
-    ...(root.closest('.jp-Notebook') && !record.outcome ? [element('p', { class: 'guess-typed' }, record.forms)] : []));
+    ...(document.querySelector('.jp-LabShell, .jp-NotebookShell') && !record.outcome ? [element('p', { class: 'guess-typed' }, record.forms)] : []));
   const value = kept.get();
   shown.put(value);
   tell(value);
   document.addEventListener('guess', ({ detail }) => {
-    if (detail.question !== record.question || !root.isConnected || (record.outcome && root.closest('.jp-Notebook'))) return;
+    if (detail.question !== record.question || !root.isConnected || (record.outcome && record.value !== null)) return;
     shown.put(detail.value);
     tell(detail.value);
   });

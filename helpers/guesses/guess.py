@@ -108,8 +108,7 @@ class Gap:
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         guess = self.guess
         if guess.run is not None:
-            says = escape(guess.gap(self.outcome)['says'])
-            html = f'<div class="replay">{style(CSS)}<p class="guess-says">{says}</p></div>'
+            html = f'<p>You said: {escape(guess.said())}</p>'
             return {'text/plain': str(self), 'text/html': html}
         record = attribute({**guess.record(), 'outcome': dict(self.outcome)})
         svg = guess.kind.picture()

@@ -3,8 +3,9 @@
 // page, hears of it by the event 'guess'.
 function memory(root, { question, value }) {
   const key = `guess: ${question}`;
-  const area = root.closest('.jp-Cell-outputArea, .jp-OutputArea');
-  const line = () => area?.querySelector('.guess-line input');
+  const inLab = document.querySelector('.jp-LabShell, .jp-NotebookShell') !== null;
+  const area = inLab && root.closest('.jp-OutputArea');
+  const line = () => area && area.querySelector('.guess-line input');
   let own = value;
   let sent;
 
@@ -24,7 +25,7 @@ function memory(root, { question, value }) {
   return {
     see(value) { own = value; },
     get() {
-      if (own !== null || area) return own;
+      if (own !== null || inLab) return own;
       try {
         return JSON.parse(localStorage.getItem(key));
       } catch { // no storage, as in a private window

@@ -15,11 +15,18 @@ function pace(us) {
 
 // The lists and the picture of one run. A short one has its times in milliseconds. What comes later is
 // covered as long as the replay is new.
-function panel(run, record, image, [from, until], grouped, short, isNew) {
+function panel(run, record, image, [from, until], grouped, short, isNew, counts) {
   const { setup, name } = record;
   const many = setup.callbacks.length > 1;
   const names = ['threads', ...(grouped ? ['groups'] : []), 'queue', ...(many ? [] : ['lost'])];
   const { rows, draw } = board(setup, names, { losses: run.scan().length });
+  const counted = counts && rows.find(one => one.querySelector('.replay-lost'));
+  const count = element('summary', {}, element('span', { class: 'replay-count' }));
+  if (counted) {
+    counted.firstChild.remove();
+    counted.firstChild.className = '';
+    counted.firstChild.replaceChildren(element('details', {}, count, ...counted.firstChild.childNodes));
+  }
   const time = element('span', { class: 'replay-time' });
   const circle = run.end && ring();
   const svg = drawing(image);
@@ -34,6 +41,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew) {
     const { state, says } = run.seek(position);
     const now = circle ? circleOf(setup, state) : { stuck: [] };
     draw(state, now.stuck);
+    count.firstChild.textContent = `${state.lost.length} lost`;
     circle?.draw(now, run.end);
     point(us ?? 1e6 * state.now);
     return run.says?.(position) ?? says;
@@ -115,7 +123,7 @@ function show(root, record) {
   const images = [...root.querySelectorAll('figure > img')];
   // One thread that runs one callback needs no group to be understood.
   const grouped = record.runs.some(({ setup }) => setup?.callbacks.length > 1 || setup?.threads.length > 1);
-  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped, length < SHORT_US, hides && drives.length)
+  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped, length < SHORT_US, hides && drives.length, record.runs.some(other => other.strip))
     : floor(runs[i], one, drawing(images[i]))));
   const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
   const slider = element('input', {

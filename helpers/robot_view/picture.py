@@ -24,8 +24,18 @@ BEAMS = 40  # of a scan, in a picture
 WALL_M = 0.15  # of an outer wall
 LANE_M, WORDS_M = 0.5, 0.26  # of a lane: to each side of the robot, and beyond for words
 RING, RING_S = 30, 0.4  # pixels, and how long: around a bump, as drive.js draws it
+WORDS_Y = 26  # of what a lane says above
+SEES = 'the brake sees this, {:.1f} s ago'  # as drive.js says it
 DRIVE_CSS = Path(__file__).with_name('drive.css')
 ROBOT, WAITING, LOST = LOOK['robot'], LOOK['waiting'], LOOK['lost']
+
+
+class Seen(NamedTuple):
+    """What a callback works on: a scan, where it was made, and how old it is (s)."""
+
+    scan: Scan
+    pose: Pose
+    age_s: float
 
 
 class Later(NamedTuple):
@@ -49,13 +59,15 @@ def floor_picture(
     ring_s: float | None = None,
     as_lane: bool = False,
     guess: Guess | None = None,
+    seen: Seen | None = None,
 ) -> str:
     """Return the SVG: the floor, the path through `points`, the robot at `pose` with its laser.
 
     `scan` was made at `scan_pose`, which is mostly a little behind `pose`. `seconds` are the places
     that get a dot, `bumps` those where it hit something, the last one `ring_s` ago. `later` is what
     comes after `pose`: drive.js draws it when its time has come. `as_lane` draws only the strip of
-    a corridor, with room above and below it for words. `guess` is one of a place.
+    a corridor, with room above and below it for words. `guess` is one of a place,
+    `seen` what the callback works on.
     """
     x, y, right, above = lane_edges(floor) if as_lane else edges(floor)
     scale = min((WIDTH - 2 * MARGIN) / (right - x), (HEIGHT - 2 * MARGIN) / (above - y))
@@ -66,13 +78,14 @@ def floor_picture(
     pale = ' stroke-opacity=".3"' if later else ''
     later = later or Later()
     start = floor.start
+    strip = LANE_M if as_lane else math.inf
     ring = f'M{start.x - r:.3f} {start.y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} 0'
     ring += f'a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
     parts = [
         _lane(floor) if as_lane else _floor(floor, scale),
-        f'<path class="fan" d="{fan(scan_pose or pose, scan)}" fill="{ROBOT}" fill-opacity=".16" '
+        f'<path class="fan" d="{fan(scan_pose or pose, scan, strip)}" fill="{ROBOT}" fill-opacity=".16" '
         f'stroke="{ROBOT}" stroke-opacity=".6"/>',
-        f'<path class="old" d="" fill="none" stroke="{WAITING}" '
+        f'<path class="old" d="{seen_from(seen, r, strip)}" fill="none" stroke="{WAITING}" '
         'stroke-width="2" stroke-dasharray="5 4"/>',
         f'<path class="all" d="{whole}" fill="none" stroke="{ROBOT}" stroke-width="2.6"{pale}/>',
         f'<path class="driven" d="{drawn}" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
@@ -99,6 +112,13 @@ def floor_picture(
         )
     if guess is not None:
         parts.insert(2, _guess(guess, r, scale))
+    words = ''
+    if seen is not None:
+        across = MARGIN + scale * (seen.pose.x - x)
+        words = (
+            f'<text class="ghost" x="{min(max(across, 130), width - 130):.0f}" y="{WORDS_Y}">'
+            f'{SEES.format(seen.age_s)}</text>'
+        )
     left, below = 14 + scale * WALL_M, height - 14 - scale * (WORDS_M if as_lane else WALL_M)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
@@ -108,7 +128,7 @@ def floor_picture(
         f'scale({scale:.2f} -{scale:.2f})" stroke-linejoin="round">{"".join(parts)}</g>'
         f'<path d="M{left:.0f} {below:.0f}v-6m0 3h{scale:.0f}m0-3v6" fill="none" '
         f'stroke="currentColor"/><text x="{left + scale / 2:.0f}" y="{below - 7:.0f}" '
-        'text-anchor="middle" fill="currentColor">1 m</text></svg>'
+        f'text-anchor="middle" fill="currentColor">1 m</text>{words}</svg>'
     ).replace('<path ', '<path vector-effect="non-scaling-stroke" ')
 
 
@@ -228,12 +248,24 @@ def crosses(poses: Sequence[Pose], r: float, a: float) -> str:
     )
 
 
-def fan(pose: Pose, scan: Scan | None) -> str:
-    """Return a path around what the laser sees from a pose."""
+def seen_from(seen: Seen | None, r: float, strip: float) -> str:
+    """Return a path around what a callback works on, and around the robot as it was."""
+    if seen is None:
+        return ''
+    x, y, _ = seen.pose
+    return (
+        f'{fan(seen.pose, seen.scan, strip)}M{x - r:.3f} {y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} '
+        f'0a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
+    )
+
+
+def fan(pose: Pose, scan: Scan | None, strip: float = math.inf) -> str:
+    """Return a path around what the laser sees from a pose, `strip` (m) to each side of it."""
     if scan is None:
         return ''
     angles, few = scan.drawn(BEAMS, RANGE_MAX)
     angles = pose.yaw + angles
+    few = np.minimum(few, strip / np.maximum(np.abs(np.sin(angles)), 1e-6))
     xs, ys = pose.x + few * np.cos(angles), pose.y + few * np.sin(angles)
     hits = 'L'.join(f'{x:.2f} {y:.2f}' for x, y in zip(xs.tolist(), ys.tolist(), strict=True))
     return f'M{pose.x:.2f} {pose.y:.2f}L{hits}z'

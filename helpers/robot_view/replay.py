@@ -18,6 +18,7 @@ from helpers.robot import RADIUS_M, RANGE_MAX, Command, DriveRecord, Event, Pose
 from helpers.robot_view.picture import (
     BEAMS,
     DRIVE_CSS,
+    LANE_M,
     Later,
     floor_in_words,
     floor_picture,
@@ -74,6 +75,11 @@ class Drive:
         return end / (count - 1) if end else EVERY_S, poses.round(3)
 
     @property
+    def as_lane(self) -> bool:
+        """Whether its picture is the strip of a corridor."""
+        return is_lane(self.record_.floor, [row[1:3] for row in self.record_.poses])
+
+    @property
     def telling_s(self) -> float:
         """The time at which it opens."""
         hit = bumps(self.record_) if self.opens == 'bump' else []
@@ -97,7 +103,7 @@ class Drive:
             [hit for done, hit in hits if done],
             [dot for done, dot in dots if done],
             scan_pose=place(record, before[-1].t_s) if before else None,
-            as_lane=is_lane(record.floor, poses),
+            as_lane=self.as_lane,
             later=Later(
                 points,
                 [hit for done, hit in hits if not done],
@@ -117,6 +123,7 @@ class Drive:
             'outcome': self.headline,
             **({'guess': self._guessed()} if self.guess else {}),
             'step': round(step, 4),
+            **({'strip': LANE_M} if self.as_lane else {}),
             'poses': poses.tolist(),
             'scans': [
                 [
