@@ -128,7 +128,7 @@ def guess(
     changes with what one sets there, or what one types in place of the dots:
 
     - a floor: your robot stands where you put it, in front of a wall; `line_m` (m) draws a line;
-    - a range or a `Level`: a line on an axis, in `unit`;
+    - a range, or a pair such as (0, 2) with a `unit`: a line on an axis;
     - `bool`, a tuple, or a dict of words and values: options, of which one is chosen, `several`
       (True), or just so many (a number).
 
@@ -174,20 +174,20 @@ def _guess_on(kind: Kind, question: str, *answers: object) -> Guess:
             made.value = kind.read(typed)
         except ValueError as problem:
             wrong = str(problem)
-    show(made, lambda value: _keep(question, value))
+    show(made, lambda value: _keep(made))
     if wrong:
         print(*wrap(wrong), sep='\n')
     elif typed is not None and typed is not ...:
-        _keep(question, made.value)
+        _keep(made)
         _outbox.say_trouble()
     return made
 
 
-def _keep(question: str, value: object) -> None:
+def _keep(made: Guess) -> None:
     """Keep what was guessed, for the next kernel, and tell the class."""
-    if (lesson := progress.this_lesson()) and value is not None:
-        progress.add(f'{GUESSED} {lesson} {json.dumps([question, value])}')
-    _tell('guess', question=question, value=value)
+    if lesson := progress.this_lesson():
+        progress.add(f'{GUESSED} {lesson} {json.dumps([made.question, made.value])}')
+    _tell('guess', question=made.question, value=made.kind.told(made.value))
 
 
 def _kept(question: str) -> object:

@@ -97,7 +97,7 @@ def _compare(
             print(f'  The answer is {answer}.')
     else:
         display(Gap(guess, outcome))
-        classroom.tell_outcome(question, outcome['at'])
+        classroom.tell_outcome(question, guess.kind.told(_plain(outcome['at'])))
     if because:
         print(f'  {because}')
 

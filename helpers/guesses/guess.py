@@ -37,6 +37,9 @@ class Kind(Protocol):
     def read(self, typed: object) -> object:
         """Return the value of what was typed. Raises ValueError with a sentence."""
 
+    def told(self, value: object) -> object:
+        """Return a value as a class is told it: a number, a text, or a list of them."""
+
     def outcome(self, measured: object, run: object, tolerance: float) -> dict:
         """Return what came out, as the script compares it. `run` is that of the guess."""
 

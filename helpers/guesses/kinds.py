@@ -65,6 +65,9 @@ class Level:
             raise ValueError(f'{typed!r} is not on the axis. {self.forms}')
         return int(number) if self.is_whole else number
 
+    def told(self, value: float) -> float:
+        return value
+
     def outcome(self, measured: float, run: object, tolerance: float) -> dict:
         return {'at': measured, 'tolerance': tolerance}
 
@@ -134,6 +137,10 @@ class Options:
             found.append(same[0])
         return found
 
+    def told(self, value: list[int] | int) -> list[str] | str:
+        names = [*self.values]
+        return [names[place] for place in value] if isinstance(value, list) else names[value]
+
     def outcome(self, measured: object, run: object, tolerance: float) -> dict:
         """Return the places of what was measured. Raises ValueError for what is no option."""
         if self.several:
@@ -147,7 +154,9 @@ class Options:
 
 
 def kind_of(on: object, several: bool | int = False, unit: str = '') -> Kind:
-    """Return the kind of a guess that `on` names: `bool`, a range, or options.
+    """Return the kind of a guess that `on` names: `bool`, an axis, or options.
+
+    With a unit, a pair of numbers is an axis.
 
     Raises TypeError for anything else.
     """
@@ -155,6 +164,8 @@ def kind_of(on: object, several: bool | int = False, unit: str = '') -> Kind:
         return on
     if on is bool:
         return Options({'yes': True, 'no': False})
+    if unit and isinstance(on, tuple) and len(on) == 2:
+        return Level(*map(float, on), unit)
     if isinstance(on, range) and not several:
         return Level(on[0], on[-1], unit)
     if isinstance(on, Mapping):

@@ -2,7 +2,7 @@
 const level = (() => {
   const [WIDE, TALL, LEFT, RIGHT, LINE] = [800, 130, 40, 40, 84];
   const rounded = ({ step }, value) => +(Math.round(value / step) * step).toFixed(3);
-  const named = ({ unit }, value) => [+value.toFixed(3), unit].filter(part => part !== '').join(' ');
+  const named = ({ unit }, value) => [`${+value.toFixed(3)}`, unit].filter(Boolean).join(' ');
 
   const said = (record, value) => `${named(record, value)}.`;
 
@@ -10,8 +10,9 @@ const level = (() => {
     const right = Math.abs(value - at) <= tolerance;
     const exact = +at.toPrecision(3);
     if (right) return { right, says: `Right: it is ${named(record, exact)}.` };
-    const far = named(record, +Math.abs(value - at).toPrecision(2));
-    const [much, little] = Number.isInteger(record.step) ? ['many', 'few'] : ['much', 'little'];
+    const whole = Number.isInteger(record.step);
+    const [much, little] = whole ? ['many', 'few'] : ['much', 'little'];
+    const far = named(whole ? {} : record, +Math.abs(value - at).toPrecision(2));
     return { right, says: `It is ${named(record, exact)}: you said ${far} too ${value > at ? much : little}.` };
   }
 
@@ -39,7 +40,11 @@ const level = (() => {
     you.append(svgElement('path', { class: 'you-round', d: `M0 ${LINE}V34`, stroke: 'var(--look-you)', 'stroke-width': 4 }),
       svgElement('circle', { cy: 34, r: 9, fill: 'var(--look-you)' }),
       svgElement('text', { class: 'you-label', y: 18 }, 'you'));
-    svg.append(you);
+    const ghosts = svgElement('g', { class: 'class' });
+    svg.append(ghosts, you);
+    classOf(record, values => ghosts.replaceChildren(...values.map(value => svgElement('path', {
+      d: `M${x(Math.min(Math.max(value, low), high))} ${LINE}v-40`, stroke: 'var(--look-you)', 'stroke-width': 6, 'stroke-opacity': 0.3,
+    }))));
     if (outcome) {
       const at = x(Math.min(Math.max(outcome.at, low), high));
       svg.append(svgElement('path', { d: `M${at} ${LINE}V34`, stroke: 'var(--look-robot)', 'stroke-width': 4 }),

@@ -123,6 +123,7 @@ def floor_picture(
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
         f'width="{width:.0f}" height="{height:.0f}" color="{LOOK["ink"]}" '
+        'preserveAspectRatio="xMinYMid" '
         f'font-family="system-ui, sans-serif" font-size="16"><g transform="translate('
         f'{MARGIN - scale * x:.1f} {height - MARGIN + scale * y:.1f}) '
         f'scale({scale:.2f} -{scale:.2f})" stroke-linejoin="round">{"".join(parts)}</g>'

@@ -59,17 +59,34 @@ const place = (() => {
     group.append(you, bracket, number);
     let now = null;
 
+    // The robots of a class, one beside the other. Those who were right light up at the end.
+    const ghosts = make('g', { class: 'class' });
+    group.insertBefore(ghosts, you);
+    classOf(record, values => ghosts.replaceChildren(...values.map((value, i) => {
+      const [cx, cy] = along(Math.max(value, radius), ((i * 37) % 9 - 4) * 0.1);
+      const ghost = make('circle', { cx, cy, r: r / 2, fill: 'var(--look-you)', 'fill-opacity': 0.35 });
+      ghost.dataset.at = value;
+      return ghost;
+    })));
+
     function put(value) {
       now = value;
       at(you, along(value ?? ahead / 2));
       you.style.display = '';
     }
 
+    const metres = ({ x, y }) => ahead - (x - x0) * Math.cos(yaw) - (y - y0) * Math.sin(yaw);
+
     function measure(pose) {
       bracket.setAttribute('d', '');
       far.textContent = '';
+      ghosts.childNodes.forEach(ghost => {
+        const isRight = pose && Math.abs(+ghost.dataset.at - metres(pose)) <= RIGHT;
+        ghost.setAttribute('fill', isRight ? 'var(--look-robot)' : 'var(--look-you)');
+        ghost.setAttribute('fill-opacity', isRight ? 1 : 0.35);
+      });
       if (!pose || now === null) return;
-      const real = ahead - (pose.x - x0) * Math.cos(yaw) - (pose.y - y0) * Math.sin(yaw);
+      const real = metres(pose);
       if (Math.abs(real - now) < RIGHT / 2) return;
       const side = 1.9 * r;
       const end = value => `M${along(value, side - 0.06).join(' ')}L${along(value, side + 0.06).join(' ')}`;
@@ -79,8 +96,7 @@ const place = (() => {
     }
 
     return { node: you, put, measure, valueAt: ({ clientX, clientY }) => {
-      const { x, y } = new DOMPoint(clientX, clientY).matrixTransform(group.getScreenCTM().inverse());
-      return ahead - (x - x0) * Math.cos(yaw) - (y - y0) * Math.sin(yaw);
+      return metres(new DOMPoint(clientX, clientY).matrixTransform(group.getScreenCTM().inverse()));
     } };
   }
 

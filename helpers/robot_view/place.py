@@ -87,6 +87,9 @@ class Place:
             )
         return max(float(number), RADIUS_M)
 
+    def told(self, value: float) -> float:
+        return round(value, 1)  # many are one bar
+
     def outcome(self, measured: Robot | DriveRecord, run: object, tolerance: float) -> dict:
         """Return where a robot ended, what it hit, and why.
 
