@@ -75,7 +75,7 @@ class Guess:
 
     def _words(self, function: str, *values: object) -> object:
         kind = self.kind.record()
-        return javascript(f'{kind["kind"]}.{function}', kind, *values, files=self.kind.scripts[:1])
+        return javascript(f'{kind["kind"]}Kind.{function}', kind, *values, files=self.kind.scripts[:1])
 
     def __str__(self) -> str:
         """Return what is true in each run: nbval compares it."""

@@ -1,5 +1,5 @@
 // A level: a number on an axis. `said` and `gap` need no page.
-const level = (() => {
+const levelKind = (() => {
   const [WIDE, TALL, LEFT, RIGHT, LINE] = [800, 130, 40, 40, 84];
   const rounded = ({ step }, value) => +(Math.round(value / step) * step).toFixed(3);
   const named = ({ unit }, value) => [`${+value.toFixed(3)}`, unit].filter(Boolean).join(' ');

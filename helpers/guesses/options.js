@@ -1,6 +1,6 @@
 // Options, of which one is chosen, or several. `said` and `gap` need no page. A value is the place
 // of the option, or a list of places.
-const options = (() => {
+const optionsKind = (() => {
   const listed = (names, places) => [places].flat().map(place => names[place]).join(', ') || 'none';
 
   const said = ({ names }, value) => `${listed(names, value)}.`;

@@ -59,7 +59,7 @@ function drive({ step, poses, commands, scans, events, bumps, guess, strip = Inf
   // With a guess the last sentence says how far it was from what came out.
   function outcome() {
     const value = guess && kept.get();
-    return value === null || value === undefined ? said : place.gap(guess, value, guess.outcome).says;
+    return value === null || value === undefined ? said : placeKind.gap(guess, value, guess.outcome).says;
   }
 
   return {
@@ -110,7 +110,7 @@ function floor(run, record, svg) {
     ghost.setAttribute('x', Math.min(Math.max(x, half + 8), wide - half - 8).toFixed(1));
     ghost.setAttribute('y', record.strip ? 26 : Math.max(y - 6, 30).toFixed(1));
   }
-  const mine = run.kept && place.yours(svg, record.guess);
+  const mine = run.kept && placeKind.yours(svg, record.guess);
   const ended = run.times.at(-1) / 1000; // ms
   let drawn = () => {};
 

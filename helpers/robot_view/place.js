@@ -1,6 +1,6 @@
 // A guess of a place: your robot on the way that it drives. `said` and `gap` need no page. A value is
 // the distance (m) from the middle of the robot to what is ahead.
-const place = (() => {
+const placeKind = (() => {
   const STEP = 0.05; // m, of a key
   const RIGHT = 0.1; // m: so near, a guess is right
 
