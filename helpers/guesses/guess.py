@@ -75,7 +75,9 @@ class Guess:
 
     def _words(self, function: str, *values: object) -> object:
         kind = self.kind.record()
-        return javascript(f'{kind["kind"]}Kind.{function}', kind, *values, files=self.kind.scripts[:1])
+        return javascript(
+            f'{kind["kind"]}Kind.{function}', kind, *values, files=self.kind.scripts[:1]
+        )
 
     def __str__(self) -> str:
         """Return what is true in each run: nbval compares it."""
@@ -84,7 +86,7 @@ class Guess:
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         svg = self.kind.picture()
-        figure = picture_of(svg, self.kind.words()) if svg else ''
+        figure = picture_of(svg, f'{self.question} {self.kind.words()}') if svg else ''
         html = (
             f'<div class="replay guess" data-guess={attribute(self.record())}>{style(CSS)}'
             f'<p class="guess-question">{escape(self.question)}</p>{figure}'
@@ -115,7 +117,7 @@ class Gap:
             return {'text/plain': str(self), 'text/html': html}
         record = attribute({**guess.record(), 'outcome': dict(self.outcome)})
         svg = guess.kind.picture()
-        figure = picture_of(svg, guess.kind.words()) if svg else ''
+        figure = picture_of(svg, f'{guess.question} {guess.kind.words()}') if svg else ''
         html = (
             f'<div class="replay guess" data-guess={record}>{style(CSS)}'
             f'<p class="guess-question">{escape(guess.question)}</p>{figure}'

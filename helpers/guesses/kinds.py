@@ -48,7 +48,13 @@ class Level:
 
     def record(self) -> dict:
         step = 1 if self.is_whole else (self.high - self.low) / MOST_STEPS
-        return {'kind': 'level', 'low': self.low, 'high': self.high, 'unit': self.unit, 'step': step}
+        return {
+            'kind': 'level',
+            'low': self.low,
+            'high': self.high,
+            'unit': self.unit,
+            'step': step,
+        }
 
     def picture(self) -> str:
         return ''
@@ -120,7 +126,9 @@ class Options:
             [place] = self._places([typed])
             return place
         if isinstance(typed, str):
-            typed = [part for part in typed.replace(',', ' ').split() if part not in ('and', 'none')]
+            typed = [
+                part for part in typed.replace(',', ' ').split() if part not in ('and', 'none')
+            ]
         elif not isinstance(typed, Collection) or isinstance(typed, Mapping):
             typed = [typed]
         places = sorted(set(self._places(typed)))
@@ -131,7 +139,11 @@ class Options:
     def _places(self, typed: Iterable) -> list[int]:
         found = []
         for one in typed:
-            same = [i for i, (name, value) in enumerate(self.values.items()) if is_same(one, value, name)]
+            same = [
+                i
+                for i, (name, value) in enumerate(self.values.items())
+                if is_same(one, value, name)
+            ]
             if not same:
                 raise ValueError(f'{one!r} is none of the options. {self.forms}')
             found.append(same[0])

@@ -7,7 +7,8 @@
 
 `picture` draws a floor and the robot on it, `scans` records which scan a callback works on,
 `replay` makes a drive that one steps through, `live` shows it while a cell runs, and `by_hand` lets
-a person drive. `place` is the guess of where it ends. A robot that runs as a program has nobody who looks, and loads none of this.
+a person drive. `place` is the guess of where it ends. A robot that runs as a program has nobody who
+looks, and loads none of this.
 """
 
 from helpers.robot_view.by_hand import drive_by_hand

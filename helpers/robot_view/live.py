@@ -173,7 +173,11 @@ class LiveView:
         ]
         waiting = ''.join(f'<li><b>{seq}</b></li>' for seq in waits)
         busy = busy or ['<li class="replay-free">free</li>']
-        rows = _row('time', f'{now_s:.3f} s') + _row('callback', ''.join(busy)) + _row('queue', waiting, 'replay-queue')
+        rows = (
+            _row('time', f'{now_s:.3f} s')
+            + _row('callback', ''.join(busy))
+            + _row('queue', waiting, 'replay-queue')
+        )
         return f'<div class="replay-run">{rows}</div>'
 
 

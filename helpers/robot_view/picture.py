@@ -83,8 +83,8 @@ def floor_picture(
     ring += f'a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
     parts = [
         _lane(floor) if as_lane else _floor(floor, scale),
-        f'<path class="fan" d="{fan(scan_pose or pose, scan, strip)}" fill="{ROBOT}" fill-opacity=".16" '
-        f'stroke="{ROBOT}" stroke-opacity=".6"/>',
+        f'<path class="fan" d="{fan(scan_pose or pose, scan, strip)}" fill="{ROBOT}" '
+        f'fill-opacity=".16" stroke="{ROBOT}" stroke-opacity=".6"/>',
         f'<path class="old" d="{seen_from(seen, r, strip)}" fill="none" stroke="{WAITING}" '
         'stroke-width="2" stroke-dasharray="5 4"/>',
         f'<path class="all" d="{whole}" fill="none" stroke="{ROBOT}" stroke-width="2.6"{pale}/>',

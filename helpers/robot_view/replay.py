@@ -7,7 +7,6 @@ from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass, replace
 from pathlib import Path
-
 from typing import TYPE_CHECKING
 
 import numpy as np

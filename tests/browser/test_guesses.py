@@ -1,4 +1,4 @@
-"""Guesses that one makes in a picture: by keys, with a finger, in JupyterLab, and kept without it."""
+"""Guesses that one makes in a picture: by keys, with a finger, in JupyterLab and without it."""
 
 import nbformat
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
@@ -110,9 +110,7 @@ def test_the_drive_goes_through_it_in_jupyterlab(lab):
         page.keyboard.press(key)
     assert page.locator('.guess-says').inner_text() == 'You say: it stops 0.61 m before the wall.'
     assert [(c['cell_type'], c['source']) for c in lab.cells()] == before
-    page.wait_for_function(
-        """() => document.querySelector('.guess-line input').value === '0.61'"""
-    )
+    page.wait_for_function("""() => document.querySelector('.guess-line input').value === '0.61'""")
     said = lab.run(2)
     assert 'You say: it stops 0.61 m before the wall.' in said
     assert 'It is in the wall, 0.50 m further than you said.' in said
