@@ -1,10 +1,19 @@
 """What a reader reads about a guess."""
 
+import os
+from html import unescape
+
 import numpy as np
 import pandas as pd
 import pytest
+from jupyter_client.manager import run_kernel
 
+from helpers.checks import guess
 from helpers.checks.guesses import NO_GUESS, compare_prediction
+from helpers.checks.progress import FILE_VARIABLE
+from helpers.guesses import Level
+from helpers.robot import CORRIDOR, EMPTY, DriveRecord
+from helpers.robot.record import Event, Step
 
 QUESTION = 'How many of 41 messages are heard?'
 
@@ -78,3 +87,164 @@ def test_an_outcome_of_no_known_kind_is_refused(capsys):
     with pytest.raises(TypeError, match='^The outcome of a prediction cannot be of type dict[.]$'):
         compare_prediction(QUESTION, 1, {'a': 1})
     assert capsys.readouterr().out == ''
+
+
+# Guesses that one makes in a picture
+
+END = 'Where does it end?'
+
+
+def asked(capsys, *typed, **on):
+    """Return the guess, and what its cell prints."""
+    made = guess(END, *typed, **on)
+    return made, capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ('on', 'typed', 'value', 'said'),
+    [
+        (CORRIDOR, 1.2, 1.2, 'it stops 1.20 m before the wall.'),
+        (CORRIDOR, '0,3 m before the wall', 0.3, 'it stops 0.30 m before the wall.'),
+        (CORRIDOR, 'wall', 0.11, 'it hits the wall.'),
+        (CORRIDOR, False, 0.11, 'it hits the wall.'),
+        (CORRIDOR, 0, 0.11, 'it hits the wall.'),
+        (range(42), 14, 14, '14.'),
+        (range(42), '14', 14, '14.'),
+        (Level(0.0, 2.0, 's'), '0,9 s', 0.9, '0.9 s.'),
+        (bool, 'no', 1, 'no.'),
+        (bool, False, 1, 'no.'),
+        (('A', 'B', 'C'), ' b', 1, 'B.'),
+        ({'hits the wall': 'hit', 'stops': 'stop'}, 'Stops', 1, 'stops.'),
+    ],
+)
+def test_whatever_says_it_is_read(capsys, on, typed, value, said):
+    made, printed = asked(capsys, typed, on=on)
+    assert made.value == value
+    assert printed.endswith(f'You say: {said}\n')
+
+
+@pytest.mark.parametrize('typed', [{7, 8}, [8, 7], (7, 8), '7, 8', '7 and 8'])
+def test_several_options_are_typed_in_any_form(capsys, typed):
+    made, _ = asked(capsys, typed, on=range(5, 9), several=2)
+    assert made.value == [2, 3]
+
+
+@pytest.mark.parametrize(
+    ('on', 'typed', 'why'),
+    [
+        ({'on': CORRIDOR}, 'far', "'far' is no place. Typed in place of the dots:"),
+        ({'on': CORRIDOR}, 9.0, '9.0 is no place: the robot starts 3.25 m before the wall.'),
+        ({'on': CORRIDOR}, True, 'True is no place.'),
+        ({'on': range(42)}, 14.5, '14.5 is no answer. Typed in place of the dots: a whole number'),
+        ({'on': range(42)}, 42, '42 is not on the axis.'),
+        ({'on': bool}, 1, '1 is none of the options. Typed in place of the dots: True or False.'),
+        ({'on': ('A', 'B')}, 'C', "'C' is none of the options."),
+        ({'on': range(9), 'several': 3}, [1, 2], 'These are 2, and 3 are asked for.'),
+    ],
+)
+def test_a_wrong_form_is_said_at_once(capsys, on, typed, why):
+    made, printed = asked(capsys, typed, **on)
+    assert made.value is None
+    assert why in printed.replace('\n', ' ')
+
+
+def test_what_may_be_answered_is_visible_before(capsys):
+    for on in (CORRIDOR, range(42), bool, ('A', 'B')):
+        made, printed = asked(capsys, ..., on=on)
+        assert made.value is None
+        assert made.kind.forms in printed
+        assert made.kind.forms in unescape(made._repr_mimebundle_()['text/html'])
+
+
+def drive(*rows, bump_s=None):
+    """Return a drive in the corridor, (t, x, v) of each step."""
+    poses = [Step(t_s, x, 1.25, 0.0, v, 0.0) for t_s, x, v in rows]
+    events = [] if bump_s is None else [Event(bump_s, 'bump', 'It hit something.')]
+    return DriveRecord(CORRIDOR, poses=poses, events=events)
+
+
+HIT = drive((0, 1.25, 0.5), (6, 4.39, 0.5), bump_s=6)  # the wall is at 4.5
+STOOD = drive((0, 1.25, 0.5), (6, 4.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ('typed', 'record', 'said'),
+    [
+        ('wall', HIT, 'Right: it hit the wall.'),
+        (0.6, HIT, 'It is in the wall, 0.49 m further than you said.'),
+        (0.5, STOOD, 'Right: it stands 0.50 m before the wall.'),
+        (0.9, STOOD, 'It stands 0.50 m before the wall, 0.40 m further than you said.'),
+        ('wall', STOOD, 'It stands 0.50 m before the wall, 0.39 m short of what you said.'),
+        # So near, and yet it hit: that is another answer.
+        (0.15, HIT, 'It is in the wall, 0.04 m further than you said.'),
+    ],
+)
+def test_the_gap_to_a_drive_is_one_sentence(capsys, typed, record, said):
+    made, _ = asked(capsys, typed, on=CORRIDOR)
+    compare_prediction(END, made, record)
+    assert capsys.readouterr().out.splitlines()[-1].strip() == said
+
+
+@pytest.mark.parametrize(
+    ('on', 'typed', 'outcome', 'said'),
+    [
+        ({'on': range(42)}, 41, 14, 'It is 14: you said 27 too many.'),
+        ({'on': range(42)}, 14, np.int64(14), 'Right: it is 14.'),
+        ({'on': Level(0.0, 2.0, 's')}, 0.5, 1.1, 'It is 1.1 s: you said 0.6 s too little.'),
+        ({'on': bool}, 'yes', np.bool_(False), 'It is no: you said yes.'),
+        ({'on': ('A', 'B', 'C'), 'several': True}, {'A', 'B'}, {'B'}, 'It is B: you said A, B.'),
+        ({'on': ('A', 'B', 'C'), 'several': True}, set(), set(), 'Right: none.'),
+    ],
+)
+def test_the_gap_to_a_number_and_to_options(capsys, on, typed, outcome, said):
+    made, _ = asked(capsys, typed, **on)
+    compare_prediction(END, made, outcome)
+    assert capsys.readouterr().out.splitlines()[-1].strip() == said
+
+
+def test_without_a_student_the_answer_is_words_that_never_move(capsys, monkeypatch):
+    made, _ = asked(capsys, ..., on=CORRIDOR)
+    compare_prediction(END, made, HIT)
+    assert 'No guess yet. Put your robot' in capsys.readouterr().out
+    monkeypatch.setattr('helpers.checks.guesses._has_student', lambda: False)
+    for record, answer in ((HIT, 'in the wall'), (STOOD, 'before the wall')):
+        compare_prediction(END, made, record)
+        assert capsys.readouterr().out == f'{END}\n  The answer is {answer}.\n'
+
+
+def test_a_floor_without_a_wall_takes_no_place():
+    with pytest.raises(ValueError, match='On the floor empty nothing is ahead'):
+        guess(END, ..., on=EMPTY)
+    with pytest.raises(TypeError, match='not on 3'):
+        guess(END, ..., on=3)
+
+
+CELL = """
+from helpers.checks import guess
+from helpers.robot import CORRIDOR
+made = guess('Where does it end?', {}, on=CORRIDOR)
+print(made.value)
+"""
+
+
+def test_the_next_kernel_knows_what_was_guessed(tmp_path):
+    """It is in the file of the student's progress, by lesson and question."""
+
+    def printed(typed, lesson='05_keep_what_is_fresh', **more):
+        env = {'JPY_SESSION_NAME': f'/home/ada/notebooks/{lesson}.ipynb', **more}
+        env |= {FILE_VARIABLE: str(tmp_path / 'progress.txt')}
+        found = []
+        with run_kernel(kernel_name='python3', env=os.environ | env) as kernel:
+            kernel.execute_interactive(
+                CELL.format(typed),
+                allow_stdin=True,  # as somebody who watches
+                output_hook=lambda one: found.append(one['content'].get('text', '')),
+                timeout=60,
+            )
+        return ''.join(found).strip()
+
+    assert printed('...') == 'None'
+    assert printed('1.5') == '1.5'
+    assert printed('...') == '1.5'
+    assert printed('...', lesson='06_call_a_service_from_a_callback') == 'None'
+    assert printed('...', ROS2_NOTEBOOKS_BEGIN_EMPTY='yes') == 'None'  # in front of a class

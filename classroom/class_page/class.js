@@ -103,7 +103,10 @@ function show(state) {
   find('joins').textContent = state.joins.join('\n');
   const here = location.href.replace(/[?#].*/, '');
   find('slides').textContent = state.secret && `Slides on your machine: make present LESSON=02 CLASS=${here}${state.secret}/`;
-  if (cell) parent.postMessage(document.documentElement.offsetHeight, '*'); // to the deck
+  if (cell) { // to the deck, which draws the numbers into the picture
+    const values = guesses.map(({ question, values = [] }) => ({ question, values }));
+    parent.postMessage({ height: document.documentElement.offsetHeight, guesses: values }, '*');
+  }
   if (shown.notes !== state.notes) find('notes').innerHTML = shown.notes = state.notes; // the lesson's
 }
 

@@ -2,6 +2,7 @@
 
     join_class('192.0.2.5:8765', 'blue-otter-lamp')   once, from what is on the wall
     my_guess = guess('How many are heard?', 41)       returns 41, and sends it
+    my_place = guess('Where does it end?', ..., on=CORRIDOR)   in the picture
     raise_hand(), lower_hand(), leave_class()
 
 Without a class nothing is sent, shown or waited for. With one, a thread in the background writes
@@ -44,13 +45,18 @@ from collections import deque
 from collections.abc import Set
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from helpers.checks import progress
-from helpers.notebook import wrap
+from helpers.notebook import somebody_watches, wrap
+from helpers.workspace import BEGIN_EMPTY
+
+if TYPE_CHECKING:
+    from helpers.guesses import Guess, Kind
 
 __all__ = ['guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand']
 
+GUESSED = 'guess'  # begins a line of the progress file; no lesson has a name of one word
 HUB_VARIABLE = 'ROS2_NOTEBOOKS_CLASS'  # on a JupyterHub: the address of its class
 JOINED_FOR_S = 12 * 3600  # a class that was not left is forgotten, so that nothing is sent at home
 ADDRESS = re.compile(r'(https?://)?[\w.-]+(:\d+)?(/[\w./-]*)?')
@@ -104,13 +110,32 @@ class Class(NamedTuple):
 # --- What a notebook calls -----------------------------------------------------------------------
 
 
-def guess(question: str, *answers: object) -> object:
+def guess(
+    question: str,
+    *answers: object,
+    on: object = None,
+    several: bool | int = False,
+    unit: str = '',
+    line_m: float | None = None,
+) -> object:
     """Return the answer that a student gives to a question; `...` if there is none yet.
 
     It says that it was taken. If there is a class, it is told in the background. The class counts
     the last guess of each student, of questions that the lesson has. An answer is a number, True or
     False, a text, or a few of them in a list, a tuple or a set.
+
+    `on` is what one answers on, and then the cell shows it, and the result is a `Guess`, which
+    changes with what one sets there, or what one types in place of the dots:
+
+    - a floor: your robot stands where you put it, in front of a wall; `line_m` (m) draws a line;
+    - a range, or a pair such as (0, 2) with a `unit`: a line on an axis;
+    - `bool`, a tuple, or a dict of words and values: options, of which one is chosen, `several`
+      (True), or just so many (a number).
+
+    What is no answer gets a sentence at once. Raises TypeError for another `on`.
     """
+    if on is not None:
+        return _guess_on(_kind(on, several, unit, line_m), question, *(answers or [...]))
     if len(answers) != 1:
         print(*wrap(ONE_ANSWER), sep='\n')
         return ...
@@ -122,6 +147,61 @@ def guess(question: str, *answers: object) -> object:
         _tell('guess', question=question, value=value)
         _outbox.say_trouble()
     return value
+
+
+def _kind(on: object, several: bool | int, unit: str, line_m: float | None) -> Kind:
+    # Slow to load, and most guesses have no floor.
+    from helpers.guesses import kind_of
+    from helpers.robot import Floor
+
+    if not isinstance(on, Floor):
+        return kind_of(on, several, unit)
+    from helpers.robot_view import Place
+
+    return Place(on, line_m)
+
+
+def _guess_on(kind: Kind, question: str, *answers: object) -> Guess:
+    """Show a guess, with what was typed, or else what was set before in this lesson."""
+    from helpers.guesses import Guess, show
+
+    typed = answers[0] if len(answers) == 1 else list(answers)
+    made, wrong = Guess(question, kind), ''
+    if typed is None or typed is ...:
+        made.value = _kept(question) if somebody_watches() else None
+    else:
+        try:
+            made.value = kind.read(typed)
+        except ValueError as problem:
+            wrong = str(problem)
+    show(made, lambda value: _keep(made))
+    if wrong:
+        print(*wrap(wrong), sep='\n')
+    elif typed is not None and typed is not ...:
+        _keep(made)
+        _outbox.say_trouble()
+    return made
+
+
+def _keep(made: Guess) -> None:
+    """Keep what was guessed, for the next kernel, and tell the class."""
+    if lesson := progress.this_lesson():
+        progress.add(f'{GUESSED} {lesson} {json.dumps([made.question, made.value])}')
+    _tell('guess', question=made.question, value=made.kind.told(made.value))
+
+
+def _kept(question: str) -> object:
+    """Return what was guessed before in this lesson, None for nothing. A class sees no old one."""
+    begins = f'{GUESSED} {progress.this_lesson()} '
+    if os.environ.get(BEGIN_EMPTY):
+        return None
+    found = None
+    for line in progress.lines_of(GUESSED):
+        with suppress(ValueError):
+            if line.startswith(begins):
+                asked, value = json.loads(line[len(begins) :])
+                found = value if asked == question else found
+    return found
 
 
 def join_class(address: str = '', code: str = '', name: str = '') -> None:

@@ -13,8 +13,10 @@ from collections.abc import Set
 from numbers import Integral, Real
 
 from IPython import get_ipython
+from IPython.display import display
 
 from helpers.checks import classroom
+from helpers.guesses import Gap, Guess
 from helpers.notebook import can_ask
 
 NO_GUESS = 'No guess yet. Write one in place of the three dots, run that cell, then this one again.'
@@ -40,12 +42,18 @@ def compare_prediction(
     its own unit. Choose it wide enough for the slowest machine: then the verdict stays the same.
     The right answer is then printed for a student only, not in a run without one.
 
+    For a guess that was made in a picture, `outcome` is what its kind compares: the robot, a
+    number, or what came out of the options. The gap is shown there, in one sentence.
+
     `because` is a sentence that explains the outcome. It is printed after any guess. If there is no
     guess yet, a student is asked for one; a run without a student, as in CI, prints the answer. A
     guess of the wrong kind gets a sentence that says what to do: it raises nothing.
 
     Raises TypeError for an outcome of another kind.
     """
+    if isinstance(guess, Guess):
+        _compare(question, guess, outcome, tolerance, because)
+        return
     outcome, guess = _plain(outcome), _plain(guess)
     wanted = _kind(outcome)
     if wanted is None:
@@ -71,6 +79,25 @@ def compare_prediction(
         answer = f' Here it was {outcome:.4g}.'
     print(f'  Your guess: {_written(guess)}. Verdict: {verdict}.{answer}')
     classroom.tell_outcome(question, outcome)
+    if because:
+        print(f'  {because}')
+
+
+def _compare(
+    question: str, guess: Guess, measured: object, tolerance: float, because: str | None
+) -> None:
+    """Show the gap between a guess that was made in a picture and what came out."""
+    outcome = guess.kind.outcome(_plain(measured), guess.run, tolerance)
+    print(question)
+    if guess.value is None:
+        if _has_student():
+            print(f'  No guess yet. {guess.kind.asks} Then run this cell again.')
+            return
+        if answer := guess.kind.answer(outcome):
+            print(f'  The answer is {answer}.')
+    else:
+        display(Gap(guess, outcome))
+        classroom.tell_outcome(question, guess.kind.told(_plain(outcome['at'])))
     if because:
         print(f'  {because}')
 

@@ -66,8 +66,10 @@ def expect(
     if within is None:
         return _is_equal(found, right) or f'{what} {_value(found, unit)}, not {_value(right, unit)}'
     is_number = isinstance(found, Real) and not isinstance(found, bool)
-    if is_number and (found == right or abs(found - right) < within):
-        return True
+    if is_number:
+        found = float(found)  # not what a type of the student's own calls equal
+        if found == right or abs(found - right) < within:
+            return True
     said = _measured(found, within, unit) if is_number else _value(found, '')
     return f'{what} {said}, not {_measured(right, within, unit)}'
 

@@ -13,15 +13,17 @@ from helpers.replay.actions import ActionRecording, replay_action
 from helpers.replay.calls import replay_calls
 from helpers.replay.free import FreePlay
 from helpers.replay.levels import level
-from helpers.replay.replays import Replay, replay, side_by_side
-from helpers.replay.script import attribute, script, source, style
+from helpers.replay.replays import Replay, picture_of, replay, side_by_side
+from helpers.replay.script import attribute, javascript, script, source, style
 
 __all__ = [
     'ActionRecording',
     'FreePlay',
     'Replay',
     'attribute',
+    'javascript',
     'level',
+    'picture_of',
     'replay',
     'replay_action',
     'replay_calls',

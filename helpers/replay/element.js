@@ -19,6 +19,13 @@ function seen(svg, words) {
   return svg;
 }
 
+// The picture of an image, as a part of the page: its ink is that of the page.
+function drawing(image) {
+  const text = decodeURIComponent(image.src.slice(image.src.indexOf(',') + 1));
+  const svg = new DOMParser().parseFromString(text, 'image/svg+xml').documentElement;
+  return seen(svg, image.alt);
+}
+
 // What replays, levels and free play have of their own on a page.
 function wake(root, name) {
   root.classList.add('replay-on');

@@ -115,11 +115,15 @@ class Replay:
 
 def figure(run: Run, svg: str) -> str:
     """Return the picture of a run with words for it, below the name of one of several runs."""
-    caption = f'<figcaption>{escape(run.name)}</figcaption>' if run.name else ''
-    words = escape(f'{run.name}: {run.words}' if run.name else run.words)
+    return picture_of(svg, f'{run.name}: {run.words}' if run.name else run.words, run.name)
+
+
+def picture_of(svg: str, words: str, name: str = '') -> str:
+    """Return an SVG as an image of a page, with words for it, below a name."""
+    caption = f'<figcaption>{escape(name)}</figcaption>' if name else ''
     # As an address, percent signs are shorter than base64.
     address = f'data:image/svg+xml,{quote(svg.replace(chr(34), chr(39)), safe=SAFE)}'
-    return f'<figure>{caption}<img alt="{words}" src="{address}"></figure>'
+    return f'<figure>{caption}<img alt="{escape(words)}" src="{address}"></figure>'
 
 
 def replay(

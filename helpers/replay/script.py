@@ -59,10 +59,12 @@ def played(kind: str, record: dict, says: str, *names: str) -> str:
     )
 
 
-def javascript(function: str, *arguments) -> list | dict | str:
-    """Return what a function of stories.js or picture.js returns, here in Python."""
+def javascript(
+    function: str, *arguments, files: tuple[str | Path, ...] = ('circle.js', *DRAWN)
+) -> list | dict | str:
+    """Return what a function of these files returns, here in Python: without a page."""
     context = Context()
-    context.eval(COLOURS + ''.join(map(source, ('circle.js', *DRAWN))))
+    context.eval(COLOURS + ''.join(map(source, files)))
     given = ', '.join(map(json.dumps, arguments))
     return json.loads(context.eval(f'JSON.stringify({function}({given}))'))
 

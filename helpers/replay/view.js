@@ -13,20 +13,20 @@ function pace(us) {
   return +(power * [10, 7, 5, 4, 3, 2, 1.5, 1].find(n => n * power <= 1.2 * needed)).toPrecision(2);
 }
 
-// The picture of a run, as a part of the page: its ink is that of the page.
-function drawing(image) {
-  const text = decodeURIComponent(image.src.slice(image.src.indexOf(',') + 1));
-  const svg = new DOMParser().parseFromString(text, 'image/svg+xml').documentElement;
-  return seen(svg, image.alt);
-}
-
 // The lists and the picture of one run. A short one has its times in milliseconds. What comes later is
 // covered as long as the replay is new.
-function panel(run, record, image, [from, until], grouped, short, isNew) {
+function panel(run, record, image, [from, until], grouped, short, isNew, counts) {
   const { setup, name } = record;
   const many = setup.callbacks.length > 1;
   const names = ['threads', ...(grouped ? ['groups'] : []), 'queue', ...(many ? [] : ['lost'])];
   const { rows, draw } = board(setup, names, { losses: run.scan().length });
+  const counted = counts && rows.find(one => one.querySelector('.replay-lost'));
+  const count = element('summary', {}, element('span', { class: 'replay-count' }));
+  if (counted) {
+    counted.firstChild.remove();
+    counted.firstChild.className = '';
+    counted.firstChild.replaceChildren(element('details', {}, count, ...counted.firstChild.childNodes));
+  }
   const time = element('span', { class: 'replay-time' });
   const circle = run.end && ring();
   const svg = drawing(image);
@@ -41,6 +41,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew) {
     const { state, says } = run.seek(position);
     const now = circle ? circleOf(setup, state) : { stuck: [] };
     draw(state, now.stuck);
+    count.firstChild.textContent = `${state.lost.length} lost`;
     circle?.draw(now, run.end);
     point(us ?? 1e6 * state.now);
     return run.says?.(position) ?? says;
@@ -84,7 +85,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew) {
 function show(root, record) {
   // One that has no setup is the drive of a robot: see drive.js.
   const runs = record.runs.map(one => {
-    const run = one.setup ? walk(one) : drive(one);
+    const run = one.setup ? walk(one) : drive(one, root);
     return typeof ring === 'undefined' ? run : close(run, one);
   });
   const own = runs.map(run => run.scan());
@@ -102,7 +103,10 @@ function show(root, record) {
   const stops = own.map((found, i) => found.map(step => counts[i].indexOf(step)));
   const losses = stops.flat().sort((a, b) => a - b);
   const named = (who, text) => (record.runs[who].name ? `${record.runs[who].name}: ` : '') + text;
-  const outcome = record.runs.flatMap((one, who) => (one.outcome ?? runs[who].end ? [named(who, one.outcome ?? runs[who].end.says)] : [])).join(' ');
+  const outcome = () => record.runs.flatMap((one, who) => {
+    const says = runs[who].outcome?.() ?? runs[who].end?.says;
+    return says ? [named(who, says)] : [];
+  }).join(' ');
   // It opens where it tells most: at the bump of the drive, else at the last loss, else at the end.
   // A page whose reader is to guess first opens it at its start.
   const drives = record.runs.flatMap((one, who) => (one.setup ? [] : [who]));
@@ -119,7 +123,7 @@ function show(root, record) {
   const images = [...root.querySelectorAll('figure > img')];
   // One thread that runs one callback needs no group to be understood.
   const grouped = record.runs.some(({ setup }) => setup?.callbacks.length > 1 || setup?.threads.length > 1);
-  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped, length < SHORT_US, hides && drives.length)
+  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped, length < SHORT_US, hides && drives.length, record.runs.some(other => other.strip))
     : floor(runs[i], one, drawing(images[i]))));
   const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
   const slider = element('input', {
@@ -179,7 +183,7 @@ function show(root, record) {
       const { who } = steps.slice(0, position).findLast(({ told }) => told) ?? {};
       const text = texts[who] ?? (who === undefined ? '' : sentence(who, counts[who][position]));
       // A text that is set again is read out again.
-      const now = (position === last && outcome) || (text ? named(who, text) : 'Nothing has happened yet. Step: →');
+      const now = (position === last && outcome()) || (text ? named(who, text) : 'Nothing has happened yet. Step: →');
       if (says.textContent !== now) says.textContent = now;
     }
     slider.value = position;
@@ -321,7 +325,7 @@ function show(root, record) {
     root.classList.add('replay-new');
     says.textContent = 'Have you guessed? Then play it.';
     shown.nextElementSibling.remove(); // it tells the end
-  } else if (bump !== undefined && outcome) says.textContent = outcome;
+  } else if (bump !== undefined && outcome()) says.textContent = outcome();
   nameButton();
 }
 

@@ -21,7 +21,7 @@ from helpers.robot.body import MAX_ACCELERATION, MAX_TURN_ACCELERATION, RADIUS_M
 from helpers.robot.drivers import KIND, TURTLEBOT3, Driver
 from helpers.robot.floor import CORRIDOR, EMPTY, FLOORS, ROOMS, Floor, Pose
 from helpers.robot.messages import ON_THE_FLOOR, odometry_message
-from helpers.robot.record import DriveRecord, Event, Scan
+from helpers.robot.record import Command, DriveRecord, Event, Scan
 from helpers.robot.robot import Robot, speeds_of
 from helpers.robot.sensors import RANGE_MAX, SLIP_SPEED, VARIANCES, without_noise
 from helpers.robot.trip import trip
@@ -41,6 +41,7 @@ __all__ = [
     'SLIP_SPEED',
     'TURTLEBOT3',
     'VARIANCES',
+    'Command',
     'DriveRecord',
     'Driver',
     'Event',

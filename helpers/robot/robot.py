@@ -51,8 +51,9 @@ class Robot(Node):
     With `sim_time=True` time passes in `run` alone, as fast as the program, and `/clock` says it.
     With `spin=False` the caller spins it, and no session is needed.
 
-    `blind = True` takes the laser away: all its ranges are NaN from then on. `clock_ahead_s` is by
-    how much (s) its stamps are ahead of the time.
+    `blind = True` takes the laser's sight away: all its ranges are NaN from then on. With
+    `silent = True` the laser publishes no scan. `clock_ahead_s` is by how much (s) the stamps are
+    ahead of the time.
 
     Raises RuntimeError where no session is open, TypeError for a floor that is none, and ValueError
     for a start in a wall and for a name that another node has.
@@ -83,8 +84,8 @@ class Robot(Node):
         self.driver = driver
         self._body = Body(floor, start, driver)
         self._sensors = Sensors(seed, noise, slip, mounting, driver)
-        # What can go wrong: a laser that measures nothing, and a clock that is ahead of the others.
-        self.blind, self.clock_ahead_s = False, 0.0
+        # What can go wrong: a laser that measures or says nothing, and a clock that is ahead.
+        self.blind, self.silent, self.clock_ahead_s = False, False, 0.0
         if spin:
             session = current_session()
             check_names(session.node, name, namespace.strip('/'), driver)
@@ -309,13 +310,14 @@ class Robot(Node):
             )
             self._say('/tf', self._moving_frame)
             self._say(TRUTH, self._truth)
-        if number % SCAN_EVERY == 0:
+        if number % SCAN_EVERY == 0 and not self.silent:
             ranges, first, step = self._sensors.scan(body)
             if self.blind:
                 ranges = np.full_like(ranges, np.nan)
             scan = Scan(len(record.scans), body.t_s, stamp_ns, ranges, first, step)
             record.scans.append(scan)
             self._say('scan', lambda: messages.laser_scan(self._header('base_scan'), scan, driver))
+        if number % SCAN_EVERY == 0:
             self._say(BUMPER, lambda: Bool(data=body.touching))
         if number % PICTURE_EVERY == 0:
             self._say(CAMERA, self._picture)

@@ -1,7 +1,8 @@
 // The drive of a robot: one more run under the slider of view.js, with a floor instead of lists.
 
 // Return what walk.js returns of a run: times, seek, scan. And `told`, which steps say something.
-function drive({ step, poses, commands, scans, events, bumps }) {
+function drive({ step, poses, commands, scans, events, bumps, guess, strip = Infinity, outcome: said }, root) {
+  const kept = guess && memory(root, guess);
   const turn = w => (w ? ` and ${w.toFixed(2)} rad/s` : '');
   const speed = ([, v, w]) => `${v.toFixed(2)} m/s${turn(w)}`;
   const told = one => (one[1] || one[2] ? `The robot is told to drive ${speed(one)}.` : 'The robot is told to stop.');
@@ -37,23 +38,32 @@ function drive({ step, poses, commands, scans, events, bumps }) {
     const { x, y, yaw } = pose(ms);
     const hits = ranges.map((range, k) => {
       const angle = yaw + first + (last - first) * k / (ranges.length - 1);
-      return [x + range / 100 * Math.cos(angle), y + range / 100 * Math.sin(angle)].map(at => at.toFixed(2)).join(' ');
+      const reach = Math.min(range / 100, strip / Math.max(Math.abs(Math.sin(angle)), 1e-6));
+      return [x + reach * Math.cos(angle), y + reach * Math.sin(angle)].map(at => at.toFixed(2)).join(' ');
     });
     return `M${x} ${y}L${hits.join('L')}z`;
   }
 
   // All that is seen at a time.
   function look(ms) {
-    const command = latest(commands, ms);
+    const till = Math.min(ms, bumps[0] ?? ms); // what the brake acted on at the bump stays
+    const command = latest(commands, till);
     const taken = command && command[3] >= 0 ? scans.findLast(([, seq]) => seq <= command[3]) : undefined;
     const now = latest(scans, ms);
     return {
-      ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]), age: taken && (ms - taken[0]) / 1000,
+      ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]), age: taken && (till - taken[0]) / 1000,
       told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}, ${seconds(command[4])} s old`) : 'nothing yet',
     };
   }
 
+  // With a guess the last sentence says how far it was from what came out.
+  function outcome() {
+    const value = guess && kept.get();
+    return value === null || value === undefined ? said : placeKind.gap(guess, value, guess.outcome).says;
+  }
+
   return {
+    kept, outcome,
     times: steps.map(([ms]) => 1000 * ms),
     told: steps.map(([, said]) => said !== ''),
     ranks: steps.map(([, , rank]) => rank), // what is said while it plays: a stop or an event, above all a bump
@@ -98,7 +108,18 @@ function floor(run, record, svg) {
     const { x, y } = new DOMPoint(was.x, was.y + 1.3 * r).matrixTransform(find('robot').parentNode.transform.baseVal.consolidate().matrix);
     const half = ghost.getComputedTextLength() / 2;
     ghost.setAttribute('x', Math.min(Math.max(x, half + 8), wide - half - 8).toFixed(1));
-    ghost.setAttribute('y', Math.max(y - 6, 30).toFixed(1));
+    ghost.setAttribute('y', record.strip ? 26 : Math.max(y - 6, 30).toFixed(1));
+  }
+  const mine = run.kept && placeKind.yours(svg, record.guess);
+  const ended = run.times.at(-1) / 1000; // ms
+  let drawn = () => {};
+
+  // Your robot, once you have put it somewhere: also elsewhere on this page.
+  function guessed() {
+    const value = run.kept.get();
+    mine.node.style.display = value === null ? 'none' : '';
+    if (value !== null) mine.put(value);
+    drawn();
   }
   const [time, robot, told] = Array.from({ length: 3 }, () => element('span', { class: 'replay-time' }));
 
@@ -117,14 +138,24 @@ function floor(run, record, svg) {
     if (plays && counts[1] > hits) ringAt(svg, now, radius);
     [, hits] = counts;
     marks.forEach(([path, parts], i) => path.setAttribute('d', parts.slice(0, counts[i]).join('')));
+    drawn = () => mine?.measure(ms >= (record.bumps[0] ?? ended) - 1 ? now : null);
+    drawn();
     time.textContent = `${(ms / 1000).toFixed(2)} s`;
     robot.textContent = `${v.toFixed(2)} m/s, ${w.toFixed(2)} rad/s`;
     told.textContent = now.told;
     return run.says(position);
   }
 
-  const node = element('div', { class: 'replay-floor' }, ...(record.name ? [element('b', {}, record.name)] : []), svg,
+  const node = element('div', { class: record.strip ? 'replay-floor replay-lane' : 'replay-floor' }, ...(record.name ? [element('b', {}, record.name)] : []), svg,
     row('time', time), row('robot', robot), row('told', told));
+  if (mine) {
+    guessed();
+    document.addEventListener('guess', ({ detail }) => {
+      if (detail.question !== record.guess.question || !svg.isConnected) return;
+      run.kept.see(detail.value);
+      guessed();
+    });
+  }
   draw.always = true; // also between two steps
   return { node, draw };
 }

@@ -7,16 +7,18 @@ from html import escape
 
 from rclpy.subscription import Subscription
 
+from helpers.guesses import Guess
 from helpers.notebook import somebody_watches
 from helpers.replay import Replay, style
 from helpers.robot import Pose, Robot
-from helpers.robot_view.picture import DRIVE_CSS, floor_in_words, floor_picture
+from helpers.robot_view.picture import DRIVE_CSS, Seen, floor_in_words, floor_picture, is_lane
 from helpers.robot_view.replay import bumps, outcome, place, replay_drive, seconds
 from helpers.robot_view.scans import ScanRecording
 from helpers.ros import current_session
 
 PERIOD_S = 1 / 12
 EVERY = 5  # steps of the robot: a point of its path
+OLD_S = 0.5  # a scan that is older is worth a sentence
 NEWS_S = 3.0  # so long an event is shown
 # Those of view.js, in their places: nothing moves when the replay comes.
 CONTROLS = (
@@ -28,15 +30,18 @@ CONTROLS = (
 
 
 def watch(
-    robot: Robot, subscription: Subscription | None = None, name: str = ''
+    robot: Robot,
+    subscription: Subscription | None = None,
+    name: str = '',
+    guess: Guess | None = None,
 ) -> ScanRecording | None:
     """Show a robot while this cell runs, and its replay when the session closes.
 
     The replay is also there after an Interrupt, and alone where nobody watches, as under nbval.
 
     With a subscription to the robot's scans one sees, too, which scan its callback works on, how
-    old it is, and which ones wait. `name` is what the replay calls the drive. Returns its
-    recording.
+    old it is, and which ones wait. `name` is what the replay calls the drive. A `guess` of a place
+    is drawn, and the replay measures its gap. Returns the recording.
 
     Raises TypeError for anything but a robot and a subscription, ValueError for one that does not
     hear the scans, RuntimeError where no session is open.
@@ -45,15 +50,17 @@ def watch(
         raise TypeError(f'Only a robot can be watched, not {robot!r}.')
     session = current_session()
     recording = ScanRecording(robot, subscription) if subscription is not None else None
-    view = LiveView(robot, recording)
+    view = LiveView(robot, recording, guess)
 
     def end() -> None:
         # Who has watched sees the robot stay where it stopped.
         opens = 'end' if view.is_shown else 'bump'
         try:
-            shown = replay_drive(robot.record, recording, name, opens)
+            shown = replay_drive(robot.record, recording, name, opens, guess)
         except ValueError:  # interrupted where it does not add up, or heard by several threads
-            shown = replay_drive(robot.record, name=name, opens=opens)
+            shown = replay_drive(robot.record, name=name, opens=opens, guess=guess)
+        if guess is not None:
+            guess.run = shown.runs[0]
         view.stop(shown)
 
     view.start()
@@ -67,9 +74,12 @@ class LiveView:
     To update a display, unlike to make one, needs no cell: it moves, whatever the cell waits for.
     """
 
-    def __init__(self, robot: Robot, recording: ScanRecording | None) -> None:
-        self._record, self._recording = robot.record, recording
+    def __init__(
+        self, robot: Robot, recording: ScanRecording | None, guess: Guess | None = None
+    ) -> None:
+        self._record, self._recording, self._guess = robot.record, recording, guess
         self._display = None
+        self._took: int | None = None  # the scan of the last callback
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name='robot view', daemon=True)
 
@@ -115,24 +125,42 @@ class LiveView:
             seconds(record, now.t_s),
             scan_pose=place(record, scans[-1].t_s) if scans else None,
             ring_s=now.t_s - hit[-1].t_s if hit else None,
+            as_lane=is_lane(record.floor, [row[1:3] for row in poses]),
+            guess=self._guess,
+            seen=(seen := self._seen(hit[0].t_s if hit else now.t_s)),
         )
+        lane = ' replay-lane' if is_lane(record.floor, [row[1:3] for row in poses]) else ''
         told = 'nothing yet'
         if commands:
             _, v, w = commands[-1]
             told = f'{v:.2f} m/s' + (f' and {w:.2f} rad/s' if w else '')
         news = record.events[-1:]
         event = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
+        if not event and seen is not None and seen.age_s > OLD_S:
+            event = f'The brake works on a scan that is {seen.age_s:.1f} s old.'
         if hit:
             event = outcome(record)
         return (
             f'<div class="replay replay-on robot-live">{style(DRIVE_CSS)}{CONTROLS}'
             f'<p class="replay-says">{escape(event)}</p><div class="replay-runs">'
-            '<div class="replay-floor">'
+            f'<div class="replay-floor{lane}">'
             f'<span role="img" aria-label="{escape(floor_in_words(record.floor))}">{svg}</span>'
             f'{_row("time", f"{now.t_s:.2f} s")}{_row("robot", speeds(now.v, now.w))}'
             f'{_row("told", told)}</div>{self._queue(now.t_s)}</div>'
             f'<p>A drive on the floor {escape(record.floor.name)}.</p></div>'
         )
+
+    def _seen(self, now_s: float) -> Seen | None:
+        """Return the scan that a callback works on, or the last one that it worked on."""
+        if self._recording is None:
+            return None
+        runs, _ = self._recording.now(self._recording.depth)
+        if runs:
+            self._took = min(runs)
+        if self._took is None:
+            return None
+        scan = self._record.scans[self._took]
+        return Seen(scan, place(self._record, scan.t_s), now_s - scan.t_s)
 
     def _queue(self, now_s: float) -> str:
         """Return which message has a callback, and which wait."""
@@ -145,7 +173,11 @@ class LiveView:
         ]
         waiting = ''.join(f'<li><b>{seq}</b></li>' for seq in waits)
         busy = busy or ['<li class="replay-free">free</li>']
-        rows = _row('time', f'{now_s:.3f} s') + _row('callback', *busy) + _row('queue', waiting)
+        rows = (
+            _row('time', f'{now_s:.3f} s')
+            + _row('callback', ''.join(busy))
+            + _row('queue', waiting, 'replay-queue')
+        )
         return f'<div class="replay-run">{rows}</div>'
 
 
@@ -153,5 +185,6 @@ def speeds(v: float, w: float) -> str:
     return f'{v:.2f} m/s, {w:.2f} rad/s'
 
 
-def _row(name: str, *content: str) -> str:
-    return f'<div class="replay-row"><b>{name}</b><div><ul>{"".join(content)}</ul></div></div>'
+def _row(name: str, content: str, kind: str = '') -> str:
+    items = f'<ul class="{kind}">{content}</ul>'
+    return f'<div class="replay-row"><b>{name}</b><div>{items}</div></div>'

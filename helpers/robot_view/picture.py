@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from helpers.guesses import Guess
 from helpers.notebook import LOOK
 from helpers.robot import RADIUS_M, RANGE_MAX, Floor, Pose, Scan
 
@@ -21,9 +22,20 @@ WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor
 BEAMS = 40  # of a scan, in a picture
 WALL_M = 0.15  # of an outer wall
+LANE_M, WORDS_M = 0.5, 0.26  # of a lane: to each side of the robot, and beyond for words
 RING, RING_S = 30, 0.4  # pixels, and how long: around a bump, as drive.js draws it
+WORDS_Y = 26  # of what a lane says above
+SEES = 'the brake sees this, {:.1f} s ago'  # as drive.js says it
 DRIVE_CSS = Path(__file__).with_name('drive.css')
 ROBOT, WAITING, LOST = LOOK['robot'], LOOK['waiting'], LOOK['lost']
+
+
+class Seen(NamedTuple):
+    """What a callback works on: a scan, where it was made, and how old it is (s)."""
+
+    scan: Scan
+    pose: Pose
+    age_s: float
 
 
 class Later(NamedTuple):
@@ -45,14 +57,19 @@ def floor_picture(
     scan_pose: Pose | None = None,
     later: Later | None = None,
     ring_s: float | None = None,
+    as_lane: bool = False,
+    guess: Guess | None = None,
+    seen: Seen | None = None,
 ) -> str:
     """Return the SVG: the floor, the path through `points`, the robot at `pose` with its laser.
 
     `scan` was made at `scan_pose`, which is mostly a little behind `pose`. `seconds` are the places
     that get a dot, `bumps` those where it hit something, the last one `ring_s` ago. `later` is what
-    comes after `pose`: drive.js draws it when its time has come.
+    comes after `pose`: drive.js draws it when its time has come. `as_lane` draws only the strip of
+    a corridor, with room above and below it for words. `guess` is one of a place,
+    `seen` what the callback works on.
     """
-    x, y, right, above = edges(floor)
+    x, y, right, above = lane_edges(floor) if as_lane else edges(floor)
     scale = min((WIDTH - 2 * MARGIN) / (right - x), (HEIGHT - 2 * MARGIN) / (above - y))
     width, height = (scale * size + 2 * MARGIN for size in (right - x, above - y))
     r = max(RADIUS_M, SMALLEST / scale)  # on a large floor the robot is drawn larger than it is
@@ -61,13 +78,14 @@ def floor_picture(
     pale = ' stroke-opacity=".3"' if later else ''
     later = later or Later()
     start = floor.start
+    strip = LANE_M if as_lane else math.inf
     ring = f'M{start.x - r:.3f} {start.y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} 0'
     ring += f'a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
     parts = [
-        _floor(floor, scale),
-        f'<path class="fan" d="{fan(scan_pose or pose, scan)}" fill="{ROBOT}" fill-opacity=".16" '
-        f'stroke="{ROBOT}" stroke-opacity=".6"/>',
-        f'<path class="old" d="" fill="none" stroke="{WAITING}" '
+        _lane(floor) if as_lane else _floor(floor, scale),
+        f'<path class="fan" d="{fan(scan_pose or pose, scan, strip)}" fill="{ROBOT}" '
+        f'fill-opacity=".16" stroke="{ROBOT}" stroke-opacity=".6"/>',
+        f'<path class="old" d="{seen_from(seen, r, strip)}" fill="none" stroke="{WAITING}" '
         'stroke-width="2" stroke-dasharray="5 4"/>',
         f'<path class="all" d="{whole}" fill="none" stroke="{ROBOT}" stroke-width="2.6"{pale}/>',
         f'<path class="driven" d="{drawn}" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
@@ -92,17 +110,89 @@ def floor_picture(
             f'fill="none" stroke="{LOST}" stroke-opacity="{1 - part:.2f}" stroke-width="3" '
             'vector-effect="non-scaling-stroke"/>'
         )
-    left, below = 14 + scale * WALL_M, height - 14 - scale * WALL_M
+    if guess is not None:
+        parts.insert(2, _guess(guess, r, scale))
+    words = ''
+    if seen is not None:
+        across = MARGIN + scale * (seen.pose.x - x)
+        words = (
+            f'<text class="ghost" x="{min(max(across, 130), width - 130):.0f}" y="{WORDS_Y}">'
+            f'{SEES.format(seen.age_s)}</text>'
+        )
+    left, below = 14 + scale * WALL_M, height - 14 - scale * (WORDS_M if as_lane else WALL_M)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
         f'width="{width:.0f}" height="{height:.0f}" color="{LOOK["ink"]}" '
+        'preserveAspectRatio="xMinYMid" '
         f'font-family="system-ui, sans-serif" font-size="16"><g transform="translate('
         f'{MARGIN - scale * x:.1f} {height - MARGIN + scale * y:.1f}) '
         f'scale({scale:.2f} -{scale:.2f})" stroke-linejoin="round">{"".join(parts)}</g>'
         f'<path d="M{left:.0f} {below:.0f}v-6m0 3h{scale:.0f}m0-3v6" fill="none" '
         f'stroke="currentColor"/><text x="{left + scale / 2:.0f}" y="{below - 7:.0f}" '
-        'text-anchor="middle" fill="currentColor">1 m</text></svg>'
+        f'text-anchor="middle" fill="currentColor">1 m</text>{words}</svg>'
     ).replace('<path ', '<path vector-effect="non-scaling-stroke" ')
+
+
+def _guess(guess: Guess, r: float, scale: float) -> str:
+    """Return the line of a guess and the robot of the student, as place.js draws them."""
+    kind, you = guess.kind.record(), LOOK['you']
+    x, y, yaw = kind['start']
+    turned = f'translate({x} {y}) rotate({math.degrees(yaw):.1f})'
+    drawn = ''
+    if kind['line']:
+        drawn = (
+            f'<path d="M{kind["ahead"] - kind["line"]:.3f} {LANE_M}v-{2 * LANE_M}" '
+            'stroke="currentColor" stroke-width="2" stroke-dasharray="3 6"/>'
+            f'<text transform="translate({kind["ahead"] - kind["line"]:.3f} {-LANE_M}) '
+            f'scale({1 / scale:.5f} -{1 / scale:.5f})" y="18" text-anchor="middle" '
+            f'fill="currentColor">{escape(kind["label"])}</text>'
+        )
+    if guess.value is not None:
+        drawn += (
+            f'<circle class="you" cx="{kind["ahead"] - guess.value:.3f}" r="{r:.3f}" fill="{you}" '
+            f'fill-opacity=".25" stroke="{you}" stroke-width="3" '
+            'vector-effect="non-scaling-stroke"/>'
+            f'<text transform="translate({kind["ahead"] - guess.value:.3f} {-r:.3f}) '
+            f'scale({1 / scale:.5f} -{1 / scale:.5f})" y="18" text-anchor="middle" '
+            f'font-weight="600" fill="{you}">you</text>'
+        )
+    return f'<g transform="{turned}">{drawn}</g>'
+
+
+def is_lane(floor: Floor, poses: Iterable[Sequence[float]] = ()) -> bool:
+    """Return whether a floor is a corridor along x, and a robot (x, y, ...) stays in its strip."""
+    width, height = floor.size_m
+    boxes = any(wall.kind != 'wall' for wall in floor.walls)
+    if boxes or floor.places or not floor.walls or height > width / 2 or floor.start.yaw:
+        return False
+    return all(abs(y - floor.start.y) < LANE_M / 2 for _, y, *_ in poses)
+
+
+def lane_edges(floor: Floor) -> tuple[float, float, float, float]:
+    """Return from where to where a lane is drawn (x, y, x, y in m), with room for words."""
+    x, y, *_ = floor.start
+    (ahead, behind), _ = floor.ranges(x, y, np.array([0.0, math.pi]))
+    return (
+        x - float(behind) - WALL_M,
+        y - LANE_M - WORDS_M,
+        x + float(ahead) + WALL_M,
+        y + LANE_M + WORDS_M,
+    )
+
+
+def _lane(floor: Floor) -> str:
+    x, low, right, high = lane_edges(floor)
+    left, right, low, high = x + WALL_M, right - WALL_M, low + WORDS_M, high - WORDS_M
+    grid = ''.join(f'M{n} {low:.2f}V{high:.2f}' for n in range(math.ceil(left), math.ceil(right)))
+    walls = ''.join(
+        f'M{one:.2f} {low - WALL_M / 2:.2f}h{WALL_M}V{high + WALL_M / 2:.2f}h-{WALL_M}z'
+        for one in (left - WALL_M, right)
+    )
+    return (
+        f'<path d="M{left:.2f} {low:.2f}H{right:.2f}V{high:.2f}H{left:.2f}z" fill="currentColor" '
+        f'fill-opacity=".1"/><path d="{grid}" stroke="currentColor" stroke-opacity=".13"/>'
+        f'<path d="{walls}" fill="{LOOK["ink"]}"/>'
+    )
 
 
 def edges(floor: Floor) -> tuple[float, float, float, float]:
@@ -159,12 +249,24 @@ def crosses(poses: Sequence[Pose], r: float, a: float) -> str:
     )
 
 
-def fan(pose: Pose, scan: Scan | None) -> str:
-    """Return a path around what the laser sees from a pose."""
+def seen_from(seen: Seen | None, r: float, strip: float) -> str:
+    """Return a path around what a callback works on, and around the robot as it was."""
+    if seen is None:
+        return ''
+    x, y, _ = seen.pose
+    return (
+        f'{fan(seen.pose, seen.scan, strip)}M{x - r:.3f} {y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} '
+        f'0a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
+    )
+
+
+def fan(pose: Pose, scan: Scan | None, strip: float = math.inf) -> str:
+    """Return a path around what the laser sees from a pose, `strip` (m) to each side of it."""
     if scan is None:
         return ''
     angles, few = scan.drawn(BEAMS, RANGE_MAX)
     angles = pose.yaw + angles
+    few = np.minimum(few, strip / np.maximum(np.abs(np.sin(angles)), 1e-6))
     xs, ys = pose.x + few * np.cos(angles), pose.y + few * np.sin(angles)
     hits = 'L'.join(f'{x:.2f} {y:.2f}' for x, y in zip(xs.tolist(), ys.tolist(), strict=True))
     return f'M{pose.x:.2f} {pose.y:.2f}L{hits}z'

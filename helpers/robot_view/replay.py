@@ -7,13 +7,26 @@ from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from helpers.guesses import CSS, MEMORY, Guess
 from helpers.replay import Replay, replay
-from helpers.robot import RANGE_MAX, DriveRecord, Event, Pose, Scan
-from helpers.robot_view.picture import BEAMS, DRIVE_CSS, Later, floor_in_words, floor_picture
+from helpers.robot import RADIUS_M, RANGE_MAX, Command, DriveRecord, Event, Pose, Scan
+from helpers.robot_view.picture import (
+    BEAMS,
+    DRIVE_CSS,
+    LANE_M,
+    Later,
+    floor_in_words,
+    floor_picture,
+    is_lane,
+)
 from helpers.robot_view.scans import ScanRecording
+
+if TYPE_CHECKING:
+    from helpers.robot_view.place import Place
 
 # What a notebook keeps of a drive, at most: so it stays below 60 kB.
 POSES, SCANS, COMMANDS, EVENTS = 400, 50, 150, 50
@@ -33,9 +46,17 @@ class Drive:
     name: str = ''
     setup: None = None
     opens: str = 'bump'  # where it opens: at its first bump, if there is one, or at its 'end'
+    guess: Guess | None = None  # of a place on this floor
 
-    scripts = (Path(__file__).with_name('drive.js'),)
-    styles = (DRIVE_CSS,)
+    @property
+    def scripts(self) -> tuple[Path, ...]:
+        """The files that step through it."""
+        guessed = (*self.guess.kind.scripts, MEMORY) if self.guess else ()
+        return (*guessed, Path(__file__).with_name('drive.js'))
+
+    @property
+    def styles(self) -> tuple[Path, ...]:
+        return (DRIVE_CSS, CSS) if self.guess else (DRIVE_CSS,)
 
     @property
     def span_s(self) -> tuple[float, float]:
@@ -51,6 +72,11 @@ class Drive:
         times = np.linspace(0, end, count)
         poses = np.stack([np.interp(times, rows[:, 0], column) for column in columns], axis=1)
         return end / (count - 1) if end else EVERY_S, poses.round(3)
+
+    @property
+    def as_lane(self) -> bool:
+        """Whether its picture is the strip of a corridor."""
+        return is_lane(self.record_.floor, [row[1:3] for row in self.record_.poses])
 
     @property
     def telling_s(self) -> float:
@@ -76,6 +102,7 @@ class Drive:
             [hit for done, hit in hits if done],
             [dot for done, dot in dots if done],
             scan_pose=place(record, before[-1].t_s) if before else None,
+            as_lane=self.as_lane,
             later=Later(
                 points,
                 [hit for done, hit in hits if not done],
@@ -92,8 +119,10 @@ class Drive:
         step, poses = self.sampled()
         return {
             'name': self.name,
-            'outcome': outcome(self.record_),
+            'outcome': self.headline,
+            **({'guess': self._guessed()} if self.guess else {}),
             'step': round(step, 4),
+            **({'strip': LANE_M} if self.as_lane else {}),
             'poses': poses.tolist(),
             'scans': [
                 [
@@ -110,23 +139,77 @@ class Drive:
             'bumps': [round(1000 * bump.t_s) for bump in bumps(self.record_)],
         }
 
-    def commands(self) -> list[list[float]]:
-        """Return of each command [when, speed, turning, message, its age]; -1 is no message.
+    def _guessed(self) -> dict:
+        return {**self.guess.record(), 'outcome': self.ended(self.guess.kind)}
 
-        The message is that whose callback sent it. Commands arrive in the order in which they are
-        sent, also if several are late.
+    @property
+    def headline(self) -> str:
+        """What came out, and why, if one knows which scan the robot acted on."""
+        what, acted = outcome(self.record_), self.acted_on()
+        if acted is None:
+            return what
+        return f'{what.partition(" after ")[0].rstrip(".")}: the scan was {acted[0]:.1f} s old.'
+
+    def acted_on(self) -> tuple[float, float] | None:
+        """Return the age (s) of the scan that decided the end, and the speed until then (m/s).
+
+        It is that of the last command before the bump, at the bump; or that of the first command
+        after which the robot stood, when it came. None if no scan is known.
         """
-        rows, before = [], None
+        rows, hit = self._rows(), bumps(self.record_)
+        if hit:
+            rows = [row for row in rows if row[0].t_s <= hit[0].t_s]
+            decided = rows[-1:]
+            at_s = hit[0].t_s
+        else:
+            drives = [i for i, (command, _) in enumerate(rows) if command.v or command.w]
+            decided = rows[drives[-1] + 1 :][:1] if drives else []
+            at_s = decided[0][0].t_s if decided else 0.0
+        if not decided or decided[0][1] < 0:
+            return None
+        speeds = [command.v for command, _ in rows if command.v and command.t_s <= at_s]
+        return at_s - self.record_.scans[decided[0][1]].t_s, speeds[-1] if speeds else 0.0
+
+    def ended(self, guessed: Place) -> dict:
+        """Return where the robot ended: how far before what is ahead (m), what it hit, and why."""
+        hit = bumps(self.record_)
+        x, y, _ = place(self.record_, hit[0].t_s if hit else self.span_s[1])
+        what = ahead_of(self.record_, x, y)
+        cause, acted = '', self.acted_on()
+        if acted is not None:
+            age_s, speed = round(acted[0], 1), round(acted[1], 2)
+            did = 'acted' if hit else 'braked'
+            cause = (
+                f'It {did} on a scan that was {age_s:g} s old: '
+                f'{age_s:g} s × {speed:g} m/s = {age_s * speed:.2g} m.'
+            )
+        at = RADIUS_M if hit else round(guessed.distance_m(x, y), 2)
+        return {'at': at, 'hit': bool(hit), 'what': what, 'cause': cause}
+
+    def _rows(self) -> list[tuple[Command, int]]:
+        """Return each command with the number of the scan whose callback sent it, or -1.
+
+        Commands arrive in the order in which they are sent, also if several are late.
+        """
+        rows = []
         sent = deque([] if self.recording is None else self.recording.sent)
         for command in self.record_.commands:
-            message = -1, 0
+            message = -1
             own = [k for k, speeds in enumerate(sent) if speeds[1:3] == command[1:3]]
             if own and sent[own[0]][0] <= self.record_.started_s + command.t_s:
                 for _ in range(own[0]):  # they never arrived
                     sent.popleft()
-                *_, seq = sent.popleft()
-                if seq >= 0:
-                    message = seq, round(1000 * (command.t_s - self.record_.scans[seq].t_s))
+                *_, message = sent.popleft()
+            rows.append((command, message))
+        return rows
+
+    def commands(self) -> list[list[float]]:
+        """Return of each command [when, speed, turning, message, its age]; -1 is no message."""
+        rows, before = [], None
+        for command, seq in self._rows():
+            message = -1, 0
+            if seq >= 0:
+                message = seq, round(1000 * (command.t_s - self.record_.scans[seq].t_s))
             told = round(command.v, 3), round(command.w, 3)
             rows.append(((told != before), [round(1000 * command.t_s), *told, *message]))
             before = told
@@ -140,6 +223,7 @@ def replay_drive(
     recording: ScanRecording | None = None,
     name: str = '',
     opens: str = 'bump',
+    guess: Guess | None = None,
 ) -> Replay:
     """Return a drive to step through: the floor, and when `recording` is given, its queue beside.
 
@@ -147,6 +231,7 @@ def replay_drive(
     the robot, in one thread. With the mouse, keys or Play one sees what the robot saw, what it was
     told, and which scan it acted on. `name` is what this drive is called in words, so that one
     tells it from others of the page. It opens at the first bump, if there is one, or at the 'end'.
+    `guess`, of a place, is drawn, and the gap at the end.
 
     Raises TypeError for anything else, ValueError for a recording beside a drive in sim time, and
     what `helpers.replay.replay` raises.
@@ -159,7 +244,7 @@ def replay_drive(
     called = f'{name}: ' if name else ''
     summary = f'{called}A drive on the floor {record.floor.name}. The robot {end}.'
     if recording is None:
-        return Replay((Drive(record, summary, opens=opens),))
+        return Replay((Drive(record, summary, opens=opens, guess=guess),))
     if record.started_s is None:
         raise ValueError(
             'In sim time a drive and a recording share no clock: replay the drive alone.'
@@ -169,7 +254,7 @@ def replay_drive(
     (run,) = replay(table, recording.depth).runs
     # How many messages there were differs from run to run.
     words = run.summary.partition(', ')[2]
-    drive = Drive(record, summary, recording, opens=opens)
+    drive = Drive(record, summary, recording, opens=opens, guess=guess)
     after_s = drive.span_s[1] - run.moves[-1][0] / 1e6
     words = called + words[0].upper() + words[1:]
     run = replace(run, summary=words, time_label=TIME_LABEL, after_s=after_s)
@@ -201,9 +286,7 @@ def outcome(record: DriveRecord) -> str:
     """
     floor = record.floor
     if hit := bumps(record):
-        x, y, _ = place(record, hit[0].t_s)
-        kind = min(floor.walls, key=lambda wall: wall.distance(x, y)).kind
-        what = 'the wall' if kind == 'wall' else f'a {kind}'
+        what = ahead_of(record, *place(record, hit[0].t_s)[:2])
         return f'The robot hit {what} after {hit[0].t_s:.1f} s.'
     if not any(row.v or row.w for row in record.poses):
         return 'The robot did not move.'
@@ -214,6 +297,12 @@ def outcome(record: DriveRecord) -> str:
     kind = floor.walls[seen].kind
     what = 'the wall' if kind == 'wall' else f'a {kind}'
     return f'The robot stands, {distance:.2f} m before {what}.'
+
+
+def ahead_of(record: DriveRecord, x: float, y: float) -> str:
+    """Return the words for the nearest wall or box."""
+    kind = min(record.floor.walls, key=lambda wall: wall.distance(x, y)).kind
+    return 'the wall' if kind == 'wall' else f'a {kind}'
 
 
 def bumps(record: DriveRecord) -> list[Event]:

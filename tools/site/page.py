@@ -101,6 +101,11 @@ def is_replay(output: NotebookNode) -> bool:
     return AT_START[0] in output.get('data', {}).get('text/html', '')
 
 
+def is_guess(output: NotebookNode) -> bool:
+    """Return whether an output is a guess that one makes there."""
+    return '<div class="replay guess"' in output.get('data', {}).get('text/html', '')
+
+
 def _fold(cell: NotebookNode) -> None:
     """Fold what is read by few: the check and the solution of a task, and the imports.
 
@@ -111,6 +116,8 @@ def _fold(cell: NotebookNode) -> None:
         cell.metadata['tags'] = ['hide-cell', kind]
         # It runs in JupyterLab. Here it would hide what the code below it is.
         cell.source = code_of_solution(cell.source)
+    elif any(is_guess(output) for output in cell.outputs):
+        cell.metadata['tags'] = ['remove-input']
     elif _is_plumbing(cell):
         kind = 'imports'
         cell.metadata['tags'] = ['hide-input', kind]

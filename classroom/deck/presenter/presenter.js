@@ -23,6 +23,7 @@ let server; // { baseUrl, ask, open }
 let plan = []; // the rows of the timetable from its first lesson on: { minutes, file, steps }
 let markdown; // JupyterLab's parser
 let deck; // the notebook's panel that is shown as slides, or nothing
+let classGuesses = []; // what the page of the class shows on this slide: { question, values }
 let twice = {}; // a key that does something at its second press
 
 async function packageOf(name) {
@@ -90,6 +91,7 @@ function begin(app, tracker, actions, { makeRequest }, dialogs) {
     if (deck && event.target.closest?.('.jp-MarkdownCell')) event.stopImmediatePropagation();
   }, true);
   window.addEventListener('message', onGuesses);
+  document.addEventListener('class-wanted', tellClass);
   window.addEventListener('message', onNotesWindow);
   window.addEventListener('resize', () => deck && fit());
   // A dialog has no place on a projector, and would take the keys: a line says what it says, and its
@@ -428,10 +430,17 @@ async function showGuesses({ model, node }, place) {
   node.append(element('iframe', { id: 'deck-guesses', title: 'Guesses of the class', src }));
 }
 
+// Pictures on the slide draw the numbers that the class has guessed: those of now, and later ones.
+function tellClass() {
+  document.dispatchEvent(new CustomEvent('class', { detail: classGuesses }));
+}
+
 function onGuesses({ source, data }) {
   const frame = document.getElementById('deck-guesses');
   if (!deck || source !== frame?.contentWindow) return;
-  frame.style.height = `${Number(data)}px`;
+  frame.style.height = `${Number(data.height)}px`;
+  classGuesses = data.guesses;
+  tellClass();
   frame.scrollIntoView({ block: 'nearest' }); // many bars are more than the slide has room for
   // A click on "Show" took the focus: the keys of the deck want it back.
   if (document.activeElement === frame) focusCell();

@@ -2,6 +2,7 @@
 
 import math
 import threading
+from contextlib import contextmanager
 
 from geometry_msgs.msg import Twist
 from rclpy.parameter import Parameter
@@ -134,14 +135,17 @@ def brake_before_the_wall(Brake):
 def speeds_after(make_brake, scans, **options):
     """Let a brake hear scans one by one. Return the speeds that it commands, and what it looks at.
 
-    A scan is what `look` says of it, in metres, and its age in seconds. Looks are the numbers of
-    the scans.
+    A scan is what `look` says of it, in metres, or the error that it raises, and its age in
+    seconds. Looks are the numbers of the scans.
     """
     looked_at = []
 
     def look(message):
         looked_at.append(number_of(message))
-        return scans[looked_at[-1]][0]
+        sees = scans[looked_at[-1]][0]
+        if isinstance(sees, Exception):
+            raise sees
+        return sees
 
     with Bench() as bench:
         commands = bench.hear('cmd_vel', Twist)
@@ -336,12 +340,24 @@ def a_place_for_one(Newest):
         thread.join(timeout=2)
         return found == [7] or 'a thread that waits in take is not woken by put'
 
+    def stays_closed():
+        place = Newest()
+        place.put(1)
+        place.close()
+        place.put(2)
+        found = []
+        thread = threading.Thread(target=lambda: found.append(place.take()), daemon=True)
+        thread.start()
+        thread.join(timeout=2)
+        return expect(found, [None], '1 was put, close was called, 2 was put. Taken:')
+
     hint = 'The list holds one scan or none: self.waiting = ...'
     return [
         ('1, 2, 3 are put: 3 is taken', lambda: takes([3], [1, 2, 3]), hint),
         ('then 4, 5 are put: 5 is taken', lambda: takes([3, 5], [1, 2, 3], [4, 5]), hint),
         ('the replaced ones are forgotten', forgets, hint),
         ('a thread that waits is woken', wakes, 'put must notify, inside the lock.'),
+        ('closed, it stays closed', stays_closed, 'Leave close and take as they are.'),
     ]
 
 
@@ -366,11 +382,18 @@ def a_worker(NewestBrake):
         return expect([*dict.fromkeys(numbers)], [0, 20], 'of 21 scans, the worker looked at')
 
     def commands(right, scans, **options):
-        speeds, _ = speeds_after(make, scans, depth=1, **options)
-        return expect(speeds, right, f'of scans at {named(scans)} it commands')
+        with errors_of_threads() as errors:
+            speeds, _ = speeds_after(make, scans, depth=1, **options)
+        found = expect(speeds, right, f'of scans at {named(scans)} it commands')
+        if found is not True and errors:
+            return f'the worker ended with {sentence(errors[0])}'
+        return found
 
     def named(scans):
-        return ', '.join(f'{metres} m ({age_s} s old)' for metres, age_s in scans)
+        return ', '.join(
+            'an error in the look' if isinstance(sees, Exception) else f'{sees} m ({age_s} s old)'
+            for sees, age_s in scans
+        )
 
     def brakes():
         return commands([0.5, 0.0, 0.5], [(2.0, 0), (0.4, 0), (0.9, 0)])
@@ -379,16 +402,33 @@ def a_worker(NewestBrake):
         scans = [(2.0, 0), (2.0, 30), (2.0, -30), (2.0, 0)]
         return commands([0.5, 0.0, 0.0, 0.5], scans, most_s=5)
 
+    def survives_an_error():
+        scans = [(2.0, 0), (KeyError('lens'), 0), (2.0, 0), (ValueError('dust'), 0), (0.4, 0)]
+        return commands([0.5, 0.0, 0.5, 0.0, 0.0], scans)
+
+    def says_the_error():
+        with Bench() as bench, errors_of_threads():
+            brake = make(1, look=lambda scan: 1 / 0)
+            commands = bench.hear('cmd_vel', Twist)
+            bench.spin(brake)
+            say_and_wait(bench, 'scan', scan(0), commands)
+            bench.wait(lambda: bench.log('brake'), 1.0)
+            lines = bench.log('brake')
+        return any(line.startswith('[ERROR]') for line in lines) or 'nothing is logged as an error'
+
     def worker_ends():
-        errors = []
-        threading.excepthook = lambda error: errors.append(error.exc_value)
-        with ros_session():
+        with errors_of_threads() as errors, ros_session():
             brake = NewestBrake(1)
+            brake.newest.close()
+            brake.scan_callback(scan(0))  # it comes after the end
+            brake.worker.join(timeout=2)
+            goes_on = brake.worker.is_alive()
         if errors:
             return f'it ended with {sentence(errors[0])}'
-        return not brake.worker.is_alive() or 'it has not ended 5 s after None'
+        return not goes_on or 'it has not ended 2 s after close()'
 
     looks = 'super().scan_callback(scan) tests, looks and commands.'
+    fails = 'Inside the loop: try: ... except Exception as error: ...'
     return [
         ('stop is received while it looks', stop_is_heard, 'Slow work does not belong there.'),
         (
@@ -398,5 +438,18 @@ def a_worker(NewestBrake):
         ),
         ('it brakes as before', brakes, looks),
         ('it stops for a scan that is old, or from the future', tests_the_age, looks),
+        ('a look that fails: it stops, and goes on with the next scan', survives_an_error, fails),
+        ('it logs the error', says_the_error, fails),
         ('its worker ends', worker_ends, 'Test for None first: None ends the loop.'),
     ]
+
+
+@contextmanager
+def errors_of_threads():
+    """Keep the errors that end threads, in place of printing them."""
+    errors, before = [], threading.excepthook
+    threading.excepthook = lambda error: errors.append(error.exc_value)
+    try:
+        yield errors
+    finally:
+        threading.excepthook = before

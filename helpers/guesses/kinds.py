@@ -1,0 +1,213 @@
+"""The kinds of a guess that need no floor: a level on an axis, and options."""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from pathlib import Path
+
+from helpers.guesses.guess import Kind
+
+HERE = Path(__file__).parent
+YES, NO = {'yes', 'y', 'true'}, {'no', 'n', 'false'}
+MOST_STEPS = 100  # of the keys, from one end of an axis to the other
+
+
+@dataclass(frozen=True)
+class Level:
+    """A number on an axis from `low` to `high`, whole if both are whole, in `unit`.
+
+    Raises ValueError unless `low` is below `high`.
+    """
+
+    low: float
+    high: float
+    unit: str = ''
+
+    scripts = (HERE / 'level.js',)
+
+    def __post_init__(self) -> None:
+        if not self.low < self.high:
+            raise ValueError(f'An axis goes up, and this one from {self.low} to {self.high}.')
+
+    @property
+    def is_whole(self) -> bool:
+        return isinstance(self.low, int) and isinstance(self.high, int)
+
+    @property
+    def asks(self) -> str:
+        return 'Draw your line on the axis.'
+
+    @property
+    def forms(self) -> str:
+        of = f' of {self.unit}' if self.unit else ''
+        kind = 'a whole number' if self.is_whole else 'a number'
+        return f'Typed in place of the dots: {kind}{of} from {self.low} to {self.high}.'
+
+    def record(self) -> dict:
+        step = 1 if self.is_whole else (self.high - self.low) / MOST_STEPS
+        return {
+            'kind': 'level',
+            'low': self.low,
+            'high': self.high,
+            'unit': self.unit,
+            'step': step,
+        }
+
+    def picture(self) -> str:
+        return ''
+
+    def words(self) -> str:
+        return f'An axis from {self.low} to {self.high} {self.unit}'.rstrip() + '.'
+
+    def read(self, typed: object) -> float:
+        """Return a number, also of a text such as '0,9 s'."""
+        number = number_of(typed, self.unit)
+        if number is None or (self.is_whole and number != int(number)):
+            raise ValueError(f'{typed!r} is no answer. {self.forms}')
+        if not self.low <= number <= self.high:
+            raise ValueError(f'{typed!r} is not on the axis. {self.forms}')
+        return int(number) if self.is_whole else number
+
+    def told(self, value: float) -> float:
+        return value
+
+    def outcome(self, measured: float, run: object, tolerance: float) -> dict:
+        return {'at': measured, 'tolerance': tolerance}
+
+    def answer(self, outcome: Mapping) -> str:
+        return '' if outcome['tolerance'] else f'{outcome["at"]}'
+
+
+@dataclass(frozen=True)
+class Options:
+    """Some options, of which one is chosen, or `several`: any number, or just so many.
+
+    `values` are the options by the words that a page shows.
+    """
+
+    values: Mapping[str, object]
+    several: bool | int = False
+
+    scripts = (HERE / 'options.js',)
+
+    @property
+    def asks(self) -> str:
+        if self.several is True:
+            return 'Choose all that you expect.'
+        return f'Choose {self.several}.' if self.several else 'Choose one.'
+
+    @property
+    def forms(self) -> str:
+        names = [repr(value) for value in self.values.values()]
+        if self.several:
+            return f'Typed in place of the dots: a list or a set, such as [{", ".join(names[:2])}].'
+        return f'Typed in place of the dots: {", ".join(names[:-1])} or {names[-1]}.'
+
+    def record(self) -> dict:
+        several = self.several if self.several is not True else 0
+        return {
+            'kind': 'options',
+            'names': [*self.values],
+            'several': several if self.several is not False else None,
+        }
+
+    def picture(self) -> str:
+        return ''
+
+    def words(self) -> str:
+        return f'Options: {", ".join(self.values)}.'
+
+    def read(self, typed: object) -> list[int] | int:
+        """Return the place of an option, or the places of several, in their order."""
+        if not self.several:
+            [place] = self._places([typed])
+            return place
+        if isinstance(typed, str):
+            typed = [
+                part for part in typed.replace(',', ' ').split() if part not in ('and', 'none')
+            ]
+        elif not isinstance(typed, Collection) or isinstance(typed, Mapping):
+            typed = [typed]
+        places = sorted(set(self._places(typed)))
+        if self.several is not True and len(places) != self.several:
+            raise ValueError(f'These are {len(places)}, and {self.several} are asked for.')
+        return places
+
+    def _places(self, typed: Iterable) -> list[int]:
+        found = []
+        for one in typed:
+            same = [
+                i
+                for i, (name, value) in enumerate(self.values.items())
+                if is_same(one, value, name)
+            ]
+            if not same:
+                raise ValueError(f'{one!r} is none of the options. {self.forms}')
+            found.append(same[0])
+        return found
+
+    def told(self, value: list[int] | int) -> list[str] | str:
+        names = [*self.values]
+        return [names[place] for place in value] if isinstance(value, list) else names[value]
+
+    def outcome(self, measured: object, run: object, tolerance: float) -> dict:
+        """Return the places of what was measured. Raises ValueError for what is no option."""
+        if self.several:
+            return {'at': sorted(set(self._places([*measured])))}
+        return {'at': self._places([measured])[0]}
+
+    def answer(self, outcome: Mapping) -> str:
+        at = outcome['at']
+        names = [*self.values]
+        return ', '.join(names[i] for i in (at if isinstance(at, list) else [at])) or 'none'
+
+
+def kind_of(on: object, several: bool | int = False, unit: str = '') -> Kind:
+    """Return the kind of a guess that `on` names: `bool`, an axis, or options.
+
+    With a unit, a pair of numbers is an axis.
+
+    Raises TypeError for anything else.
+    """
+    if isinstance(on, Level | Options):
+        return on
+    if on is bool:
+        return Options({'yes': True, 'no': False})
+    if unit and isinstance(on, tuple) and len(on) == 2:
+        return Level(*map(float, on), unit)
+    if isinstance(on, range) and not several:
+        return Level(on[0], on[-1], unit)
+    if isinstance(on, Mapping):
+        return Options(dict(on), several)
+    if isinstance(on, Collection) and not isinstance(on, str) and len(on) > 1:
+        values = sorted(on, key=str) if isinstance(on, AbstractSet) else on
+        return Options({str(value): value for value in values}, several)
+    raise TypeError(f'A guess is made on a floor, an axis or options, not on {on!r}.')
+
+
+def number_of(typed: object, unit: str = '') -> float | None:
+    """Return the number that was typed, also as a text with its unit; None if it is none."""
+    if isinstance(typed, str):
+        text = typed.strip().removesuffix(unit).strip().replace(',', '.')
+        try:
+            typed = float(text)
+        except ValueError:
+            return None
+    if isinstance(typed, bool) or not isinstance(typed, numbers.Real):
+        return None
+    return float(typed)
+
+
+def is_same(typed: object, value: object, name: str) -> bool:
+    """Return whether what was typed means this option: 'no' is False, and 'a' is 'A'."""
+    if isinstance(typed, str):
+        text = typed.strip().casefold()
+        if isinstance(value, bool):
+            return text in (YES if value else NO)
+        return text in (name.casefold(), str(value).casefold())
+    if isinstance(value, bool) != isinstance(typed, bool):
+        return False
+    return bool(typed == value)

@@ -1,0 +1,88 @@
+// A level: a number on an axis. `said` and `gap` need no page.
+const levelKind = (() => {
+  const [WIDE, TALL, LEFT, RIGHT, LINE] = [800, 130, 40, 40, 84];
+  const rounded = ({ step }, value) => +(Math.round(value / step) * step).toFixed(3);
+  const named = ({ unit }, value) => [`${+value.toFixed(3)}`, unit].filter(Boolean).join(' ');
+
+  const said = (record, value) => `${named(record, value)}.`;
+
+  function gap(record, value, { at, tolerance }) {
+    const right = Math.abs(value - at) <= tolerance;
+    const exact = +at.toPrecision(3);
+    if (right) return { right, says: `Right: it is ${named(record, exact)}.` };
+    const whole = Number.isInteger(record.step);
+    const [much, little] = whole ? ['many', 'few'] : ['much', 'little'];
+    const far = named(whole ? {} : record, +Math.abs(value - at).toPrecision(2));
+    return { right, says: `It is ${named(record, exact)}: you said ${far} too ${value > at ? much : little}.` };
+  }
+
+  const svgElement = (name, attributes = {}, text = '') => {
+    const made = document.createElementNS('http://www.w3.org/2000/svg', name);
+    Object.entries(attributes).forEach(([key, one]) => made.setAttribute(key, one));
+    made.textContent = text;
+    return made;
+  };
+
+  function draw(record, image, set) {
+    const { low, high, step, unit, outcome } = record;
+    const x = value => LEFT + (WIDE - LEFT - RIGHT) * (value - low) / (high - low);
+    const svg = svgElement('svg', { viewBox: `0 0 ${WIDE} ${TALL}`, 'font-size': 18, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' });
+    const rough = (high - low) / 8;
+    const power = 10 ** Math.floor(Math.log10(rough));
+    const tick = Math.max([1, 2, 5, 10].find(n => n * power >= rough) * power, Number.isInteger(step) ? 1 : 0);
+    svg.append(svgElement('path', { d: `M${LEFT} ${LINE}H${WIDE - RIGHT}`, stroke: 'currentColor', 'stroke-width': 2 }));
+    for (let n = Math.ceil(low / tick); n * tick <= high + 1e-9; n += 1) {
+      svg.append(svgElement('path', { d: `M${x(n * tick)} ${LINE}v8`, stroke: 'currentColor', 'stroke-width': 2 }),
+        svgElement('text', { x: x(n * tick), y: LINE + 28, 'text-anchor': 'middle' }, `${+(n * tick).toPrecision(6)}`));
+    }
+    svg.append(svgElement('text', { x: WIDE - RIGHT, y: TALL - 2, 'text-anchor': 'end' }, unit));
+    const you = svgElement('g', { class: 'you', tabindex: outcome ? -1 : 0, role: 'slider', 'aria-label': 'Your line', 'aria-valuemin': low, 'aria-valuemax': high });
+    you.append(svgElement('path', { class: 'you-round', d: `M0 ${LINE}V34`, stroke: 'var(--look-you)', 'stroke-width': 4 }),
+      svgElement('circle', { cy: 34, r: 9, fill: 'var(--look-you)' }),
+      svgElement('text', { class: 'you-label', y: 18 }, 'you'));
+    const ghosts = svgElement('g', { class: 'class' });
+    svg.append(ghosts, you);
+    classOf(record, values => ghosts.replaceChildren(...values.map(value => svgElement('path', {
+      d: `M${x(Math.min(Math.max(value, low), high))} ${LINE}v-40`, stroke: 'var(--look-you)', 'stroke-width': 6, 'stroke-opacity': 0.3,
+    }))));
+    if (outcome) {
+      const at = x(Math.min(Math.max(outcome.at, low), high));
+      svg.append(svgElement('path', { d: `M${at} ${LINE}V34`, stroke: 'var(--look-robot)', 'stroke-width': 4 }),
+        svgElement('circle', { cx: at, cy: 34, r: 9, fill: 'var(--look-robot)' }));
+    }
+    let now = null;
+    const begin = rounded(record, (low + high) / 2);
+
+    function put(value) {
+      now = value;
+      const at = value ?? begin;
+      you.setAttribute('transform', `translate(${x(at)})`);
+      you.setAttribute('aria-valuenow', at);
+      you.setAttribute('aria-valuetext', value === null ? 'not yet' : said(record, value));
+    }
+
+    const to = value => set(rounded(record, Math.min(Math.max(value, low), high)));
+    if (!outcome) {
+      const point = event => {
+        const at = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
+        to(low + (high - low) * (at.x - LEFT) / (WIDE - LEFT - RIGHT));
+      };
+      svg.addEventListener('pointerdown', event => {
+        svg.setPointerCapture(event.pointerId);
+        you.focus({ preventScroll: true });
+        point(event);
+      });
+      svg.addEventListener('pointermove', event => event.buttons && point(event));
+      const KEYS = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 };
+      you.addEventListener('keydown', event => {
+        const ends = { Home: low, End: high }[event.key];
+        if (!(event.key in KEYS) && ends === undefined) return;
+        event.preventDefault();
+        to(ends ?? (now ?? begin) + KEYS[event.key] * step);
+      });
+    }
+    return { node: svg, put };
+  }
+
+  return { said, gap, draw };
+})();

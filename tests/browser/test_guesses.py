@@ -1,0 +1,125 @@
+"""Guesses that one makes in a picture: by keys, with a finger, in JupyterLab and without it."""
+
+import nbformat
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+from support.lab_page import WIDER
+
+from helpers.guesses import Gap, Guess, Level, Options
+from helpers.robot import CORRIDOR
+from helpers.robot_view import Place
+from tools.lessons.clean import NOTEBOOK_METADATA
+
+PLACE = Guess('Where does it end?', Place(CORRIDOR, 0.6))
+LEVEL = Guess('How many are received?', Level(0, 41, 'messages'))
+OPTIONS = Guess('Which three wait?', Options({str(n): n for n in range(5)}, 3))
+ONE = Guess('Does it stop?', Options({'yes': True, 'no': False}))
+
+
+def group(page, guess):
+    return page.get_by_role('group', name=guess.question)
+
+
+def says(page, guess):
+    return group(page, guess).locator('.guess-says').inner_text()
+
+
+def test_all_kinds_by_keys_alone_on_a_phone(phone, artefacts):
+    page = phone(PLACE, LEVEL, OPTIONS, ONE)
+    assert says(page, PLACE) == ''
+    robot = group(page, PLACE).get_by_role('slider')
+    assert robot.get_attribute('aria-valuetext') == 'not yet'
+    page.keyboard.press('Tab')
+    page.keyboard.press('Tab')
+    assert robot.evaluate('robot => robot === document.activeElement')
+    page.keyboard.press('End')
+    assert says(page, PLACE) == 'You say: it hits the wall.'
+    for _ in range(10):
+        page.keyboard.press('ArrowLeft')
+    assert says(page, PLACE) == 'You say: it stops 0.61 m before the wall.'
+    assert robot.get_attribute('aria-valuetext') == 'it stops 0.61 m before the wall.'
+    page.keyboard.press('Tab')
+    page.keyboard.press('Home')
+    page.keyboard.press('ArrowUp')
+    assert says(page, LEVEL) == 'You say: 1 messages.'
+    page.keyboard.press('Tab')
+    for _ in range(4):
+        page.keyboard.press('Space')
+        page.keyboard.press('ArrowRight')
+    assert says(page, OPTIONS) == 'You say: 1, 2, 3.'  # the fourth takes the place of the first
+    group(page, ONE).get_by_role('radio', name='no').click()
+    assert says(page, ONE) == 'You say: no.'
+    assert not page.evaluate(WIDER)
+    page.screenshot(path=artefacts / 'guess_phone.png', full_page=True)
+    # The browser keeps them: no kernel is there.
+    page.wait_for_function("() => localStorage.getItem('guess: Does it stop?') === '1'")
+    page.reload()
+    assert says(page, PLACE) == 'You say: it stops 0.61 m before the wall.'
+    assert says(page, ONE) == 'You say: no.'
+
+
+def test_a_finger_puts_the_robot_there(file_page, tmp_path):
+    with file_page(390, 844, has_touch=True, color_scheme='dark') as page:
+        file = tmp_path / 'page.html'
+        file.write_text(PLACE._repr_mimebundle_()['text/html'], encoding='utf-8')
+        page.goto(file.as_uri())
+        box = group(page, PLACE).locator('svg').bounding_box()
+        page.touchscreen.tap(box['x'] + 0.9 * box['width'], box['y'] + box['height'] / 2)
+        metres = float(says(page, PLACE).split()[4])
+        assert 0.11 < metres < 0.6
+
+
+def test_what_came_out_is_drawn_beside_it(phone, artefacts):
+    level = Guess(LEVEL.question, LEVEL.kind, 41)
+    three = Guess(OPTIONS.question, OPTIONS.kind, [0, 1, 2])
+    page = phone(Gap(level, {'at': 14, 'tolerance': 0}), Gap(three, {'at': [2, 3, 4]}))
+    assert says(page, LEVEL) == 'It is 14 messages: you said 27 too many.'
+    assert says(page, OPTIONS) == 'It is 2, 3, 4: you said 0, 1, 2.'
+    # It is over: nothing is moved any more.
+    group(page, LEVEL).locator('svg').click()
+    assert says(page, LEVEL) == 'It is 14 messages: you said 27 too many.'
+    assert group(page, OPTIONS).get_by_role('checkbox', name='2').is_disabled()
+    page.screenshot(path=artefacts / 'guess_gap.png', full_page=True)
+
+
+ASK = """from helpers.checks import compare_prediction, guess
+from helpers.robot import CORRIDOR, Robot
+from helpers.robot_view import watch
+from helpers.ros import ros_session
+my_end = guess('Where does it end?', ..., on=CORRIDOR, line_m=0.6)"""
+DRIVE = """with ros_session():
+    robot = Robot(CORRIDOR)
+    watch(robot, guess=my_end)
+    robot.drive(1.0, 0.0, 5.0)
+compare_prediction('Where does it end?', my_end, robot)"""
+
+
+def test_the_drive_goes_through_it_in_jupyterlab(lab):
+    cells = [new_markdown_cell('# 96 Guess'), new_code_cell(ASK), new_code_cell(DRIVE)]
+    path = lab.server.folder / 'notebooks' / '96_guess.ipynb'
+    nbformat.write(new_notebook(cells=cells, metadata=NOTEBOOK_METADATA), path)
+    lab.open(path.name)
+    page = lab.page
+    lab.run(1)
+    assert 'No guess yet. Put your robot' in lab.run(2)
+    before = [(c['cell_type'], c['source']) for c in lab.cells()]
+    lab.show(1)
+    robot = page.locator('.guess .you')
+    robot.focus()
+    page.keyboard.press('End')
+    for key in ['ArrowLeft'] * 10 + ['d', 'd', 'b', 'x']:  # no command of JupyterLab
+        page.keyboard.press(key)
+    assert page.locator('.guess-says').inner_text() == 'You say: it stops 0.61 m before the wall.'
+    assert [(c['cell_type'], c['source']) for c in lab.cells()] == before
+    page.wait_for_function("""() => document.querySelector('.guess-line input').value === '0.61'""")
+    said = lab.run(2)
+    assert 'You say: it stops 0.61 m before the wall.' in said
+    assert 'It is in the wall, 0.50 m further than you said.' in said
+    shown = page.locator('.replay:not(.guess)')
+    assert shown.locator('.you').is_visible()
+    assert shown.locator('.gap').get_attribute('d')
+    assert shown.locator('.replay-says').inner_text().startswith('It is in the wall, 0.50 m')
+    lab.screenshot('guess_drive')
+    # At its start nothing is measured yet.
+    shown.focus()
+    page.keyboard.press('Home')
+    assert not shown.locator('.gap').get_attribute('d')
