@@ -17,7 +17,7 @@ def play_colleague(workspace: Workspace) -> None:
 
 
 def write_fleet(workspace: Workspace) -> None:
-    """Write the package fleet_pkg anew: a driver that goes straight ahead, before it is launched."""
+    """Write the package fleet_pkg anew: a driver that goes straight ahead until a wall is near."""
     workspace.terminal(f'bash {FLEET}')
 
 
