@@ -11,7 +11,7 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
     build_output  what a build says, and which of its lines matter
     first_error   the first error of a build, a program, a launch
     small_rclcpp  a package in C++: the part of rclcpp that write_a_node_in_cpp needs, over rcl
-    given         files of somebody else: the repository that bring_in_a_package gets, a program
+    given         files of somebody else: a repository, a package, a program
     rosdep        rosdep, with rules of a lesson
     sourcing      what `source install/setup.bash` gives, for a kernel that already runs
 """
@@ -28,7 +28,7 @@ from helpers.workspace.first_error import (
     started,
     why_it_failed,
 )
-from helpers.workspace.given import play_colleague, write_try_nearest
+from helpers.workspace.given import play_colleague, write_fleet, write_try_nearest
 from helpers.workspace.processes import DIED, Process, show_launch, wait_until
 from helpers.workspace.rosdep import rosdep, run_rosdep
 from helpers.workspace.tf2_msgs import provide_tf2_msgs
@@ -37,6 +37,7 @@ from helpers.workspace.workspace import BEGIN_EMPTY, SMALL_RCLCPP, Workspace
 
 __all__ = [
     'play_colleague',
+    'write_fleet',
     'write_try_nearest',
     'rosdep',
     'run_rosdep',

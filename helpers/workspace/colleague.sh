@@ -27,6 +27,7 @@ END
 
 cat > brake/brake/brake.py << 'END'
 import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -35,8 +36,10 @@ import yaml
 from ament_index_python import get_package_share_directory
 from brake_tools.speed import nearest_ahead, safe_speed
 from geometry_msgs.msg import Twist
+from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import LaserScan
 
@@ -47,13 +50,21 @@ class Brake(Node):
         file = Path(get_package_share_directory('brake'), 'config', 'brake.yaml')
         self.speed = yaml.safe_load(file.read_text())['speed']
         self.publisher = self.create_publisher(Twist, 'cmd_vel', 1)
-        self.subscription = self.create_subscription(LaserScan, 'scan', self.listener_callback, 1)
+        newest = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self.create_subscription(LaserScan, 'scan', self.listener_callback, newest)
+        self.scan_s, steady = time.monotonic(), Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(0.1, self.watch, clock=steady)
 
     def listener_callback(self, scan):
+        self.scan_s = time.monotonic()
         distance = nearest_ahead(np.array(scan.ranges))
         message = Twist()
         message.linear.x = float(safe_speed(distance, self.speed))
         self.publisher.publish(message)
+
+    def watch(self):
+        if time.monotonic() - self.scan_s > 0.5:  # no scan comes
+            self.publisher.publish(Twist())
 
     def stop(self):
         self.publisher.publish(Twist())

@@ -7,12 +7,18 @@ from pathlib import Path
 from helpers.workspace.workspace import Workspace
 
 COLLEAGUE = Path(__file__).with_name('colleague.sh')
+FLEET = Path(__file__).with_name('fleet.sh')
 TRY_NEAREST = Path(__file__).with_name('try_nearest.cpp')
 
 
 def play_colleague(workspace: Workspace) -> None:
     """Make a repository with three packages on the server, with the branches jazzy and humble."""
     workspace.terminal(f'bash {COLLEAGUE}')
+
+
+def write_fleet(workspace: Workspace) -> None:
+    """Write the package fleet_pkg anew: a driver that goes straight ahead until a wall is near."""
+    workspace.terminal(f'bash {FLEET}')
 
 
 def write_try_nearest(workspace: Workspace) -> None:

@@ -5,7 +5,7 @@ import math
 import re
 import shlex
 
-from helpers.checks.builds import builds
+from helpers.checks.builds import builds, setup_fits
 from helpers.checks.errors import Failed
 from helpers.checks.points import cached, expect, needs, rows
 from helpers.checks.programs import manifest, needed
@@ -148,7 +148,11 @@ def install_the_files(workspace):
         ('config/brake.yaml is installed', 'config/brake.yaml'),
         ('the launch file is installed', 'launch/brake.launch.xml'),
     )
-    return [('it builds', built, commas), *files]
+    fits, given = (
+        lambda: setup_fits(workspace, 'src/brake/brake'),
+        'The lines that were there stay.',
+    )
+    return [('it builds', built, commas), *files, ('it says what package.xml says', fits, given)]
 
 
 @tasks.add(limit_s=90)
@@ -261,84 +265,6 @@ def fix_the_function(workspace):
         ('it is right for 0.8 m/s', lambda: returns(first, 0.8, 0.1, 0.49, 0.5, 0.99, 1.0), order),
         ('it is right for 1 m/s', lambda: returns(second, 1.0, 0.2, 0.8, 3.0), 'speed / 2'),
         ('it is 0.0 if the distance is NaN', lambda: returns([0.0], 1.0, math.nan), not_a_number),
-    ]
-
-
-@tasks.add
-def create_a_package(workspace, commands):
-    folder = 'overlay/src/speed_table'
-
-    @cached
-    def created():
-        printed = workspace.terminal(f'rm -rf {folder}\n{commands}')
-        if workspace.file(folder).is_dir():
-            return True
-        return f'there is no folder {folder}. {last_of(printed)}'.strip()
-
-    def package():
-        created()
-        return manifest(workspace, folder)
-
-    def is_of_python():
-        kind = package().get_build_type()
-        return kind == 'ament_python' or f'it is: {kind}'
-
-    def has_license():
-        return package().licenses[0] == 'Apache-2.0' or f'it is: {package().licenses[0]}'
-
-    def needs_brake_tools():
-        names = sorted(needed(package(), 'run'))
-        return names == ['brake_tools'] or f'it needs: {", ".join(names) or "nothing"}'
-
-    def has_executable():
-        module = workspace.file(f'{folder}/speed_table/table.py')
-        return module.is_file() or 'there is no speed_table/table.py'
-
-    read = 'Run the text in a terminal, and read what it says.'
-    return [
-        ('the package is there', created, read),
-        ('it is a Python package', is_of_python, '--build-type'),
-        ('its license is Apache-2.0', has_license, '--license'),
-        ('it needs brake_tools alone', needs_brake_tools, '--dependencies'),
-        ('it has the executable table', has_executable, '--node-name'),
-    ]
-
-
-ASKED = """
-from brake_tools import speed
-speed.safe_speed = lambda distance_m, speed: f"{distance_m:g} m at {speed:g} m/s"
-from speed_table.table import main
-main()
-"""
-
-
-@tasks.add(limit_s=90)
-def fill_it(workspace):
-    built = cached(lambda: build_overlay(workspace))
-
-    def prints_speeds():
-        needs(built)
-        run = 'source overlay/install/setup.bash\nros2 run speed_table table'
-        return prints(workspace.terminal(run).splitlines(), '0.0', '0.4', '0.8')
-
-    def asks_safe_speed():
-        """Run it with a `safe_speed` that returns what it is asked."""
-        needs(built)
-        asked = '0.4 m at 0.8 m/s', '0.8 m at 0.8 m/s', '2 m at 0.8 m/s'
-        lines = run_in_overlay(workspace, ASKED)
-        if not first_error(lines) and not any(' m at ' in line for line in lines):
-            return 'it prints, and does not ask safe_speed'
-        return prints(lines, *asked)
-
-    def prints(lines, *right):
-        if error := first_error(lines):
-            raise Failed(error, hint='')
-        return expect(lines, [*right], 'it prints')
-
-    speed_hint = 'from brake_tools.speed import safe_speed'
-    return [
-        ('it prints 0.0, 0.4 and 0.8', prints_speeds, speed_hint),
-        ('it asks safe_speed', asks_safe_speed, 'print(safe_speed(0.4, 0.8))'),
     ]
 
 

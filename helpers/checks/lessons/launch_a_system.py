@@ -1,6 +1,6 @@
 """What the tasks of the lesson "Launch a system" are judged by."""
 
-import contextlib
+import itertools
 import os
 import re
 import signal
@@ -8,7 +8,7 @@ import time
 
 from helpers.checks.builds import builds
 from helpers.checks.errors import Failed
-from helpers.checks.points import all_of, cached, needs
+from helpers.checks.points import all_of, cached, expect, needs
 from helpers.checks.programs import Program, launch, manifest, needed
 from helpers.checks.tasks import Tasks
 from helpers.workspace import error_of_launch, first_error, started, wait_until
@@ -149,7 +149,13 @@ def start_it_again(workspace, file):
         if not starts_s:
             return error_of_launch(text) or 'no program is started'
         often = {1: 'once', 2: 'twice'}.get(len(starts_s), 'again and again')
-        return len(starts_s) == 3 or f'with speed:=fast it is started {often}'
+        if len(starts_s) != 3:
+            return f'with speed:=fast it is started {often}'
+        # A busy machine makes a pause longer, never shorter.
+        pauses_s = [
+            start - end for end, start in zip(times(log, 'has died'), starts_s[1:], strict=False)
+        ]
+        return min(pauses_s) < 0.95 or f'it is started again after {min(pauses_s):.1f} s'
 
     hint = 'respawn_max_retries counts the starts after the first one.'
     return [
@@ -158,76 +164,79 @@ def start_it_again(workspace, file):
     ]
 
 
-SILENT = """import rclpy
+# Two robots without a body: one never answers, the other one says that it cannot turn.
+SERVERS = """import time
+
+import rclpy
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 
 async def never(request, response):
-    print('asked', flush=True)
+    print('asked', time.time(), flush=True)
     await Future()
 
 
+def refuse(request, response):
+    response.success, response.message = False, 'it is stuck'
+    return response
+
+
 rclpy.init()
-node = rclpy.create_node('silent')
+node = rclpy.create_node('servers')
 group = ReentrantCallbackGroup()  # a second request is counted, too
-node.create_service(Trigger, 'camera/turn_left', never, callback_group=group)
+node.create_service(Trigger, '/silent/camera/turn_left', never, callback_group=group)
+node.create_service(Trigger, '/stuck/camera/turn_left', refuse)
+print('ready', flush=True)
 rclpy.spin(node)
 """
+
+
+WITH_TIMES = 'export RCUTILS_CONSOLE_OUTPUT_FORMAT="[{severity}] [{time}] [{name}]: {message}"'
 
 
 @tasks.add(limit_s=120, own_domain=True)
 def a_camera_that_waits(workspace):
     def start(words, name):
-        run = f'source install/setup.bash\n{words} --ros-args -r __ns:=/{name}'
-        return Program(workspace.start(run, f'{words} in {name}'))
+        run = f'source install/setup.bash\n{WITH_TIMES}\n{words} --ros-args -r __ns:=/{name}'
+        return Camera(workspace.start(run, f'{words} in {name}'), name)
 
     def start_camera(name):
         return start('ros2 run fleet_pkg camera', name)
 
     @cached
     def tried():
-        """Try both at once, because the second one waits for 5 s. Return the two results."""
-        workspace.write('.tried/silent.py', SILENT)
-        with (
-            start('exec python3 .tried/silent.py', 'silent') as silent,
-            start_camera('silent') as camera,
-        ):
-            tests = cached(waits_and_turns), cached(lambda: gives_up(camera, silent))
-            for test in tests:
-                with contextlib.suppress(Failed):
-                    test()
-        return tests
+        """Start a camera before its robot, one whose robot is stuck, and one that is not answered.
 
-    def waits_and_turns():
-        """Start it before the robot, and a second time after it."""
-        with start_camera('tried') as camera:
-
-            def has_waited():
-                return sum('I wait for' in line for line in camera.lines) >= 3
-
-            wait_until(lambda: has_waited() or not camera.running, 12)
-            if not camera.running:
-                raise ended('before there is a robot it ends', camera)
-            if not has_waited():
-                return 'before there is a robot it does not say again and again that it waits'
-            begun_s = time.monotonic()
-            with start('ros2 run simulated_robot robot', 'tried') as robot:
-                wait_until(lambda: robot.says('drives on'), 25)
-                # A slow machine gets more time.
-                limit_s = max(4.0, 3 * (time.monotonic() - begun_s))
-                turned = turns(camera, limit_s)
-                if turned is not True:
-                    return turned
-                with start_camera('tried') as late:
-                    return turns(late, limit_s)
+        All run at once, because each waits for some seconds. Return the three results.
+        """
+        workspace.write('.tried/servers.py', SERVERS)
+        begun_s = time.monotonic()
+        with start('exec python3 .tried/servers.py', 'servers') as servers:
+            wait_until(lambda: servers.says('ready'), 30)
+            now_s = time.monotonic()
+            slow = max(1.0, now_s - begun_s)  # a slow machine gets more time
+            with (
+                start_camera('tried') as camera,
+                start_camera('stuck') as stuck,
+                start_camera('silent') as silent,
+            ):
+                first = result_of(lambda: waits(camera, 6 * slow))
+                if first is True:
+                    with start('ros2 run simulated_robot robot', 'tried'):
+                        first = result_of(lambda: turns(camera, 5 * slow))
+                second = result_of(lambda: cannot_turn(stuck, now_s + 7 * slow))
+                third = result_of(lambda: gives_up(silent, servers, now_s + 11 * slow))
+        return first, second, third
 
     hint = 'while not self.client.wait_for_service(timeout_sec=1.0): log. Only then call_async.'
+    success = 'What has come is future.result(), and says in its success whether it has turned.'
     late = 'After timeout_sec=5.0, future.done() says whether the answer has come.'
     return [
-        ('it turns the camera, whichever starts first', lambda: tried()[0](), hint),
-        ('it asks once, and gives up if no answer comes', lambda: tried()[1](), late),
+        ('it waits for the robot, then turns the camera', lambda: said(tried()[0]), hint),
+        ('it says False if the robot cannot turn it', lambda: said(tried()[1]), success),
+        ('it asks once, and gives up after 5 s', lambda: said(tried()[2]), late),
     ]
 
 
@@ -398,44 +407,124 @@ def times(log, event):
 # --- The camera
 
 
+class Camera(Program):
+    """The program of a camera in its namespace, which logs with times."""
+
+    TIME = re.compile(r'(?<=\] )\[(\d+\.\d+)\] ')
+
+    def __init__(self, process, name):
+        super().__init__(process)
+        self._logger = f'[{name}.camera]: '
+
+    @property
+    def lines(self):
+        """What it has printed so far, without the times."""
+        return [self.TIME.sub('', line) for line in super().lines]
+
+    def logged(self, text):
+        """Return what its node has logged that begins like this."""
+        return [said for said, _ in self._logged(text)]
+
+    def times(self, text):
+        """Return when it did so, in seconds."""
+        return [time_s for _, time_s in self._logged(text)]
+
+    def _logged(self, text):
+        parts = (line.partition(self._logger) for line in super().lines)
+        return [
+            (said, float(self.TIME.search(before)[1]))
+            for before, logger, said in parts
+            if logger and said.startswith(text)
+        ]
+
+
+def result_of(test):
+    """Return what a test returns, or the Failed that it raises."""
+    try:
+        return test()
+    except Failed as failed:
+        return failed
+
+
+def said(result):
+    """Raise it if it is a Failed, else return it."""
+    if isinstance(result, Failed):
+        raise result
+    return result
+
+
+def waits(camera, limit_s):
+    """Return whether a camera without a robot says about once a second that it waits."""
+
+    def times_s():
+        return camera.times('I wait for the robot')
+
+    wait_until(lambda: len(times_s()) >= 3 or not camera.running, limit_s)
+    if not camera.running:
+        raise ended('before there is a robot it ends', camera)
+    if len(times_s()) < 2:
+        last = ' / '.join(camera.lines[-2:]) or 'nothing'
+        return f'before there is a robot it does not log again and again that it waits, but {last}'
+    # A busy machine makes a pause longer, never shorter.
+    pause_s = min(later - before for before, later in itertools.pairwise(times_s()))
+    return pause_s < 1.8 or f'it says only every {pause_s:.1f} s that it waits'
+
+
 def turns(camera, limit_s):
     """Wait until a camera has logged that it turned, and has ended without an error."""
 
-    def has_turned():
-        return camera.says('Turned: True')
+    def has_said():
+        return camera.logged('Turned: ')
 
-    wait_until(lambda: has_turned() or not camera.running, limit_s)
-    if not camera.running and not has_turned():
+    wait_until(lambda: has_said() or not camera.running, limit_s)
+    if not camera.running and not has_said():
         raise ended('beside a robot it ends', camera)
-    if not has_turned():
+    if not has_said():
         if camera.lines and 'I wait for' in camera.lines[-1]:
             found = 'the robot is there, and it still waits: has the service another name, or does '
             found += 'nobody spin while it waits for the answer?'
             raise Failed(found, hint='')
-        said = ' / '.join(camera.lines[-3:]) or 'nothing'
-        found = f'the robot is there, and it does not log "Turned: True". Its last lines: {said}'
+        last = ' / '.join(camera.lines[-3:]) or 'nothing'
+        found = f'the robot is there, and it does not log "Turned: True". Its last lines: {last}'
         raise Failed(found, hint='rclpy.spin_until_future_complete(self, future, timeout_sec=5.0)')
     if not camera.has_ended(limit_s):
         raise Failed('it has turned the camera, and does not end', hint='')
     if camera.exit_code() != 0:
         raise ended('it ends with an error', camera)
-    return True
+    return expect(camera.logged('Turned: '), ['Turned: True'], 'beside a robot it logs')
 
 
-def gives_up(camera, silent):
-    """Wait until a camera has ended, whose robot is asked and never answers."""
-    wait_until(lambda: silent.says('asked') or not camera.running, 30)
-    if not silent.says('asked'):
+def cannot_turn(camera, until_s):
+    """Return whether a camera says False that got an answer without success."""
+    if not has_ended_by(camera, until_s):
+        return 'the robot answers with success False, and it does not end'
+    if camera.exit_code() != 0:
+        raise ended('the robot answers with success False, and it ends', camera)
+    answer = 'the robot answers with success False, and it logs'
+    return expect(camera.logged('Turned: '), ['Turned: False'], answer)
+
+
+def gives_up(camera, servers, until_s):
+    """Return whether a camera asks once, and says after 5 s that no answer came."""
+    has_ended = has_ended_by(camera, until_s)
+    asked_s = [float(line.split()[1]) for line in servers.lines if line.startswith('asked')]
+    if not asked_s:
         raise ended('it never asks', camera)
-    # Five seconds, and what a slow machine needs for the end of a program.
-    if not camera.has_ended(15):
-        return 'no answer comes, and it waits for ever'
-    asked = silent.lines.count('asked')
-    if asked != 1:
-        return f'it asks {asked} times: {camera.error}'
+    if not has_ended:
+        return 'no answer comes, and it goes on waiting'
+    if len(asked_s) != 1:
+        return f'it asks {len(asked_s)} times: {camera.error}'
     if camera.exit_code() != 0:
         return f'no answer comes, and it ends: {camera.error}'
-    return camera.says('Turned: False') or 'no answer comes, and it does not log "Turned: False"'
+    if camera.logged('Turned: ') != ['Turned: False']:
+        return expect(camera.logged('Turned: '), ['Turned: False'], 'no answer comes, and it logs')
+    waited_s = camera.times('Turned: ')[0] - asked_s[0]
+    return 4.5 < waited_s < 8.0 or f'it waits {waited_s:.1f} s for the answer, not 5 s'
+
+
+def has_ended_by(camera, until_s):
+    """Return whether a camera ends by a time of time.monotonic()."""
+    return camera.has_ended(max(0.0, until_s - time.monotonic()))
 
 
 def ended(what, camera):

@@ -4,6 +4,7 @@ import contextlib
 import itertools
 import re
 import shlex
+import signal
 import time
 from pathlib import Path
 from typing import NamedTuple
@@ -12,7 +13,7 @@ import psutil
 from std_msgs.msg import String
 
 from helpers.checks.bench import Bench
-from helpers.checks.builds import builds
+from helpers.checks.builds import builds, setup_fits
 from helpers.checks.errors import Failed
 from helpers.checks.points import cached, needs
 from helpers.checks.programs import Program, line_of, manifest, needed, open_terminal, sourced
@@ -45,41 +46,105 @@ def is_of_python(workspace):
     return kind == 'ament_python' or f'its type is {kind}'
 
 
+# Code before a listener: each time.sleep is printed, and the first waits until a file is there.
+HELD = """
+import pathlib, time
+real_sleep = time.sleep
+
+def sleep(seconds):
+    print(f'sleeps {seconds:g}', flush=True)
+    while not pathlib.Path('.go').exists():
+        real_sleep(0.01)
+
+time.sleep = sleep
+"""
+RAISES = """
+import time
+
+def sleep(seconds):
+    raise ValueError('a mistake in the callback')
+
+time.sleep = sleep
+"""
+
+
 @tasks.add(own_domain=True)
 def a_slow_listener(workspace, file):
-    texts = ['Hello World: 7', 'Good morning']
-    run = cached(lambda: run_main(workspace, file, texts))
+    first = ['Hello World: 7', 'Good morning']
+    later = [f'Hello World: {number}' for number in range(100, 115)]
+    heard = re.compile(r'\[INFO\] \[listener\]: I heard: "(.*)" at ([\d.]+)$')
+
+    @cached
+    def run():
+        """Send two texts while it sleeps, fifteen while it still does, and press Ctrl+C."""
+        workspace.terminal('rm -f .go')
+        with listener(workspace, file, HELD) as (bench, program):
+            bench.say('topic', String(data=first[0]))
+            bench.wait(lambda: program.lines or not program.running, 8)
+            bench.say('topic', *(String(data=text) for text in [first[1], *later]), at_once=True)
+            workspace.write('.go', '')
+            bench.wait(lambda: program.says(later[-1]) or not program.running, 8)
+            went_on = program.running
+            ended = program.end(limit_s=4)
+            return Run(program.lines, went_on, ended)
+
+    def texts():
+        return [match for line in run().lines if (match := heard.match(line))]
 
     def logs():
         if not run().went_on and run().failed:
             raise Failed(error_in(run().lines), hint='')
-        shapes = [re.sub(r'\d+\.\d{4}$', 'TIME', line) for line in run().lines[:2]]
-        right = [f'[INFO] [listener]: I heard: "{text}" at TIME' for text in texts]
-        return shapes == right or f'it printed: {" / ".join(shapes) or "nothing"}'
+        found = texts()
+        if not found or found[0][1] != first[0] or not re.fullmatch(r'\d+\.\d{4}', found[0][2]):
+            said = [line for line in run().lines if not line.startswith('sleeps')]
+            shapes = [re.sub(r'\d+\.\d{4}$', 'TIME', line) for line in said[:1]]
+            right = f'[INFO] [listener]: I heard: "{first[0]}" at TIME'
+            return f'it printed {"".join(shapes) or "nothing"}, not {right}'
+        stamp_s = float(found[0][2])
+        near = abs(stamp_s - time.monotonic()) < 100
+        return near or f'{stamp_s:.0f} is no time of time.monotonic()'
 
     def sleeps():
-        printed = re.findall(r'at ([\d.]+)$', '\n'.join(run().lines), re.MULTILINE)
-        if len(printed) != 2:
-            return f'{len(printed)} of its lines end with a time'
-        first_s, second_s = map(float, printed)
-        if abs(first_s - time.monotonic()) > 100:
-            return f'{first_s:.0f} is no time of time.monotonic()'
-        apart_s = second_s - first_s
-        return 0.199 < apart_s < 1.5 or f'they are {apart_s:.2f} s apart'
+        needs(logs, 'it does not log what it hears')
+        kinds = ['heard' if heard.match(line) else line for line in run().lines]
+        if kinds[:4] == ['heard', 'sleeps 0.2'] * 2:
+            return True
+        return f'of two callbacks it printed: {", ".join(kinds[:4]) or "nothing"}'
+
+    def keeps_ten():
+        needs(logs, 'it does not log what it hears')
+        found = [match[1] for match in texts()][1:]
+        kept = [text for text in [first[1], *later] if text in found]
+        return found == later[-10:] or f'of 16 that came while it slept it heard {len(kept)}'
 
     def ends():
         if not run().went_on:
             return 'it ends by itself'
         if run().failed:
-            return 'it ends with a traceback'
-        return run().ended or 'it does not end'
+            return 'at Ctrl+C it ends with a traceback'
+        return run().ended or 'at Ctrl+C it does not end'
+
+    def ends_after_a_launch():
+        needs(ends)
+        with listener(workspace, file) as (_, program):
+            if not program.end(signal.SIGTERM, limit_s=4):
+                return 'it does not end when a launch ends it (SIGTERM)'
+            if program.failed:
+                return f'when a launch ends it (SIGTERM): {program.error}'
+        with listener(workspace, file, RAISES) as (bench, program):
+            bench.say('topic', String(data=first[0]))
+            program.has_ended(8)
+            return program.failed or 'an error in its callback is not seen'
 
     hint = 'get_logger().info(...) with an f-string, and {time.monotonic():.4f}, as in talker.py.'
     end_hint = 'spin is between try: and except (KeyboardInterrupt, ...), as in talker.py.'
+    errors = 'except names two errors, as in talker.py, and no other.'
     return [
-        ('it logs two messages with their times', logs, hint),
-        ('the next callback starts 0.2 s later', sleeps, 'time.sleep(0.2), at the end.'),
+        ('it logs what it hears, with the time', logs, hint),
+        ('it sleeps for 0.2 s after each', sleeps, 'time.sleep(0.2), below the log.'),
+        ('its queue has depth 10', keeps_ten, 'The last argument of create_subscription.'),
         ('Ctrl+C ends it', ends, end_hint),
+        ('so does a launch, and an error is seen', ends_after_a_launch, errors),
     ]
 
 
@@ -127,16 +192,18 @@ def what_is_installed(workspace):
         file = workspace.file('install/hello_pkg/share/hello_pkg/config/slow.yaml')
         return file.is_file() or 'share/hello_pkg/config has no slow.yaml'
 
-    entries = 'Is there a comma after each entry? Paths begin in the folder of the package.'
+    entries = 'Is there a comma behind each entry? Paths begin in the folder of the package.'
     names = (
         "'talker = hello_pkg.talker:main': the executable, the module in its package, the function."
     )
     files = "('share/' + package_name + '/config', ['config/slow.yaml'])"
+    given = 'The lines that were there stay.'
     return [
         ('it builds', built, entries),
         ('two executables are installed', installed, names),
         ('they talk', they_talk, names),
         ('the parameters are installed', has_parameters, files),
+        ('it says what package.xml says', lambda: setup_fits(workspace, 'src/hello_pkg'), given),
     ]
 
 
@@ -161,11 +228,25 @@ def a_second_terminal(workspace):
 
 
 MEET = """
-import threading, time
+import resource, threading, time
 barrier = threading.Barrier({count})
+real_sleep = time.sleep
+
+def used_s():
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    return used.ru_utime + used.ru_stime
+
 def sleep(seconds):
-    barrier.wait(3)
-    print('They meet\\n', end='', flush=True)  # in one piece
+    if barrier.wait(3) == 0:  # one of them looks how the others wait
+        begun_s = used_s()
+        for _ in range(100):
+            real_sleep(0.01)
+            if used_s() > begun_s + 0.3:
+                break
+        print('They meet', f'{{used_s() - begun_s:.2f}}', flush=True)
+    else:
+        real_sleep(1.0)
+
 time.sleep = sleep
 """
 
@@ -175,22 +256,47 @@ def callbacks_in_parallel(workspace, file):
     def meet(count):
         """Let each callback wait in its sleep until `count` of them are there."""
         texts = [f'Hello World: {number}' for number in range(count)]
-        lines = run_main(workspace, file, texts, MEET.format(count=count), 'They meet').lines
-        if 'They meet' in lines:
-            return True
-        if any('BrokenBarrierError' in line for line in lines) or not lines:
-            return f'{count} callbacks did not run at the same time'
-        raise Failed(error_in(lines), hint='')
+        run = run_main(workspace, file, texts, MEET.format(count=count), 'They meet')
+        if not any(line.startswith('They meet') for line in run.lines):
+            if any('BrokenBarrierError' in line for line in run.lines) or not run.lines:
+                return f'{count} callbacks did not run at the same time'
+            raise Failed(error_in(run.lines), hint='')
+        return run
 
-    two = cached(lambda: meet(2))
+    def together(run):
+        return run if isinstance(run, str) else True
+
+    first, last = cached(lambda: meet(2)), cached(lambda: meet(8))
+
+    def two():
+        return together(first())
 
     def eight():
         needs(two, 'not even two')
-        return meet(8)
+        return together(last())
+
+    def is_idle():
+        """While eight callbacks only wait, the program must not use a core."""
+        needs(eight, 'eight callbacks never run at once')
+        used = [line for line in last().lines if line.startswith('They meet')]
+        idle = float(used[0].split()[-1]) < 0.3
+        return idle or 'while all callbacks sleep, it uses a whole core'
+
+    def ends():
+        needs(two, 'two callbacks never run at once')
+        run = first()
+        if run.failed:
+            return 'at Ctrl+C it ends with a traceback'
+        return run.ended or 'at Ctrl+C it does not end'
 
     hint = 'ReentrantCallbackGroup() for the subscription, MultiThreadedExecutor(num_threads=8), '
     hint += 'spin.'
-    return [('two at a time', two, hint), ('eight at a time', eight, hint)]
+    return [
+        ('two at a time', two, hint),
+        ('eight at a time', eight, hint),
+        ('it rests while they sleep', is_idle, 'Keep the line with event_callbacks.'),
+        ('Ctrl+C ends it', ends, 'Keep try and except around the spin.'),
+    ]
 
 
 @tasks.add(limit_s=90)
@@ -312,9 +418,11 @@ def fix_a_package(workspace):
             return bool(line_of(counter, 'Counted: 5'))
 
     module = 'No module named: which file is in the folder, and which names are in setup.py?'
+    fits, given = lambda: setup_fits(workspace, 'src/forgetful_pkg'), 'Three faults, and no more.'
     return [
         ('it builds', built, 'Which file is there: resource/forgetful_pkg.'),
         ('counter counts messages', counts, module),
+        ('it says what package.xml says', fits, given),
     ]
 
 
@@ -341,7 +449,9 @@ def main():
 def write_forgetful(workspace):
     """Write all files of forgetful_pkg but its setup.py, which is the learner's."""
     workspace.terminal("""rm -rf .made; mkdir .made; cd .made; ros2 pkg create forgetful_pkg \\
-        --build-type ament_python --license Apache-2.0 --dependencies rclpy std_msgs
+        --build-type ament_python --license Apache-2.0 --dependencies rclpy std_msgs \\
+        --description 'Count messages' --maintainer-name you --maintainer-email you@example.com
+        rm -f ../src/forgetful_pkg/package.xml
         cp --recursive --no-clobber forgetful_pkg ../src""")
     workspace.write('src/forgetful_pkg/forgetful_pkg/counter.py', COUNTER)
 
@@ -386,11 +496,12 @@ class Run(NamedTuple):
         return any(TRACEBACK in line for line in self.lines)
 
 
-def run_main(workspace, file, texts, before='', last=''):
-    """Run main() of a file, publish texts at once, and press Ctrl+C when `last` was printed.
+@contextlib.contextmanager
+def listener(workspace, file, before=''):
+    """Run main() of a file: yield a bench and the program, which has subscribed to the topic.
 
-    Nothing is built. `before` is code that runs before the file; `last` is the last text, if
-    nothing else is given. Raises Failed if nobody subscribes to the topic.
+    Nothing is built. `before` is code that runs before the file. Raises Failed if the program runs
+    and does not subscribe.
     """
     start = f'{before}\nimport runpy\nrunpy.run_path({file!r})["main"]()\n'
     workspace.write('.start.py', start)
@@ -404,12 +515,18 @@ def run_main(workspace, file, texts, before='', last=''):
         def is_there():
             return subscribed_or_ended() or 'listener' in bench.tester.get_node_names()
 
-        bench.wait(is_there, 8)
+        bench.wait(is_there, 12)
         bench.wait(subscribed_or_ended)
         if program.running and not publisher.get_subscription_count():
             raise Failed('it runs, and does not subscribe to the topic "topic"', hint='')
+        yield bench, program
+
+
+def run_main(workspace, file, texts, before, last):
+    """Run main() of a file, publish texts at once, and press Ctrl+C when `last` was printed."""
+    with listener(workspace, file, before) as (bench, program):
         bench.say('topic', *(String(data=text) for text in texts), at_once=True)
-        bench.wait(lambda: program.says(last or texts[-1]) or not program.running, 8)
+        bench.wait(lambda: program.says(last) or not program.running, 8)
         went_on = program.running
         ended = program.end(limit_s=4)
         return Run(program.lines, went_on, ended)

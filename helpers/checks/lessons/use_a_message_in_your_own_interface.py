@@ -1,6 +1,10 @@
 """What the tasks of the lesson "Use a message in your own interface" are judged by."""
 
 import json
+import re
+import threading
+import time
+from functools import partial
 
 import numpy as np
 from rclpy.node import Node
@@ -19,6 +23,7 @@ tasks = Tasks()
 check = tasks.check
 
 GENERATORS, RUNTIME = 'rosidl_default_generators', 'rosidl_default_runtime'
+STOP = 'find_package(NAME REQUIRED), each time.'
 BOTH = '<depend>NAME</depend> counts for the build and for the run.'
 
 
@@ -67,7 +72,14 @@ def what_it_depends_on(workspace):
 @tasks.add(limit_s=90)
 def fix_the_build(workspace):
     hint = 'Unknown command: which package has it? KeyError: what was not told about the package?'
-    return [('it builds', lambda: builds(workspace, 'custom_interfaces', anew=False), hint)]
+    return [
+        ('it builds', lambda: builds(workspace, 'custom_interfaces', anew=False), hint),
+        (
+            'it stops if a package is missing',
+            lambda: requires(workspace, 'custom_interfaces'),
+            STOP,
+        ),
+    ]
 
 
 @tasks.add
@@ -92,13 +104,30 @@ def the_server(CameraServer):
     ]
 
 
-@tasks.add(limit_s=45)  # a call that nobody answers waits for 30 s
+ASK_S = 5.0  # a session of the judge waits no longer for what never comes
+
+
+@tasks.add(limit_s=45)
 def the_client(ask, pixels):
+    def wait_until(wait, predicate, timeout_s=ASK_S, **options):
+        wait(predicate, min(timeout_s, ASK_S), **options)
+
     def asks(degrees):
+        """Let the service come when the client is there already, and answer after a while."""
         with Bench() as bench:
             robot = Robot(ROOMS)
-            serve(bench, robot)
-            image = ask(bench.session, bench.spin(Node('client')), degrees)
+            bench.session.wait_until = partial(wait_until, bench.session.wait_until)
+            node = bench.spin(Node('client'))
+            later = threading.Timer(0.5, serve, (bench, robot, 0.5))
+            later.start()
+            begun_s = time.thread_time()
+            try:
+                image = ask(bench.session, node, degrees)
+            finally:
+                used_s = time.thread_time() - begun_s
+                later.join()
+            if used_s > 0.15:
+                return 'it waits in a loop that uses a whole core'
             if not isinstance(image, Image):
                 return f'it returns {type(image).__name__}, not an Image'
             return is_picture(image, robot, degrees)
@@ -118,7 +147,10 @@ def the_client(ask, pixels):
             return f'{size} gives the wrong array: {np.shape(array)}'
         return np.array_equal(array, wanted) or f'{size} has its bytes at other places'
 
-    ask_hint = 'node.create_client, client.call_async(TurnCamera.Request(...)), future.done.'
+    ask_hint = (
+        'create_client, then wait until client.service_is_ready; call_async, then wait until '
+    )
+    ask_hint += 'future.done.'
     shape_hint = '.reshape(image.height, image.width, 3)'
     return [
         ('ask(session, node, 30.0) returns the picture', first, ask_hint),
@@ -167,6 +199,11 @@ def a_message_of_two_packages(workspace):
     def names(moment, *wanted):
         return is_named(workspace, package, moment, *wanted)
 
+    def exports():
+        folder = workspace.file(f'install/{package}/share/{package}/cmake')
+        said = ''.join(file.read_text() for file in folder.glob('ament_cmake_export_dependencies*'))
+        return RUNTIME in said or f'it does not export {RUNTIME}'
+
     both = 'nav_msgs', 'sensor_msgs'
     whole = 'Which line of the error says what was not found? Steps 1 and 2.'
     line = 'The lines of step 1, one by one.'
@@ -175,10 +212,20 @@ def a_message_of_two_packages(workspace):
         ('both packages are named to build it', lambda: names('build', *both), BOTH),
         ('both packages are named to run it', lambda: names('run', *both), BOTH),
         ('the runtime of interfaces is named', lambda: names('run', RUNTIME), line),
+        ('packages that use it get the runtime, too', exports, 'ament_export_dependencies(...)'),
+        ('it stops if a package is missing', lambda: requires(workspace, package), STOP),
     ]
 
 
-# --- package.xml
+# --- The files of a package
+
+
+def requires(workspace, package):
+    """Return whether each find_package of a CMakeLists.txt says REQUIRED, or the first without."""
+    text = workspace.file(f'src/{package}/CMakeLists.txt').read_text()
+    calls = re.findall(r'^\s*find_package\(([^)]*)\)', text, re.MULTILINE | re.IGNORECASE)
+    without = [call.strip() for call in calls if 'REQUIRED' not in call.split()]
+    return not without or f'find_package({without[0]}) goes on without the package'
 
 
 def is_named(workspace, package, moment, *wanted):
@@ -198,11 +245,12 @@ def service_type():
     return TurnCamera
 
 
-def serve(bench, robot):
-    """Serve the camera of a robot, as `the_server` wants it."""
+def serve(bench, robot, takes_s=0.0):
+    """Serve the camera of a robot, as `the_server` wants it. An answer takes some seconds."""
 
     def turn(request, response):
         response.camera_image = robot.turn_camera(request.deg_turn)
+        time.sleep(takes_s)
         return response
 
     node = Node('camera')
