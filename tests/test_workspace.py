@@ -364,6 +364,16 @@ def test_waiting_is_bounded_and_says_what_was_printed(built):
             talker.wait(timeout_s=0.1)
 
 
+def test_commands_that_go_on_for_ever_are_ended_and_the_message_says_how_to_run_them(
+    built, monkeypatch
+):
+    monkeypatch.setattr('helpers.workspace.workspace.TERMINAL_LIMIT_S', 0.3)
+    lines = []
+    with pytest.raises(TimeoutError, match='^After 0.3 s the commands had not ended.*`timeout 5`'):
+        built.terminal('echo begun; sleep 60', show=lines.append)
+    assert lines == ['begun\n']
+
+
 def run_script(workspace: Workspace, name: str, text: str) -> Process:
     file = f'install/talker_pkg/lib/talker_pkg/{name}'
     workspace.write(file, f'#!/bin/sh\n{text}\n')

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -266,7 +267,9 @@ class Watcher:
         return now_s - self._ready_s > max(patience_s, 1.5 * (self._ready_s - self._begun_s))
 
 
-def end_launches(processes) -> None:
-    """End the launches of terminals that are still open, of which robots would hear."""
+def end_launches(processes: Iterable[Process]) -> None:
+    """End the launches of terminals that are still open, of which robots would hear, and say so."""
     for process in [*processes]:
+        if process.running:
+            print(f'The terminal {process.name} was closed: its programs would drive, too.')
         process.interrupt()

@@ -10,6 +10,7 @@ a cable is unplugged, the laser is blind, a program is ended.
 """
 
 from helpers.patrol.drives import (
+    CABLES,
     CIRCLE,
     CUT,
     DEGREES,
@@ -23,10 +24,12 @@ from helpers.patrol.drives import (
     steered,
 )
 from helpers.patrol.floors import CELLAR, LAST, ON_THE_WAY, write_route_of_cellar
-from helpers.patrol.launches import ENDS, LAUNCH, driven_live, ended_by, launched, printed
+from helpers.patrol.launches import ALL_END, ENDS, LAUNCH, driven_live, ended_by, launched, printed
 from helpers.patrol.program import PACKAGE, SIM, action, module, route_of
 
 __all__ = [
+    'ALL_END',
+    'CABLES',
     'CELLAR',
     'CIRCLE',
     'CUT',

@@ -7,11 +7,12 @@ import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import Log
 from rclpy.action import ActionClient
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import Imu, LaserScan
 
 from helpers.patrol.program import PACKAGE, SIM, action, module
 from helpers.robot import EMPTY, KIND, ROOMS, Driver, Floor, Pose, Robot
@@ -23,6 +24,7 @@ PATIENT = Parameter('timeout_s', value=60.0)
 CIRCLE, SNAKE = [(0.3, 0.2)] * 600, [(0.5, 0.9 * math.sin(k / 9)) for k in range(120)]
 DEGREES = np.arange(-90.0, 91.0)
 CUT = ['--ros-args', '-r', 'scan:=laser']
+CABLES = {'scan': (LaserScan, 'laser'), 'odom': (Odometry, 'wheels'), 'imu/data': (Imu, 'gyro')}
 LEVELS = {10: 'debug', 20: 'information', 30: 'warning', 40: 'error', 50: 'fatal'}
 
 
@@ -85,18 +87,22 @@ def steered(
 
 
 class Cable(Node):
-    """A cable for the scans that can be unplugged: the node hears `laser`."""
+    """A cable from a sensor to the program: for scans, which the program then hears on `laser`.
 
-    def __init__(self) -> None:
-        super().__init__('cable')
-        self.plugged = True
-        self.laser = self.create_publisher(LaserScan, 'laser', 1)
-        self.create_subscription(LaserScan, 'scan', self.on_scan, 1)
+    It can be unplugged. `change(message)` returns what it carries in place of a message.
+    """
 
-    def on_scan(self, scan: LaserScan) -> None:
-        """Pass a scan on."""
+    def __init__(self, topic: str = 'scan') -> None:
+        kind, end = CABLES[topic]
+        super().__init__(f'cable_of_{end}')
+        self.plugged, self.change = True, lambda message: message
+        self.end = self.create_publisher(kind, end, 1)
+        self.create_subscription(kind, topic, self.on_message, 1)
+
+    def on_message(self, message: LaserScan | Odometry | Imu) -> None:
+        """Pass a message on."""
         if self.plugged:
-            self.laser.publish(scan)
+            self.end.publish(self.change(message))
 
 
 class Ear(Node):
@@ -114,7 +120,10 @@ class Ear(Node):
 
 
 class Tour:
-    """The whole node, a robot in simulated time, a client and a cable. Make it in a session."""
+    """The whole node, a robot in simulated time, a client and cables. Make it in a session.
+
+    `cables` has one for each of `scan`, `odom` and `imu/data`; those of `silent` are unplugged.
+    """
 
     def __init__(
         self,
@@ -123,16 +132,21 @@ class Tour:
         floor: Floor = ROOMS,
         route: Sequence[float] | None = (3.5, 0.0, 6.5, 0.0),
         arguments: Sequence[str] = (),
+        silent: Sequence[str] = (),
     ) -> None:
         values = [*SIM, *options] + ([Parameter('route', value=list(route))] if route else [])
         if 'timeout_s' not in [option.name for option in options]:
             values.append(PATIENT)
-        self.robot, self.cable, self.ear = Robot(floor, sim_time=True), Cable(), Ear()
-        arguments = [*CUT, *arguments]
+        self.robot, self.ear = Robot(floor, sim_time=True), Ear()
+        self.cables = {topic: Cable(topic) for topic in CABLES}
+        for topic in silent:
+            self.cables[topic].plugged = False
+        cut = [word for topic, (_, end) in CABLES.items() for word in ('-r', f'{topic}:={end}')]
+        arguments = ['--ros-args', *cut, *arguments]
         patrol = module(workspace, 'patrol').Patrol
         self.node = patrol(parameter_overrides=values, cli_args=arguments)
         self.client, self.result = ActionClient(self.ear, action(), 'patrol'), None
-        self.executor = spun(self.node, self.cable, self.ear)
+        self.executor = spun(self.node, *self.cables.values(), self.ear)
         self.run(1.0)
 
     def run(self, seconds: float, until: Callable[[], object] = lambda: False) -> bool:

@@ -28,7 +28,14 @@ from helpers.workspace import (
 
 LAUNCH = 'source install/setup.bash\nexec ros2 launch patrol_pkg '
 BEATS = 12  # scans before a goal: in this time the battery says how full it is
-ENDS = 'Ctrl+C', 'patrol crashes', 'the laser is blind', 'the guard crashes'
+GOALS = 40  # more of them, as long as the goal is refused
+ENDS = 'Ctrl+C', 'patrol crashes', 'patrol freezes', 'the laser is blind', 'the guard crashes'
+ALL_END = 'the guard crashes, then Ctrl+C ends the rest'
+SIGNALS = {
+    'Ctrl+C': signal.SIGINT,
+    'patrol crashes': signal.SIGKILL,
+    'patrol freezes': signal.SIGSTOP,
+}
 QUIET = ['--ros-args', '--disable-rosout-logs']  # which line comes first is an accident
 ON_A_TURTLEBOT = [
     *(*QUIET, '-r', 'imu/data:=imu', '-r', 'cmd_vel:=cmd_vel_wanted'),
@@ -92,7 +99,12 @@ def launched(
                 beats += beat(0.5)
             if beats < BEATS:
                 return robot, f'a scan had no command. {printed(workspace, program.lines)}'
-            goal = send_goal(session, server, places)
+            # A program that waits for its sensors, or whose battery has not spoken, refuses it.
+            for _ in range(GOALS):
+                goal = send_goal(session, server, places)
+                if goal is None or goal.accepted:
+                    break
+                beat(0.5)
             if goal is None or not goal.accepted:
                 return robot, 'the goal is refused' if goal else 'the goal gets no answer'
             ended = goal.get_result_async()
@@ -154,41 +166,53 @@ class Ended(NamedTuple):
     seconds: float
 
 
-def ended_by(workspace: Workspace, end: str) -> Ended:
+def ended_by(workspace: Workspace, end: str, halt: bool = False) -> Ended:
     """Drive a TurtleBot 3 with patrol and guard, end something, and return what the robot did.
 
-    `end` is one of `ENDS`. Without a guard it is watched for two seconds. Raises RuntimeError if
+    `end` is one of `ENDS`, or `ALL_END`. With `halt` the program `halt` runs as well. The robot is
+    watched until it stands, but two seconds at most if the guard crashes. Raises RuntimeError if
     the robot does not come to drive.
     """
-    with ros_session() as session, contextlib.ExitStack() as programs:
+    with ros_session() as session, contextlib.ExitStack() as stack:
         robot, client = Robot(CORRIDOR, driver=TURTLEBOT3), Node('client')
         server = ActionClient(client, action(), 'patrol')
         session.spin(spun(client))
-        guard = programs.enter_context(workspace.run('patrol_pkg', 'guard', *QUIET))
-        patrol = programs.enter_context(workspace.run('patrol_pkg', 'patrol', *ON_A_TURTLEBOT))
+        options = {'guard': QUIET, 'patrol': ON_A_TURTLEBOT}
+        if halt:
+            options['halt'] = [*QUIET, '-p', 'timeout_s:=0.6']
+        programs = {
+            name: stack.enter_context(workspace.run('patrol_pkg', name, *words))
+            for name, words in options.items()
+        }
 
         def drives():
             if server.server_is_ready() and robot.pose.x == CORRIDOR.start.x:
-                send_goal(session, server, 1)  # refused, as long as the battery has not spoken
+                send_goal(session, server, 1)  # refused, as long as its sensors have not spoken
             return robot.record.poses[-1].v > 0.15
 
         limit_s = robot.t_s + LIMIT_S
         while not drives():
-            if robot.t_s > limit_s or not (guard.running and patrol.running):
-                lines = [*guard.lines, *patrol.lines, 'nothing'][-1]
-                raise RuntimeError(f'The robot does not drive. The programs printed: {lines}')
+            if robot.t_s > limit_s or not all(program.running for program in programs.values()):
+                lines = [line for program in programs.values() for line in program.lines]
+                last = [*lines, 'nothing'][-1]
+                raise RuntimeError(f'The robot does not drive. The programs printed: {last}')
             robot.run(0.2)
         since_s = robot.t_s
-        if end == 'the laser is blind':
+        if end in SIGNALS:
+            os.kill(programs['patrol'].pid, SIGNALS[end])
+        elif end == 'the laser is blind':
             robot.blind = True
-        elif end == 'the guard crashes':
-            os.kill(guard.pid, signal.SIGKILL)
         else:
-            os.kill(patrol.pid, signal.SIGINT if end == 'Ctrl+C' else signal.SIGKILL)
+            os.kill(programs['guard'].pid, signal.SIGKILL)
+            if end == ALL_END:
+                for name in {*programs} - {'guard'}:
+                    os.kill(programs[name].pid, signal.SIGINT)
         # It must stand before the other programs end, which stop it, too.
-        limit_s = 2.0 if end == 'the guard crashes' else LIMIT_S
+        limit_s = 2.0 if end in (ENDS[-1], ALL_END) else LIMIT_S
         stands = robot.run(limit_s, until=lambda: robot.stopped)
         moves = [step for step in robot.record.poses if step.t_s > since_s and (step.v or step.w)]
+        if end == 'patrol freezes':
+            os.kill(programs['patrol'].pid, signal.SIGCONT)  # or it could not end
     return Ended(robot, stands, sum(step.v for step in moves) / RATE_HZ, len(moves) / RATE_HZ)
 
 

@@ -329,6 +329,12 @@ class Workspace:
                     time.sleep(POLL_S)
                     show_new()
                 shell.wait(max(0.0, end - time.monotonic()))
+            except TimeoutError:
+                raise TimeoutError(
+                    f'After {TERMINAL_LIMIT_S:g} s the commands had not ended: this terminal was '
+                    'closed. Write `timeout 5` before a command that goes on for ever, or give the '
+                    'terminal a name: %%terminal listener.'
+                ) from None
             finally:
                 if show:
                     show_new()
@@ -465,7 +471,10 @@ def terminal(line: str, cell: str) -> None:
     if _open_workspace is None:
         raise UsageError("Open a workspace first: workspace = Workspace('my_lesson').")
     if not name:
-        _open_workspace.terminal(cell, show=lambda text: print(text, end='', flush=True))
+        try:
+            _open_workspace.terminal(cell, show=lambda text: print(text, end='', flush=True))
+        except TimeoutError as error:
+            raise UsageError(str(error)) from None
     else:
         _open_workspace.start(cell, name)
 

@@ -72,7 +72,10 @@ def a_node_that_drives(workspace):
 
 
 # The student's main(), with a node of ours: what Patrol does later does not matter here.
-PROGRAM = """import sys
+PROGRAM = """import queue
+import sys
+import threading
+import time
 
 import rclpy
 from geometry_msgs.msg import Twist
@@ -82,10 +85,35 @@ from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import LaserScan
 
 
+class Slow:
+    # A publisher whose messages leave a while later, as over a busy network.
+    def __init__(self, publisher):
+        self.publisher, self.waiting = publisher, queue.Queue()
+        threading.Thread(target=self.send, daemon=True).start()
+
+    def publish(self, message):
+        self.waiting.put((time.monotonic() + 0.3, message))
+
+    def send(self):
+        while True:
+            at_s, message = self.waiting.get()
+            time.sleep(max(0.0, at_s - time.monotonic()))
+            self.publisher.publish(message)
+            self.waiting.task_done()
+
+    def wait_for_all_acked(self, timeout):
+        limit_s = time.monotonic() + timeout.nanoseconds / 1e9
+        while self.waiting.unfinished_tasks and time.monotonic() < limit_s:
+            time.sleep(0.01)
+        return self.publisher.wait_for_all_acked(timeout)
+
+
 class Drives(Node):
     def __init__(self):
         super().__init__('patrol')
         self.publisher, self.scans = self.create_publisher(Twist, 'cmd_vel', 1), 0
+        if 'slow' in sys.argv:
+            self.publisher = Slow(self.publisher)
         self.create_subscription(LaserScan, 'scan', self.on_scan, qos_profile_sensor_data)
         self.timer = self.create_timer(0.1, self.is_idle) if 'idle' in sys.argv else None
 
@@ -115,7 +143,12 @@ START = (
     '[ -f install/setup.bash ] && source install/setup.bash\n'
     'PYTHONPATH=src/patrol_pkg:$PYTHONPATH exec python -B .start.py '
 )
-SIGNALS = {'interrupted': signal.SIGINT, 'terminated': signal.SIGTERM, 'failed': None}
+SIGNALS = {
+    'interrupted': signal.SIGINT,
+    'terminated': signal.SIGTERM,
+    'failed': None,
+    'slow': signal.SIGINT,
+}
 
 
 @tasks.add(limit_s=120, cpu_s=20)
@@ -170,6 +203,11 @@ def a_program(workspace):
         says = program.says('planted') or 'it ends, and says nothing of the error'
         return all_of(found, says)
 
+    def waits_for_the_base():
+        needs(lambda: stands('interrupted'), 'not judged: Ctrl+C must end it first')
+        found = stands('slow')
+        return found is True or f'over a network that is 0.3 s late {found}'
+
     def ends_while_nothing_happens():
         needs(lambda: stands('interrupted'), 'not judged: Ctrl+C must end it first')
         with Program(workspace.start(f'{START} idle --ros-args -r __ns:=/idle', 'idle')) as idle:
@@ -182,12 +220,14 @@ def a_program(workspace):
     stop = 'In finally: node.stop(), before rclpy.try_shutdown().'
     handlers = 'rclpy.init(signal_handler_options=SignalHandlerOptions.NO)'
     term = 'signal.signal(signal.SIGTERM, signal.default_int_handler)'
+    acked = 'node.publisher.wait_for_all_acked(Duration(seconds=1))'
     once_more = 'while rclpy.ok(): rclpy.spin_once(node, timeout_sec=0.1)'
     return [
         ('after Ctrl+C the robot stands', lambda: stands('interrupted'), handlers),
         ('without a traceback', ends_quietly, 'except KeyboardInterrupt: pass'),
         ('after SIGTERM it stands', lambda: stands('terminated'), term),
         ('after an error in a callback it stands', stands_and_says_why, stop),
+        ('it waits until the base has the zeros', waits_for_the_base, acked),
         ('Ctrl+C also ends it while no callback is due', ends_while_nothing_happens, once_more),
     ]
 
@@ -377,39 +417,154 @@ def metres_ahead(robot):
 
 @tasks.add(cpu_s=20)
 def where_am_i(workspace):
-    def knows(commands):
+    def knows_its_place(commands):
         where, place, yaw = estimated(module(workspace, 'where').Where, commands)
         if abs(math.remainder(where.yaw - yaw, math.tau)) > 0.1:
             return f'at the end its yaw is {where.yaw:.1f}, not {yaw:.1f}'
         error = math.dist((where.x, where.y), place)
         return error < 0.15 or f'at the end it is {error:.1f} m away'
 
-    def goes(scale, *stamps_s):
-        """Publish what the wheels say at these times of their clock, all at once."""
+    def looking(degrees, at_s):
+        """Return what an IMU says that looks in a direction at a time: both are its own."""
+        half = math.radians(degrees) / 2
+        imu = Imu(orientation=Quaternion(z=math.sin(half), w=math.cos(half)))
+        imu.header.stamp = Time(seconds=at_s).to_msg()
+        return imu
+
+    def rolling(mps, at_s):
+        """Return what the wheels say at a time of their clock."""
+        odom = Odometry()
+        odom.twist.twist.linear.x = mps
+        odom.header.stamp = Time(seconds=at_s).to_msg()
+        return odom
+
+    def told(*steps, scale=1.0):
+        """Tell the part messages, one after the other. A step may also be a test of what it says.
+
+        Return the first result of a test that is not True, or the part.
+        """
         options = [*SIM, Parameter('wheel_scale', value=scale)]
-        messages = [Odometry() for _ in stamps_s]
-        for message, stamp_s in zip(messages, stamps_s, strict=True):
-            message.header.stamp = Time(seconds=stamp_s).to_msg()
-            message.twist.twist.linear.x = 0.5
         with Bench() as bench:
             node = Node('tested', parameter_overrides=options)
             where = module(workspace, 'where').Where(node)
             bench.spin(node)
-            bench.say('imu/data', Imu(orientation=Quaternion(w=1.0)))  # it looks along the x axis
-            bench.say('odom', *messages)
-        way = 0.5 / scale * (stamps_s[-1] - stamps_s[0])
+            for step in steps:
+                if callable(step):
+                    result = step(where)
+                    if result is not True:
+                        return result
+                else:
+                    bench.say('odom' if isinstance(step, Odometry) else 'imu/data', step)
+        return where
+
+    def is_at(name, x, y, degrees):
+        """Return a test of where it is: m from the start, and how far it has turned."""
+
+        def test(where):
+            turned = math.degrees(math.remainder(where.yaw, math.tau))
+            found = tuple(round(float(number), 1) + 0.0 for number in (where.x, where.y, turned))
+            what = f'{name} it is at x, y, yaw (m, m, degrees) ='
+            return expect(found, (x, y, degrees), what)
+
+        return test
+
+    def goes(scale, *stamps_s, counted_s):
+        where = told(looking(0, 7), *(rolling(0.5, at_s) for at_s in stamps_s), scale=scale)
         stamps = ', '.join(f'{stamp_s:g}' for stamp_s in stamps_s)
         what = f'odom has 0.5 m/s at {stamps} s by its stamps, wheel_scale is {scale}, and x is'
-        return expect(where.x, way, what, within=0.01, unit='m')
+        return expect(where.x, 0.5 / scale * counted_s, what, within=0.01, unit='m')
+
+    def is_right(result):
+        return result if isinstance(result, str) else True
+
+    def counts_from_the_first():
+        begins = 'the IMU says 40 degrees at first, and then'
+        turned = told(
+            looking(40, 7),
+            rolling(0.5, 7),
+            rolling(0.5, 7.4),
+            is_at(f'{begins} 0.2 m straight on:', 0.2, 0.0, 0.0),
+            looking(130, 7.4),
+            rolling(0.5, 7.8),
+            is_at(f'{begins} 130, and 0.2 m on:', 0.2, 0.2, 90.0),
+        )
+        over = told(
+            looking(170, 7),
+            looking(-170, 7.1),
+            is_at('the IMU says 170 degrees, and then -170:', 0.0, 0.0, 20.0),
+        )
+        return all_of(is_right(turned), is_right(over))
+
+    def skips_what_is_no_number():
+        wrong_imus = looking(0, 7.3), looking(0, 7.3)
+        wrong_imus[0].orientation.z = wrong_imus[0].orientation.w = math.nan
+        wrong_imus[1].orientation.w = 0.0
+        there = 0.0, 0.2, 90.0
+        story = told(
+            *(looking(90, 7), looking(180, 7), rolling(0.5, 7), rolling(0.5, 7.4)),
+            *(wrong_imus[0], is_at('after an orientation of NaN', *there)),
+            *(wrong_imus[1], is_at('after the orientation 0, 0, 0, 0', *there)),
+            *(rolling(math.nan, 7.5), is_at('after wheels that say NaN', *there)),
+        )
+        return is_right(story)
+
+    def says_whether_it_knows():
+        def asked(name, *answers):
+            def test(where):
+                for now_s, right in answers:
+                    found = where.knows(now_s)
+                    if bool(found) is not right:
+                        return f'{name} knows({now_s}) is {found}'
+                return True
+
+            return test
+
+        broken, speed = looking(0, 8.3), 0.1
+        broken.orientation.z = broken.orientation.w = math.nan
+        ages = (7.1, True), (7.4, True), (7.6, False), (6.9, True), (6.7, False)
+        story = told(
+            asked('before any message', (7.0, False)),
+            *(rolling(speed, 7), asked('without a message of the IMU', (7.1, False))),
+            *(looking(3, 7), asked('after messages with the stamp 7.0', *ages)),
+            *(looking(3, 7.6), asked('with the stamps odom 7.0 and IMU 7.6', (7.7, False))),
+            *(rolling(math.nan, 7.65), asked('and after NaN of the wheels at 7.65', (7.7, False))),
+            *(rolling(speed, 7.65), asked('with the stamps odom 7.65, IMU 7.6', (7.7, True))),
+            *(rolling(speed, 8.3), asked('with the stamps odom 8.3, IMU 7.6', (8.4, False))),
+            *(broken, asked('and after an orientation of NaN at 8.3', (8.4, False))),
+            *(looking(3, 7.6), asked('and after the IMU repeats 7.6', (8.4, False))),
+            *(looking(3, 8.35), asked('with the stamps odom 8.3, IMU 8.35', (8.4, True))),
+        )
+        other = told(looking(3, 7), asked('without a message of the wheels', (7.1, False)))
+        return all_of(is_right(story), is_right(other))
 
     stamps = 'The seconds between two stamps, not a fixed time.'
+    gap = 'if 0 < now_s - self.odom_s < 0.5: count it'
     scale = 'node.declare_parameter(...).value'
     grows = 'x grows by way * cos(yaw), y by way * sin(yaw).'
+    first = 'Keep the first yaw: self.yaw is the yaw of this message minus the first one.'
+    skip = 'if not abs(z**2 + w**2 - 1) < 0.1: return; math.isfinite(speed)'
+    knows = 'Keep the stamp of the last good message of each topic: all(-0.2 < age < 0.5 ...).'
     return [
-        ('a circle', lambda: knows(CIRCLE[:150]), grows),
-        ('a line like a snake', lambda: knows(SNAKE), stamps),
-        ('odom comes less often', lambda: goes(1.0, 7.0, 7.9, 8.2, 9.0), stamps),
-        ('the parameter wheel_scale', lambda: goes(2.0, 7.0, 7.1, 7.2, 9.0), scale),
+        ('a circle', lambda: knows_its_place(CIRCLE[:150]), grows),
+        ('a line like a snake', lambda: knows_its_place(SNAKE), stamps),
+        (
+            'odom comes less often',
+            lambda: goes(1.0, 7.0, 7.45, 7.6, 8.05, counted_s=1.05),
+            stamps,
+        ),
+        (
+            'half a second of silence does not count',
+            lambda: goes(1.0, 7.0, 7.2, 9.0, 9.1, counted_s=0.3),
+            gap,
+        ),
+        (
+            'the parameter wheel_scale',
+            lambda: goes(2.0, 7.0, 7.1, 7.2, 7.6, counted_s=0.6),
+            scale,
+        ),
+        ('it counts from the first yaw', counts_from_the_first, first),
+        ('it skips what is no number', skips_what_is_no_number, skip),
+        ('knows(now_s)', says_whether_it_knows, knows),
     ]
 
 

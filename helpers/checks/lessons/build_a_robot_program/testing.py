@@ -75,6 +75,7 @@ NODE = """import math
 
 from geometry_msgs.msg import Twist
 from patrol_pkg.battery import Battery
+from patrol_pkg.frozen import Frozen
 from patrol_pkg.job import Job
 from patrol_pkg.logic import beams, direction, steer
 from patrol_pkg.watchdog import Watchdog
@@ -95,8 +96,9 @@ class Patrol(Node):
         self.add_post_set_parameters_callback(self.take)
         self.speed = self.declare_parameter('speed', 0.5).value
         self.publisher = self.create_publisher(Twist, 'cmd_vel', 1)
-        self.where, self.battery = Where(self), Battery(self)
-        self.job = Job(self, lambda: not self.battery.low)
+        self.told = 0.0, 0.0
+        self.where, self.battery, self.frozen = Where(self), Battery(self), Frozen(self)
+        self.job = Job(self, lambda: self.where.knows(self.now_s()) and not self.battery.low)
         self.watchdog = Watchdog(self, self.stop, 'scan')
         self.create_subscription(LaserScan, 'scan', self.on_scan, LASER)
         self.create_timer(0.1, self.job.place)
@@ -112,7 +114,11 @@ class Patrol(Node):
             if parameter.name == 'speed':
                 self.speed = parameter.value
 
+    def now_s(self):
+        return self.get_clock().now().nanoseconds / 1e9
+
     def command(self, v, w):
+        self.told = v, w
         twist = Twist()
         twist.linear.x, twist.angular.z = v, w
         self.publisher.publish(twist)
@@ -126,14 +132,17 @@ class Patrol(Node):
 
     def on_scan(self, scan):
         self.watchdog.seen()
-        if self.battery.low:
+        hanging = self.frozen.look(self.now_s(), self.told, scan)
+        for sensor in hanging:
+            self.get_logger().error(f'{sensor} does not change: I stop')
+        if self.battery.low or hanging:
             self.job.end()
         x, y, yaw = self.where.x, self.where.y, self.where.yaw
         place = self.job.place()
         if place is not None and math.dist((x, y), place) < 0.2:
             self.job.arrived()
             place = self.job.place()
-        if place is None or not self.is_fresh(scan):
+        if place is None or not self.is_fresh(scan) or not self.where.knows(self.now_s()):
             self.stop()
             return
         wanted, distance = direction(x, y, yaw, place), math.dist((x, y), place)

@@ -1,5 +1,8 @@
 """Of the project: a TurtleBot 3."""
 
+import os
+import re
+import signal
 import time
 
 from geometry_msgs.msg import Twist, TwistStamped
@@ -43,38 +46,63 @@ def the_guard(workspace):
         before = bench.tester.get_clock().now()
         bench.say('cmd_vel_wanted', wanted(0.2, 0.0), wanted(0.1, -0.5))
         after = bench.tester.get_clock().now()
-        if speeds(heard)[:2] != [(0.2, 0.0), (0.1, -0.5)]:
-            said = ', '.join(f'{v:g} m/s and {w:g} rad/s' for v, w in speeds(heard))
+        moving = [one for one in heard if one.twist != Twist()]
+        if speeds(moving)[:2] != [(0.2, 0.0), (0.1, -0.5)]:
+            said = ', '.join(f'{v:g} m/s and {w:g} rad/s' for v, w in speeds(moving))
             return f'of two commands it published {said or "nothing"}'
-        for one in heard[:2]:
+        for one in moving[:2]:
             if not before <= Time.from_msg(one.header.stamp) <= after:
                 return f'a stamp is {one.header.stamp.sec} s: not the time at which it was sent'
         return True
 
+    def begins(bench, heard):
+        if not bench.wait(lambda: len(heard) >= 5, 2):
+            return f'before the first command it publishes {len(heard)} times in 2 s, not 20 times'
+        return expect({*speeds(heard)}, {(0.0, 0.0)}, 'before a command it publishes (m/s, rad/s)')
+
+    def drives_then_stops(bench, heard):
+        """Send one command. Return when it was passed on, and when zeros came, or None (s)."""
+        command = bench.publisher('cmd_vel_wanted', Twist)
+        command.publish(wanted(0.2, 0.0))
+        came_s = stopped_s = None
+        limit = time.monotonic() + 10
+        while stopped_s is None and time.monotonic() < limit:
+            bench.wait(lambda: False, 0.005)
+            said = speeds(heard)
+            if came_s is None and (0.2, 0.0) in said:
+                came_s = time.monotonic()
+            if came_s is not None and (0.0, 0.0) in said[said.index((0.2, 0.0)) :]:
+                stopped_s = time.monotonic()
+        return came_s, stopped_s
+
     def stops(bench, heard):
-        if bench.wait(lambda: heard, 0.6):
-            return 'it publishes before the first command'
-        begin = time.monotonic()
-        bench.say('cmd_vel_wanted', wanted(0.2, 0.0))
-        if not bench.wait(lambda: heard):
+        came_s, stopped_s = drives_then_stops(bench, heard)
+        if came_s is None:
             return 'it publishes nothing for a command'
-        if not bench.wait(lambda: (0.0, 0.0) in speeds(heard), 10):
+        if stopped_s is None:
             return 'no command comes any more, and it does not stop the robot'
-        waited_s = time.monotonic() - begin
-        if waited_s < 0.3:
-            return f'it stops {waited_s:.2f} s after the last command: timeout_s is 0.3'
+        if stopped_s - came_s < 0.25:
+            return f'it stops {stopped_s - came_s:.2f} s after the last command: timeout_s is 0.3'
+        if stopped_s - came_s > 1.0:
+            return f'it stops {stopped_s - came_s:.2f} s after the last command: timeout_s is 0.3'
         right = '[ERROR] [guard]: No command comes: I stop'
         if not bench.wait(lambda: right in bench.log('guard')):
             return f'it logged {bench.log("guard") or "nothing"}'
-        bench.wait(lambda: len(heard) > 2, 0.6)
-        return len(heard) == 2 or 'it stops the robot again and again'
+        count = len(heard)
+        bench.wait(lambda: len(heard) >= count + 3)
+        if len(heard) < count + 3:
+            return f'it stops, and then publishes {len(heard) - count} times in 2 s, not 20 times'
+        logged = bench.log('guard').count(right)
+        return logged == 1 or f'it has logged this {logged} times'
 
     def stops_without_clock(bench, heard):
-        bench.say('cmd_vel_wanted', wanted(0.2, 0.0))
-        if not bench.wait(lambda: heard):
+        if not bench.wait(lambda: len(heard) >= 3, 2):
+            return 'with use_sim_time and without /clock it does not begin with zeros'
+        came_s, stopped_s = drives_then_stops(bench, heard)
+        if came_s is None:
             return 'it publishes nothing for a command'
-        stopped = bench.wait(lambda: (0.0, 0.0) in speeds(heard), 10)
-        return stopped or 'with use_sim_time and without /clock it does not stop the robot'
+        text = 'with use_sim_time and without /clock it does not stop the robot'
+        return stopped_s is not None or text
 
     def can_be_run(bench, heard):
         guard = module(workspace, 'guard')
@@ -84,14 +112,16 @@ def the_guard(workspace):
         must_have(node, 'publisher', 'stop')
         node.stop()
         bench.wait(lambda: heard)
-        return expect(speeds(heard), [(0.0, 0.0)], 'stop() publishes (m/s, rad/s)')
+        return expect({*speeds(heard)}, {(0.0, 0.0)}, 'stop() publishes (m/s, rad/s)')
 
     send = 'TwistStamped(twist=twist), and header.stamp = self.get_clock().now().to_msg()'
     dog = "Watchdog(self, self.stop, 'command'), and its seen() for each command"
+    zeros = 'create_timer(0.1, ..., clock=Clock(clock_type=ClockType.STEADY_TIME))'
     return [
         ('it stamps each command', guarded(hands_on), send),
-        ('it stops the robot, once', guarded(stops), dog),
-        ('also without /clock', guarded(stops_without_clock, *SIM), dog),
+        ('it begins with zeros', guarded(begins), zeros),
+        ('it stops the robot, and goes on with zeros', guarded(stops), dog),
+        ('also without /clock', guarded(stops_without_clock, *SIM), zeros),
         ('stop() and publisher, for run', guarded(can_be_run), 'self.publisher, stop(), main()'),
     ]
 
@@ -124,30 +154,54 @@ def a_turtlebot(workspace):
         return is_driven_at_most(robot, 0.2, 'a TurtleBot 3 drives at most 0.2 m/s')
 
     def starts_all():
-        command = f'{LAUNCH}turtlebot3.launch.xml timeout:=0.7'
-        with Bench() as bench, Program(workspace.start(command, 'all')) as program:
-            bench.wait(
-                lambda: program.says(DRIVES) or program.says(DIED) or not program.running, 20
-            )
+        with Bench() as bench, started_with(workspace, bench) as program:
             found = started('\n'.join(program.lines))
-            if found != ['guard', 'patrol', 'robot']:
+            if found != ['guard', 'halt', 'patrol', 'robot']:
                 programs = ' and '.join(found) or 'nothing'
                 return f'it starts {programs}. {printed(workspace, program.lines)}'
-            for node in ('patrol', 'guard'):
+            for node, right in (('patrol', 0.7), ('guard', 0.7), ('halt', 1.4)):
                 request = GetParameters.Request(names=['timeout_s'])
                 service = f'/{node}/get_parameters'
                 answer = bench.call(service, GetParameters, request, limit_s=10)
                 if answer is None:
                     return f'the node {node} does not answer. {printed(workspace, program.lines)}'
+                found_s = answer.values[0].double_value
                 what = f'with timeout:=0.7 the parameter timeout_s of {node} is'
-                waits = expect(answer.values[0].double_value, 0.7, what)
+                waits = expect(found_s, right, what, within=0.01, unit='s')
                 if waits is not True:
                     return waits
         return True
 
+    def they_come_back():
+        with Bench() as bench, started_with(workspace, bench) as program:
+            for name in ('guard', 'halt'):
+                pids = pids_of(program, name)
+                if not pids:
+                    return f'not judged: it does not start {name}'
+                os.kill(pids[0], signal.SIGKILL)
+                if not bench.wait(lambda name=name: len(pids_of(program, name)) > 1, 10):
+                    return f'{name} is killed, and does not come back'
+        return True
+
     remap = '<remap from="cmd_vel" to="cmd_vel_wanted"/>, in the node patrol'
-    both = '<param name="timeout_s" value="$(var timeout)"/>, in both nodes'
+    both = '<param name="timeout_s" value="$(var timeout)"/>; in halt $(eval ...)'
     return [
         ('it drives a TurtleBot 3 on a new floor', drives_on_a_new_floor, remap),
-        ('it starts robot, guard and patrol', starts_all, both),
+        ('it starts robot, guard, halt and patrol', starts_all, both),
+        ('guard and halt come back', they_come_back, '<node ... respawn="true">'),
+    ]
+
+
+def started_with(workspace, bench):
+    """Launch all of it, and return the program when its robot drives or something has died."""
+    program = Program(workspace.start(f'{LAUNCH}turtlebot3.launch.xml timeout:=0.7', 'all'))
+    bench.wait(lambda: program.says(DRIVES) or program.says(DIED) or not program.running, 20)
+    return program
+
+
+def pids_of(program, name):
+    """Return the ids of the processes that a launch has started for a program, the first first."""
+    text = '\n'.join(program.lines)
+    return [
+        int(pid) for pid in re.findall(rf'\[{name}-\d+\]: process started with pid \[(\d+)\]', text)
     ]

@@ -3,8 +3,11 @@
 import math
 import time
 
+from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterValueException
 from rclpy.parameter import Parameter
+from rclpy.time import Time
+from sensor_msgs.msg import Imu
 
 from helpers.checks.lessons.build_a_robot_program.shared import (
     comes_to_each_place,
@@ -29,7 +32,8 @@ def the_whole_node(workspace):
         return test
 
     def has_parts(tour):
-        missing = [name for name in ('battery', 'job') if not hasattr(tour.node, name)]
+        parts = 'where', 'battery', 'frozen', 'job', 'told'
+        missing = [name for name in parts if not hasattr(tour.node, name)]
         return not missing or f'it has no attribute {" and no ".join(missing)}'
 
     def stands(tour):
@@ -68,7 +72,7 @@ def the_whole_node(workspace):
     def cancel_without_scans(tour):
         tour.send(2)
         tour.run(1)
-        tour.cable.plugged = False
+        tour.cables['scan'].plugged = False
         tour.run(0.2)
         tour.handle.cancel_goal_async()
         tour.wait(tour.ended)
@@ -104,7 +108,7 @@ def the_whole_node(workspace):
         tour.send(2)
         tour.run(2)
         before, limit = len(tour.robot.record.commands), time.monotonic() + 10
-        tour.cable.plugged = False
+        tour.cables['scan'].plugged = False
         tour.run(0.1)  # on a slow computer it may stop already
         if not tour.wait(lambda: (0.0, 0.0) in commands_of(tour.robot)[before:]):
             return 'it does not stop'
@@ -113,7 +117,7 @@ def the_whole_node(workspace):
             tour.run(0.02)
         if said not in tour.ear.heard:
             return 'it does not say so'
-        tour.cable.plugged, now_s = True, tour.robot.t_s
+        tour.cables['scan'].plugged, now_s = True, tour.robot.t_s
         tour.run(1)
         fastest = max((v for v, _ in tour.speeds(now_s)), default=0.0)
         return fastest > 0.1 or 'it does not go on when the scans are back'
@@ -136,6 +140,57 @@ def the_whole_node(workspace):
                 return f'the scans are only {when}, and it stands'
         return tour.robot.pose.x > ROOMS.start.x + 0.2 or 'it does not drive'
 
+    def begins_when_it_knows():
+        with ros_session():
+            tour = Tour(workspace, silent=['imu/data'])
+            if tour.send(1):
+                return 'it takes a goal before the first message of the IMU'
+            tour.cables['imu/data'].plugged = True
+            tour.run(0.2)
+            return tour.send(1) or 'the IMU speaks now, and it refuses a goal'
+
+    def needs_each_sensor(tour):
+        tour.send(2)
+        for topic in ('odom', 'imu/data'):
+            cable = tour.cables[topic]
+            for name, change in TROUBLES.items():
+                tour.run(0.7)
+                if tour.robot.stopped:
+                    return f'all sensors speak, and it stands: {tour.status()}'
+                cable.plugged, cable.change = change is not None, change or cable.change
+                tour.run(1.0)
+                goes_on = not tour.robot.stopped
+                cable.plugged, cable.change = True, lambda message: message
+                if goes_on:
+                    return f'{topic} {name}, and 1 s later it drives on'
+        tour.run(0.7)
+        return not tour.robot.stopped or 'all sensors speak again, and it stands'
+
+    def notices_what_hangs(topic, limit_s, place):
+        with ros_session():
+            tour = Tour(workspace, route=place)
+            tour.cables[topic].change = Hangs()
+            tour.send(1)
+            tour.run(0.5)
+            tour.cables[topic].change.begins()
+            tour.run(limit_s, until=tour.ended)
+            if tour.status() != 'ABORTED':
+                return f'{topic} says the same for {limit_s} s, and the job is {tour.status()}'
+            tour.run(0.3)
+            if not tour.robot.stopped:
+                return f'{topic} hangs, the job is ABORTED, and it drives on'
+            said = 'error', f'{topic.partition("/")[0]} does not change: I stop'
+            logged = tour.wait(lambda: said in tour.ear.heard, 2)
+        return logged or f'{topic} hangs, and it does not log: {said[1]}'
+
+    def each_that_hangs():
+        ahead, beside = (6.5, 0.0), (3.0, 3.0)  # to the second it turns first
+        return all_of(
+            notices_what_hangs('scan', 1.5, ahead),
+            notices_what_hangs('odom', 3.5, ahead),
+            notices_what_hangs('imu/data', 3.5, beside),
+        )
+
     def wrong_at_the_start():
         with ros_session():
             try:
@@ -147,16 +202,21 @@ def the_whole_node(workspace):
     empty = Parameter('least_battery', value=0.9998)
     soon = Parameter('timeout_s', value=0.3)
     rule = 'add_on_set_parameters_callback; get_parameter'
-    zeros, job = 'self.command(0.0, 0.0)', 'self.job = Job(...)'
+    zeros, parts = (
+        'self.command(0.0, 0.0)',
+        'self.told = 0.0, 0.0, and in command: self.told = v, w',
+    )
     timer = 'self.create_timer(0.1, self.job.place)'
-    fresh = 'self.get_clock().now() - Time.from_msg(scan.header.stamp)'
+    fresh = '-0.2 < now_s - seconds(scan.header.stamp) < 0.5'
     steered, none = 'self.command(*steer(...))', 'job.place() is None then.'
     at_once = 'without a goal it stands, with one command for each scan'
+    knows = 'self.where.knows(self.get_clock().now().nanoseconds / 1e9)'
+    hangs = 'self.frozen.look(now_s, self.told, scan) returns names; then self.job.end()'
     also_without = 'a cancel ends the job also if no scan comes'
     first = 'First the callback, then declare_parameter.'
     return [
         (at_once, toured(stands), zeros),
-        ('its attributes battery and job', toured(has_parts), job),
+        ('its parts', toured(has_parts), parts),
         ('it visits two places', toured(two_places), steered),
         ('a cancel stops it', toured(cancel), none),
         (also_without, toured(cancel_without_scans), timer),
@@ -165,7 +225,56 @@ def the_whole_node(workspace):
         ('a low battery ends the job', toured(low_battery, empty), 'self.job.end()'),
         ('without scans it stops, and says so', toured(no_scan, soon), 'self.watchdog.seen()'),
         ('it stands if scans are old, or from the future', toured(wrong_stamps), fresh),
+        ('it takes a goal if it knows where it is', begins_when_it_knows, knows),
+        ('it stands if wheels or IMU are not to be trusted', toured(needs_each_sensor), knows),
+        ('a sensor that hangs ends the job', each_that_hangs, hangs),
     ]
+
+
+def says_nan(message):
+    """Return a message of wheels or IMU without numbers."""
+    if isinstance(message, Imu):
+        message.orientation.z = message.orientation.w = math.nan
+    else:
+        message.twist.twist.linear.x = math.nan
+    return message
+
+
+def with_stamp(late_s):
+    """Return a function that changes the stamp of a message."""
+
+    def change(message):
+        stamp = Time.from_msg(message.header.stamp) + Duration(seconds=late_s)
+        message.header.stamp = stamp.to_msg()
+        return message
+
+    return change
+
+
+# What becomes of the messages of wheels or IMU. None: they do not come.
+TROUBLES = {
+    'is silent': None,
+    'says NaN': says_nan,
+    'has stamps that are 3 s old': with_stamp(-3.0),
+    'has stamps that are 3 s ahead': with_stamp(3.0),
+}
+
+
+class Hangs:
+    """Repeats the last message of a sensor, with new stamps, from `begins()` on."""
+
+    def __init__(self):
+        self.last, self.hangs = None, False
+
+    def begins(self):
+        self.hangs = True
+
+    def __call__(self, message):
+        if self.hangs and self.last is not None:
+            self.last.header.stamp = message.header.stamp
+            return self.last
+        self.last = message
+        return message
 
 
 def commands_at_arrivals(tour):
