@@ -2,7 +2,6 @@
 
 import math
 import re
-import shutil
 import sys
 import sysconfig
 import threading
@@ -14,7 +13,6 @@ from helpers.checks.bench import Bench, scan
 from helpers.checks.builds import EMPTY_OPTIONAL
 from helpers.checks.errors import Failed
 from helpers.checks.points import all_of, cached, expect, needs, rows
-from helpers.checks.programs import manifest
 from helpers.checks.tasks import Tasks
 from helpers.trials import build_anew
 from helpers.workspace import compile_error, error_in, why_it_failed
@@ -166,27 +164,7 @@ def the_gap(workspace):
 
 # --- Packages -------------------------------------------------------------------------------------
 
-# A package that uses the library, and the lines that give the library to others.
-USER = {
-    'package.xml': """<package format="3"><name>try_library</name><version>0.0.0</version>
-<description>A user</description><maintainer email="you@example.com">you</maintainer>
-<license>Apache-2.0</license><buildtool_depend>ament_cmake</buildtool_depend>
-<depend>scan_tools</depend><export><build_type>ament_cmake</build_type></export></package>
-""",
-    'CMakeLists.txt': """cmake_minimum_required(VERSION 3.8)
-project(try_library CXX)
-find_package(ament_cmake REQUIRED)
-find_package(scan_tools REQUIRED)
-add_executable(user main.cpp)
-target_link_libraries(user PRIVATE scan_tools::scan_tools)
-install(TARGETS user DESTINATION lib/${PROJECT_NAME})
-ament_package()
-""",
-    'main.cpp': """#include <iostream>
-#include <scan_tools/gap.hpp>
-int main() {const float r[] = {1, 5, 6, 5}; std::cout << *scan_tools::widest_gap(r, 4, 3);}
-""",
-}
+# The lines that give the library to others.
 GIVEN = """
 install(DIRECTORY include/ DESTINATION include/${PROJECT_NAME})
 install(TARGETS scan_tools EXPORT ours ARCHIVE DESTINATION lib LIBRARY DESTINATION lib)
@@ -201,113 +179,24 @@ def result_of(workspace, *packages, library=None):
     return result.ok or why_it_failed(result)
 
 
-def prints(workspace, package, executable, right):
-    """Return True if the last line that an executable prints is right, or else this line."""
-    output = workspace.terminal(f'source install/setup.bash\nros2 run {package} {executable}')
-    return expect((output.splitlines() or ['nothing'])[-1], right, 'it prints')
-
-
-@tasks.add(limit_s=BUILD_S)
-def make_the_library(workspace, library):
-    @cached
-    def built():
-        for file, text in USER.items():
-            workspace.write(f'src/try_library/{file}', text)
-        try:
-            return result_of(workspace, 'scan_tools', 'try_library', library=library + GIVEN)
-        finally:
-            shutil.rmtree(workspace.file('src/try_library'))
-
-    def is_a_library():
-        folder = workspace.file('install/scan_tools/lib')
-        names = [f'libscan_tools.{end}' for end in ('a', 'so', 'dylib')]
-        if any((folder / name).is_file() for name in names):
-            return True
-        others = sorted(path.name for path in folder.glob('lib*'))
-        return f'in install/scan_tools/lib: {", ".join(others) or "no library"}'
-
-    def finds_the_gap():
-        needs(built, NOT_BUILT)
-        return prints(workspace, 'try_library', 'user', '2')
-
-    return [
-        ('another package builds with it', built, 'target_include_directories(... PUBLIC ...)'),
-        ('it is called scan_tools', is_a_library, 'add_library(scan_tools src/gap.cpp)'),
-        ('its program finds the gap', finds_the_gap, 'It runs if it builds.'),
-    ]
-
-
 @tasks.add(limit_s=BUILD_S)
 def link_the_library(workspace, library):
     built = cached(lambda: result_of(workspace, 'scan_tools', 'look', library=library + GIVEN))
 
-    def library_is_first():
-        order = workspace.terminal('colcon list -t --names-only').split()
-        if 'look' not in order:
-            return f'colcon does not find look: {" ".join(order)}'
-        return order.index('scan_tools') < order.index('look') or 'colcon builds look first'
-
-    def prints_for(ranges, beam):
-        """Build look again with other ranges. Return whether it prints the right beam."""
-        file = workspace.file('src/look/src/look.cpp')
-        yours = file.read_text()
-        try:
-            file.write_text(re.sub(r'(ranges\[\] = )\{.*?\}', rf'\1{{{ranges}}}', yours))
-            # CMake installs no program that was linked in the same second as the one there.
-            workspace.file('install/look/lib/look/look').unlink(missing_ok=True)
-            result = workspace.build('look')
-        finally:
-            file.write_text(yours)
-        if not result.ok:
-            return f'for {ranges} it does not build: {why_it_failed(result)}'
-        right = prints(workspace, 'look', 'look', f'The gap is at beam {beam}')
-        return right is True or f'for {ranges}, {right}'
-
     def prints_the_gap():
         needs(built, NOT_BUILT)
-        right = prints(workspace, 'look', 'look', 'The gap is at beam 3')
-        return prints_for('7, 8, 9, 1, 1, 1', 1) if right is True else right
+        printed = workspace.terminal('source install/setup.bash\nros2 run look look')
+        return expect(
+            (printed.splitlines() or ['nothing'])[-1], 'The gap is at beam 3', 'it prints'
+        )
 
     steps = 'As in step 1, with find_package and target_link_libraries.'
-    call = 'scan_tools::widest_gap(ranges, 6, 3).value(), and install(...)'
     return [
-        ('colcon builds the library first', library_is_first, '<depend>NAME</depend>'),
         ('look builds', built, steps),
-        ('look prints the gap', prints_the_gap, call),
-    ]
-
-
-@tasks.add(limit_s=BUILD_S)
-def give_it_to_others(workspace):
-    built = cached(lambda: result_of(workspace, 'scan_tools', 'look'))
-
-    def headers_are_installed():
-        include = workspace.path / 'install/scan_tools/include'
-        headers = sorted(str(file.relative_to(include)) for file in include.glob('**/*.hpp'))
-        right = [f'scan_tools/scan_tools/{name}.hpp' for name in ('gap', 'nearest')]
-        return headers == right or f'in install/scan_tools/include: {", ".join(headers) or "none"}'
-
-    def look_runs():
-        needs(built, NOT_BUILT)
-        return prints(workspace, 'look', 'look', 'The gap is at beam 3')
-
-    def is_found_at_the_start():
-        """Source the package alone: for a library that is shared, colcon helps."""
-        needs(built, NOT_BUILT)
-        folders = workspace.terminal("""unset LD_LIBRARY_PATH DYLD_LIBRARY_PATH
-            source install/scan_tools/share/scan_tools/local_setup.bash
-            echo $LD_LIBRARY_PATH $DYLD_LIBRARY_PATH""")
-        is_there = 'install/scan_tools/lib' in folders
-        return is_there or 'after sourcing, programs do not look into install/scan_tools/lib'
-
-    return [
-        ('look builds with your library', built, 'Copy the three lines of the table.'),
-        ('both headers are installed', headers_are_installed, 'install(DIRECTORY ...)'),
-        ('look runs', look_runs, 'It runs if it builds.'),
         (
-            'sourcing tells programs where the library is',
-            is_found_at_the_start,
-            'ament_export_targets(... HAS_LIBRARY_TARGET)',
+            'look prints the gap',
+            prints_the_gap,
+            'install(TARGETS look DESTINATION ...), as in step 1',
         ),
     ]
 
@@ -334,80 +223,55 @@ def bind(workspace):
         is_made = workspace.file('try_module/scan_tools_py.so').is_file()
         return is_made or compile_error(output)
 
-    def prints(code, right):
+    def said(code):
+        """Return the last line that a program of Python prints. Raises Failed with its error."""
         needs(compiled, NOT_COMPILED)
         workspace.write(
             'try_module/try.py',
             f'import numpy as np, threading, time\nimport scan_tools_py as m\n{code}\n',
         )
-        lines = workspace.terminal('cd try_module && python try.py 2>&1').splitlines()
-        return lines[-1:] == [right] or f'in Python: {error_in(lines)}'
+        printed = workspace.terminal('cd try_module && timeout 20 python try.py 2>&1')
+        if 'Error' in printed or not printed:
+            raise Failed(f'in Python: {error_in(printed)}')
+        return printed.splitlines()[-1]
+
+    def returns(call, right):
+        return expect(said(f'print({call})'), right, f'{call} is')
+
+    def releases_the_gil():
+        return said(STOPPED) == 'True' or 'm.stop() in another thread did not end m.search(4.0)'
 
     function = '[](const Ranges & ranges, int width) {return scan_tools::widest_gap(...);}'
     guard = 'm.def("search", &search, py::call_guard<...>());'
     return [
         ('it compiles', compiled, 'Compare with nearest: parentheses, commas, semicolons.'),
         *rows(
-            prints,
+            returns,
             function,
-            ('a gap', 'print(m.widest_gap([1, 5, 6, 5, 1], 3))', '2'),
-            ('another gap', 'print(m.widest_gap(np.arange(9), 4))', '7'),
-            ('no gap is None', 'print(m.widest_gap([0, 0], 1))', 'None'),
+            ('a gap', 'm.widest_gap([1, 5, 6, 5, 1], 3)', '2'),
+            ('another gap', 'm.widest_gap(np.arange(9), 4)', '7'),
+            ('no gap is None', 'm.widest_gap([0, 0], 1)', 'None'),
         ),
-        ('search releases the GIL', lambda: prints(STOPPED, 'True'), guard),
+        ('search releases the GIL', releases_the_gil, guard),
     ]
 
 
-@tasks.add
-def name_what_it_needs(workspace):
-    package = cached(lambda: manifest(workspace, 'src/scan_tools_py'))
-
-    def names(kind, *right):
-        found = sorted(depend.name for depend in getattr(package(), f'{kind}_depends'))
-        return found == sorted(right) or f'named: {", ".join(found) or "none"}'
-
-    tools = 'ament_cmake', 'ament_cmake_python'
-    to_build = 'pybind11-dev', 'python3-dev', 'scan_tools'
-    to_run = 'python3-numpy', 'scan_tools'
-    both = '<build_depend>, and <depend>'
-    return [
-        ('the tools', lambda: names('buildtool', *tools), '<buildtool_depend>'),
-        ('what it needs to build', lambda: names('build', *to_build), both),
-        ('what it needs to run', lambda: names('exec', *to_run), '<exec_depend>'),
-    ]
-
-
-def module_points(workspace, built, hint):
-    """Return the points of a task that makes the module: it builds, and Python imports it."""
+@tasks.add(limit_s=BUILD_S)
+def fix_it(workspace):
+    built = cached(lambda: result_of(workspace, 'scan_tools', 'scan_tools_py'))
 
     def is_imported():
         needs(built, NOT_BUILT)
         lines = workspace.terminal("""
             source install/setup.bash
-            python -c 'import scan_tools_py as m; print(m.widest_gap([1, 5, 6, 5, 1], 3))' 2>&1
+            python -c 'import scan_tools_py as m; print(m.nearest([3, 1, 2], 0, 3))' 2>&1
         """).splitlines()
-        return lines[-1:] == ['2'] or error_in(lines)
+        return lines[-1:] == ['1.0'] or error_in(lines)
 
     return [
-        ('the module builds', built, hint),
+        ('the module builds', built, "'add_library(scan_tools SHARED'"),
         ('Python imports it', is_imported, 'It comes with the build.'),
     ]
-
-
-@tasks.add(limit_s=BUILD_S)
-def make_the_module(workspace, library):
-    shared = re.sub('find_package', 'set(BUILD_SHARED_LIBS ON)\n\\g<0>', library, count=1)
-    built = cached(
-        lambda: result_of(workspace, 'scan_tools', 'scan_tools_py', library=shared + GIVEN)
-    )
-    module = 'pybind11_add_module(scan_tools_py NO_EXTRAS src/bindings.cpp)'
-    return module_points(workspace, built, module)
-
-
-@tasks.add(limit_s=BUILD_S)
-def fix_it(workspace):
-    built = cached(lambda: result_of(workspace, 'scan_tools', 'look', 'scan_tools_py'))
-    return module_points(workspace, built, "'add_library(scan_tools SHARED'")
 
 
 # --- The node -------------------------------------------------------------------------------------
@@ -415,17 +279,15 @@ def fix_it(workspace):
 
 @tasks.add
 def through_the_slalom(GapDriver, WIDTH, scan_tools_py):
-    def command_for(gap):
-        """Return the command for a scan with a gap, and whether the node has asked C++ for it."""
-        calls = []
+    asked = []
+
+    def command_for(ranges):
+        """Return the command that the node makes of a scan, and note whether it asks C++."""
 
         def note(frame, event, function):
             if event == 'c_call':
-                calls.append(function)
+                asked.append(function)
 
-        ranges = np.full(181, math.nan if gap is None else 1.0)
-        if gap is not None:
-            ranges[gap - WIDTH // 2 : gap + WIDTH // 2 + 1] = 3.0
         with Bench() as bench:
             commands = bench.hear('cmd_vel', Twist)
             threading.setprofile(note)  # for the thread that spins the node
@@ -434,33 +296,89 @@ def through_the_slalom(GapDriver, WIDTH, scan_tools_py):
             if not bench.tester.count_subscribers('scan'):
                 raise Failed('nobody hears the topic scan')
             bench.say('scan', scan(ranges))
+            bench.quiet()
         if not commands:
             raise Failed('after a scan, it publishes nothing on cmd_vel')
-        return commands[0], scan_tools_py.widest_gap in calls
+        if len(commands) > 1:
+            raise Failed(f'after one scan, it publishes {len(commands)} messages on cmd_vel')
+        return commands[0]
 
-    def drives(gap, w):
-        command, _ = command_for(gap)
+    def with_gap(gap, *, near=(), near_m=0.3):
+        """Return a scan of 1 m with a gap, and something near where the beams of `near` look."""
+        ranges = np.full(181, 1.0)
+        ranges[gap - WIDTH // 2 : gap + WIDTH // 2 + 1] = 3.0
+        ranges[[*near]] = near_m
+        return ranges
+
+    def drives(gap, w, **near):
+        command = command_for(with_gap(gap, **near))
         of = f'with the gap at beam {gap},'
         return all_of(
             expect(command.linear.x, 0.4, f'{of} linear.x is', within=0.001),
             expect(command.angular.z, w, f'{of} angular.z is', within=0.001),
         )
 
-    def stops():
-        command, _ = command_for(None)
+    def stops(of, ranges):
+        command = command_for(ranges)
         v, w = command.linear.x, command.angular.z
-        return v == w == 0.0 or f'of beams that are all NaN it makes {v:.2f} m/s, {w:.2f} rad/s'
+        return v == w == 0.0 or f'{of} it makes {v:.2f} m/s, {w:.2f} rad/s'
+
+    def stops_where_all_is_near():
+        return all_of(
+            stops('of beams that are all 0.12 m', np.full(181, 0.12)),
+            stops('of beams that are all -inf', np.full(181, -math.inf)),
+        )
+
+    def stops_before_something():
+        of = 'with a gap on the left, and something at 0.3 m ahead,'
+        return all_of(*(stops(of, with_gap(150, near=[beam])) for beam in (60, 120)))
+
+    def drives_past_something():
+        return all_of(
+            drives(90, 0.0, near=(20, 59, 121, 160)),
+            drives(90, 0.0, near=[62], near_m=0.5),  # far enough
+        )
+
+    def stops_if_ahead_is_unknown():
+        ranges = with_gap(150, near=range(60, 121), near_m=math.nan)
+        ranges[90] = 5.0
+        return stops('with a gap on the left, and one known beam ahead,', ranges)
+
+    def stops_without_a_gap():
+        ranges = np.full(181, math.nan)
+        ranges[60:76] = ranges[105:121] = 3.0  # half of those ahead, and too few for a gap
+        return all_of(
+            stops('of beams that are all NaN', np.full(181, math.nan)),
+            stops('of beams of which too few are known for a gap', ranges),
+        )
 
     def asks_cpp():
-        _, asked = command_for(90)
-        return asked or 'for a scan it does not call scan_tools_py.widest_gap'
+        command_for(with_gap(90))
+        return (
+            scan_tools_py.widest_gap in asked
+            or 'for a scan it does not call scan_tools_py.widest_gap'
+        )
 
     angle = '2 * math.radians(gap - 90)'
     call = 'scan_tools_py.widest_gap(scan.ranges, WIDTH)'
+    ahead = 'scan_tools_py.nearest(scan.ranges, 60, 121)'
+    near = f'If {ahead} is less than STOP_M, publish Twist().'
     return [
         ('straight ahead', lambda: drives(90, 0.0), call),
         ('to the left', lambda: drives(120, math.radians(60)), angle),
         ('to the right', lambda: drives(45, -math.radians(90)), angle),
-        ('it stops if there is no gap', stops, 'widest_gap returns None: then publish Twist().'),
+        ('it stops where all is near', stops_where_all_is_near, near),
+        ('it stops before something ahead', stops_before_something, near),
+        ('it drives past what is far enough, or at its side', drives_past_something, ahead),
+        (
+            'it stops if there is no gap',
+            stops_without_a_gap,
+            'widest_gap returns None: then publish Twist().',
+        ),
+        (
+            'it stops if it does not know what is ahead',
+            stops_if_ahead_is_unknown,
+            'nearest returns None: then publish Twist().',
+        ),
         ('it asks C++', asks_cpp, call),
     ]

@@ -12,7 +12,7 @@ from helpers.checks.lessons.test_a_node.shared import (
     tasks,
 )
 from helpers.checks.points import cached, needs
-from helpers.trials import BRAKE, BUSY, planted, run_busy, run_tests
+from helpers.trials import BRAKE, BUSY, planted, run_tests
 
 # --- Task 1: a function
 
@@ -95,43 +95,7 @@ def a_domain_of_its_own(workspace):
     ]
 
 
-# --- Tasks 3 and 5: a flaky test
-
-LATE = (
-    BRAKE
-    + """
-Quick = Brake
-
-class Brake(Quick):
-    def create_subscription(self, *arguments):
-        def connect():
-            late.cancel()
-            Quick.create_subscription(self, *arguments)
-
-        late = self.create_timer(0.4, connect)
-"""
-)
-
-
-@tasks.add(limit_s=60)
-def catch_it(workspace, tests):
-    busy = cached(lambda: run_busy(workspace, tests))
-
-    def runs_nine_times():
-        count = busy().passed + len(busy().failed)
-        return count == 9 or f'number of runs: {count}; pytest: {busy().says}'
-
-    def is_flaky():
-        return (busy().passed > 0 and busy().fails) or f'all runs are alike: {busy().says}'
-
-    parametrize = "@pytest.mark.parametrize('again', range(9)), and (bench, again)"
-    return [
-        ('pytest runs it nine times', runs_nine_times, parametrize),
-        ('some runs pass, and some fail', is_flaky, 'Leave the rest of the test as it is.'),
-    ]
-
-
-# --- Task 4: a wait
+# --- Task 3: a wait
 
 # 600 events come so quickly that who counts calls of spin_once, in place of time, gives up.
 WAITS = """import pytest
@@ -182,6 +146,24 @@ def wait_for_an_event(workspace):
     ]
 
 
+# --- Task 4: a flaky test
+
+LATE = (
+    BRAKE
+    + """
+Quick = Brake
+
+class Brake(Quick):
+    def create_subscription(self, *arguments):
+        def connect():
+            late.cancel()
+            Quick.create_subscription(self, *arguments)
+
+        late = self.create_timer(0.4, connect)
+"""
+)
+
+
 @tasks.add(limit_s=60)
 def fix_the_flaky_test(workspace, tests):
     @cached
@@ -220,7 +202,7 @@ def without_run(text):
     return re.sub(r'(test_\w+)\[.*?\]', r'\1', text)
 
 
-# --- Task 6: colcon
+# --- Task 5: colcon
 
 
 @tasks.add(limit_s=90)

@@ -13,7 +13,7 @@ from helpers.checks.lessons.test_a_node.shared import (
 from helpers.checks.points import all_of, cached, expect
 from helpers.trials import Device, planted, run_tests, state_after
 
-# --- Task 7: a lifecycle
+# --- Task 6: a lifecycle
 
 # rclpy tells nobody what a step raises: `step` does.
 OURS = """import time
@@ -94,6 +94,8 @@ def test_parameter(bench):
     soon(bench, lambda: errors, 'a wrong full_mps is refused, and no error is logged')
     bench.brake.set_parameters([Parameter('full_mps', value=1.0)])
     up(bench)
+    publisher = getattr(bench.brake, 'publisher', None)
+    assert hasattr(publisher, 'publish'), 'it has no publisher with the name self.publisher'
     found = answers(bench, 9.0)
     assert found == [1.0], f'with full_mps 1.0, of 9.0 m it makes {found}, not [1.0]'
 
@@ -154,7 +156,7 @@ def a_brake_with_a_lifecycle(workspace):
     ]
 
 
-# --- Task 8: a step that fails
+# --- Task 7: a step that fails
 
 
 @tasks.add
@@ -203,7 +205,7 @@ def a_camera_that_fails(Camera):
     ]
 
 
-# --- Task 9: the running node
+# --- Task 8: the running node
 
 
 @tasks.add
@@ -215,7 +217,7 @@ def make_it_active(workspace):
     return [('the node is active', is_active, 'configure, then activate.')]
 
 
-# --- Task 10: six bugs
+# --- Task 9: six bugs
 
 RIGHT_NODE = """from geometry_msgs.msg import Twist
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
