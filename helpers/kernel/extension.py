@@ -15,7 +15,6 @@ from IPython.utils.process import system
 from helpers.notebook import own_line, run_command
 
 # The first cells of each lesson load one of them.
-SHOWN = '_render_traceback_'  # IPython shows what an exception's own method of this name returns
 IN_IMPORT, IN_TRACKER = '<frozen importlib', 'resource_tracker.py'
 OF_FIRST_CELLS = 'helpers.ros.session', 'helpers.workspace'
 
@@ -34,7 +33,8 @@ def load_ipython_extension(shell) -> None:
             line = own_line(
                 (frame.f_code.co_filename, number) for frame, number in _frames(traceback)
             )
-            setattr(error, SHOWN, lambda: [f'Interrupted. {line}'.strip()])
+            # private: an error that IPython shows, IPython 9.18
+            error._render_traceback_ = lambda: [f'Interrupted. {line}'.strip()]
         shell.showtraceback((kind, error, traceback), tb_offset=tb_offset)
         if kind is KeyboardInterrupt:
             return
