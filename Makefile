@@ -30,20 +30,20 @@ present: set_up ## show lessons as slides whose cells run: LESSON=02, PLAN=90 (h
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join; PORT=8765, BROWSER=no
 	@exec $(PYTHON) -m classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
 
-handout: set_up ## write a student's edition: SOLUTIONS=no (or "00 01"), OFFLINE=yes (with packages, PYTHONS="3.11 3.12")
-	@$(PYTHON) -m classroom.handout $(if $(SOLUTIONS),--solutions "$(SOLUTIONS)") \
+handout: set_up ## write a student's edition: SOLUTIONS=no (or "00 01"), BORROW=no, OFFLINE=yes (with packages, PYTHONS="3.11 3.12")
+	@$(PYTHON) -m classroom.handout $(if $(SOLUTIONS),--solutions "$(SOLUTIONS)") $(if $(BORROW),--borrow "$(BORROW)") \
 		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
 
 grade: set_up ## judge what students hand in: FOLDER=submissions, LESSON=02, JOBS=2, STARS=no; see teaching.md
 	@$(PYTHON) -m classroom.grade "$(or $(FOLDER),submissions)" --lesson "$(LESSON)" --seed "$(SEED)" --assignment "$(ASSIGNMENT)" \
 		$(if $(filter no,$(STARS)),--no-stars) $(if $(TASKS),--tasks "$(TASKS)") $(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
 
-hub: ## run a JupyterHub for a class: CONTAINERS=yes, SOLUTIONS=no, HUB_ARGS=...; see classroom/HOSTING.md
+hub: ## run a JupyterHub for a class: CONTAINERS=yes, SOLUTIONS=no, BORROW=no, HUB_ARGS=...; see classroom/HOSTING.md
 	@classroom/hub/set_up.sh
-	@CONTAINERS="$(CONTAINERS)" SOLUTIONS="$(SOLUTIONS)" exec $(PYTHON) -m jupyterhub --config classroom/hub/jupyterhub_config.py $(HUB_ARGS)
+	@CONTAINERS="$(CONTAINERS)" SOLUTIONS="$(SOLUTIONS)" BORROW="$(BORROW)" exec $(PYTHON) -m jupyterhub --config classroom/hub/jupyterhub_config.py $(HUB_ARGS)
 
-image: ## build the container image of the lessons: SOLUTIONS=no, BASE=, CONTAINER=, IMAGE_ARGS=
-	@SOLUTIONS="$(SOLUTIONS)" classroom/container/run.sh image
+image: ## build the container image of the lessons: SOLUTIONS=no, BORROW=no, BASE=, CONTAINER=, IMAGE_ARGS=
+	@SOLUTIONS="$(SOLUTIONS)" BORROW="$(BORROW)" classroom/container/run.sh image
 
 ## Contribute
 
@@ -96,6 +96,10 @@ test-hub: set_up ## test a hub and a container with a class of twelve
 soak: set_up ## run the notebooks in hard conditions, as root: CONDITIONS="idle busy", LESSON=02
 	@tests/soak/run.sh "$(CONDITIONS)" "$(LESSON)"
 
+left-out: set_up ## run the notebooks with tasks left unsolved: TASKS=each (stars), LESSON=02
+	@$(PYTHON) -m pytest -n $(WORKERS) --dist loadscope --max-worker-restart 0 -o faulthandler_timeout=600 tests/left_out notebooks \
+		--left-out "$(or $(TASKS),stars)" $(lesson) $(PYTEST_ARGS)
+
 bench: set_up ## measure what the first start costs, on an idle machine: ROUNDS=3
 	@$(PYTHON) tests/benchmarks/start.py $(ROUNDS)
 
@@ -114,12 +118,12 @@ set_up:
 	@tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
-test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub notebooks lesson task soak bench lint: groups := test
+test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub notebooks lesson task soak left-out bench lint: groups := test
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
 .PHONY: help lab present class test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub image lab-container hub handout grade update notebooks \
-	lesson task site soak bench release lint lock licences clean set_up
+	lesson task site soak left-out bench release lint lock licences clean set_up
 
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None
 # is replaced: where one has crashed, pytest-xdist may wait for its successor for ever.

@@ -3,6 +3,7 @@
     python -m classroom.handout                       without notes for the instructor
     python -m classroom.handout --solutions no        and without solutions
     python -m classroom.handout --solutions "00 01"   with the solutions of these lessons only
+    python -m classroom.handout --solutions no --borrow no    and nothing can be borrowed
     python -m classroom.handout --wheels 3.11 3.12    with all packages for these Pythons
     python -m classroom.handout --lessons FOLDER      the lessons only, into this folder
 
@@ -11,6 +12,10 @@ environment.md is without what is between `<!-- not in the handout -->` and `<!-
 notebooks have no outputs. `.handed_out` holds the same files once more, so that `make update` can
 see what the student has written since. An archive with more solutions brings them to those who have
 one with fewer.
+
+Without solutions a student who is stuck may borrow what the next steps need, after some tries:
+`%borrow be_the_queue`. For that each check keeps its solution in its metadata, unreadable at a
+glance; with `--borrow no` it is left out.
 """
 
 import argparse
@@ -27,7 +32,16 @@ from nbformat import NotebookNode
 from packaging.requirements import Requirement
 
 from classroom.update import BASE, committed
-from helpers.lesson import PICTURES, ROOT, chosen, is_for_instructors, tags
+from helpers.lesson import (
+    PICTURES,
+    ROOT,
+    Lesson,
+    chosen,
+    code_of_solution,
+    is_for_instructors,
+    keep_solution,
+    tags,
+)
 from helpers.notebook import MARK
 from tools.lessons.clean import text_of
 
@@ -51,15 +65,25 @@ LESSONS = re.compile(
     r'<!-- made by `make notebooks`: lessons -->\n\n(.*?)\n\n<!-- end -->', re.DOTALL
 )
 NOT_HANDED_OUT = re.compile(r'<!-- not in the handout -->.*?<!-- end -->\n\n?', re.DOTALL)
+# The line of notebook 00 that says how to use solutions, and the one that takes its place.
+OF_SOLUTIONS = re.compile(r'^- The \*\*solution\*\* .*\n?', re.MULTILINE)
+OF_BORROWING = (
+    '- Are you **stuck**? After three tries the check names a line, such as `%borrow a_driver`. It '
+    'puts what the next steps need into place. The task counts as borrowed, not as solved, and you '
+    'can come back to it.\n'
+)
 GTEST = 'ros-gtest-vendor=='
 GTEST_PYTHON = '3.12'  # whose wheel holds the sources: see tools/set_up.sh
 GLIBC = ('_2_28', '_2_27', '_2_26', '_2_24', '_2_17', '_2_12', '_2_5', '2014', '2010', '1')
 
 
-def handout(root: Path, output: Path, *, solutions: str = ALL, pythons: tuple = ()) -> Path:
+def handout(
+    root: Path, output: Path, *, solutions: str = ALL, borrow: bool = True, pythons: tuple = ()
+) -> Path:
     """Write the archive of the checkout `root`, and return it.
 
-    `solutions` is what SOLUTIONS= says; `pythons` are versions such as '3.12', whose wheels are
+    `solutions` is what SOLUTIONS= says; `borrow` whether what is left out may be borrowed;
+    `pythons` are versions such as '3.12', whose wheels are
     added. Raises ValueError with one sentence.
     """
     with tempfile.TemporaryDirectory() as folder:
@@ -73,7 +97,9 @@ def handout(root: Path, output: Path, *, solutions: str = ALL, pythons: tuple = 
         _keep_only(course)
         for name, text in texts.items():
             (course / name).write_text(text, encoding='utf-8')
-        write_lessons(course / 'notebooks', course / 'notebooks', solutions=solutions)
+        write_lessons(
+            course / 'notebooks', course / 'notebooks', solutions=solutions, borrow=borrow
+        )
         shutil.copytree(course, Path(folder, BASE))
         Path(folder, BASE).rename(course / BASE)
         if pythons:
@@ -86,10 +112,11 @@ def handout(root: Path, output: Path, *, solutions: str = ALL, pythons: tuple = 
     return output
 
 
-def write_lessons(source: Path, to: Path, *, solutions: str = ALL) -> None:
+def write_lessons(source: Path, to: Path, *, solutions: str = ALL, borrow: bool = True) -> None:
     """Write the lessons of a folder as students get them: all may read them, and no others stay.
 
     `solutions` is what SOLUTIONS= says: yes, no, or the lessons whose solutions are handed out.
+    `borrow` is whether a student who is stuck may borrow those that are left out.
     Raises ValueError with one sentence if there is no such lesson.
     """
     solved = [] if solutions == 'no' else chosen('' if solutions == ALL else solutions, source)
@@ -100,7 +127,10 @@ def write_lessons(source: Path, to: Path, *, solutions: str = ALL) -> None:
         (to / other).unlink()
     for path in paths:
         left_out = {'notes'} if path in solved else {'notes', 'solution'}
-        lesson = lesson_for_students(nbformat.read(path, as_version=4), left_out)
+        notebook = nbformat.read(path, as_version=4)
+        if 'solution' in left_out:
+            _without_solutions(Lesson(path.name, notebook), borrow)
+        lesson = lesson_for_students(notebook, left_out)
         (to / path.name).write_text(text_of(lesson), encoding='utf-8')
         (to / path.name).chmod(0o644)
     if to != source:
@@ -143,6 +173,16 @@ def readme_for_students(course: Path) -> str:
 def for_students(text: str) -> str:
     """Return a document without what only a clone has."""
     return NOT_HANDED_OUT.sub('', text)
+
+
+def _without_solutions(lesson: Lesson, borrow: bool) -> None:
+    """Take out the sentence about solutions; let checks keep what can be borrowed."""
+    for cell in lesson.cells:
+        if cell.cell_type == 'markdown':
+            cell.source = OF_SOLUTIONS.sub(OF_BORROWING if borrow else '', cell.source)
+    for task in lesson.tasks if borrow else ():
+        for check, solution in zip(task.checks, task.solutions, strict=False):
+            keep_solution(check, code_of_solution(solution.source))
 
 
 def lesson_for_students(notebook: NotebookNode, left_out: set[str]) -> NotebookNode:
@@ -207,19 +247,20 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the tool; return its exit status."""
     parser = argparse.ArgumentParser(description="Make a student's edition of this course.")
     parser.add_argument('--solutions', default=ALL, metavar='yes|no|"00 01"')
+    parser.add_argument('--borrow', choices=('yes', 'no'), default='yes', help='without solutions')
     parser.add_argument('--wheels', nargs='+', default=(), metavar='PYTHON', help='such as 3.12')
     parser.add_argument('--lessons', type=Path, metavar='FOLDER', help='no archive: lessons only')
     parser.add_argument('--root', type=Path, default=ROOT)
     options = parser.parse_args(arguments)
     output = options.root / 'handout' / f'{NAME}.tar.gz'
-    pythons = tuple(options.wheels)
+    pythons, borrow = tuple(options.wheels), options.borrow == 'yes'
     try:
         if options.lessons:
             notebooks = options.root / 'notebooks'
-            write_lessons(notebooks, options.lessons, solutions=options.solutions)
+            write_lessons(notebooks, options.lessons, solutions=options.solutions, borrow=borrow)
             return 0
         left_out = not_committed(options.root)
-        handout(options.root, output, solutions=options.solutions, pythons=pythons)
+        handout(options.root, output, solutions=options.solutions, borrow=borrow, pythons=pythons)
     except ValueError as error:
         print(error, file=sys.stderr)
         return 1

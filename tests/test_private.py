@@ -22,6 +22,7 @@ import pytest
 import rclpy
 from ipykernel.comm.comm import BaseComm
 from ipykernel.kernelbase import Kernel
+from IPython.core import interactiveshell
 from rclpy.action import ActionClient
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
@@ -55,6 +56,9 @@ def owners():
         'a ThreadPoolExecutor': ThreadPoolExecutor(),
         'sys': sys,
         'a kernel': Kernel,
+        'an error that IPython shows': SimpleNamespace(
+            **dict.fromkeys(re.findall(r'value\.(_\w+_)\(', inspect.getsource(interactiveshell)))
+        ),
         'a comm': BaseComm,
         'a process of pexpect': pexpect.spawn,
         'quickjs-ng': SimpleNamespace(_quickjs=_quickjs),

@@ -28,7 +28,8 @@ $container version > /dev/null 2>&1 ||
 
 make_image() {
     set -- --file classroom/container/Containerfile --tag "$image" --label "lessons=$inside" \
-        --label "solutions=${SOLUTIONS:-yes}" --build-arg "SOLUTIONS=${SOLUTIONS:-yes}" ${BASE:+--build-arg "BASE=$BASE"}
+        --label "solutions=${SOLUTIONS:-yes}" --build-arg "SOLUTIONS=${SOLUTIONS:-yes}" \
+        --build-arg "BORROW=${BORROW:-yes}" ${BASE:+--build-arg "BASE=$BASE"}
     # The wheels of ROS 2 are for x86-64; a base with ROS 2 is for the machine that it is on.
     case ${BASE-} in *ros:*) ;; *) [ "$(uname -m)" = x86_64 ] || set -- "$@" --platform linux/amd64 ;; esac
     # Podman's own format of images has no health check.

@@ -31,7 +31,8 @@ LARGEST_SOURCE = 200_000  # letters of a cell
 # What an answer of a lesson has no need for, and what forges a verdict would use.
 MACHINERY = re.compile(
     r'helpers\.checks|ros2_notebooks|sys\.modules|get_ipython|gc\.get_|_getframe|ctypes|/proc/'
-    r'|\.ipynb|__globals__|__closure__|__code__|inspect\.'
+    r'|\.ipynb|__globals__|__closure__|__code__|inspect\.|importlib|ipykernel|multiprocessing'
+    r'|builtins|settrace|setprofile|mock|%borrow'
 )
 
 

@@ -60,7 +60,8 @@ CLASS_URL = 'http://127.0.0.1:8764'
 LESSONS = ROOT / '.jupyter/lessons'  # without notes, and with the solutions that SOLUTIONS names
 SOLUTIONS = os.environ.get('SOLUTIONS') or ALL
 try:
-    write_lessons(ROOT / 'notebooks', LESSONS, solutions=SOLUTIONS)
+    borrow = os.environ.get('BORROW') != 'no'
+    write_lessons(ROOT / 'notebooks', LESSONS, solutions=SOLUTIONS, borrow=borrow)
 except ValueError as error:  # SOLUTIONS names no lesson
     sys.exit(str(error))
 c.Spawner.environment = {

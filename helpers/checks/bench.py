@@ -31,6 +31,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import sys
 import threading
 import time
@@ -62,6 +63,7 @@ QUIET_S = 6.0
 CALLBACK_S = 3.0  # for a callback to end
 HOLD_S = 30.0  # at a gate that nobody opens
 POLL_S = 0.005
+WAITS_FOR_LOCK = re.compile(r'\.acquire\(|: with .*lock', re.IGNORECASE)
 ALL = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)  # hears every publisher
 # As the base of a robot subscribes: a program that ends can wait until its last message is here.
 RELIABLE = QoSProfile(depth=1000)
@@ -264,6 +266,8 @@ class Bench:
         end = time.monotonic() + CALLBACK_S
         while place := self.line_of_callback():
             if time.monotonic() > end:
+                if WAITS_FOR_LOCK.search(place):
+                    raise NeverEnds(f'a callback waits for a lock that nobody releases. {place}')
                 raise NeverEnds(f'a callback does not end. {place}')
             time.sleep(POLL_S)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 from helpers.lesson import CHECK_BEGINS
 
 NOT_RUN = (
@@ -27,4 +29,6 @@ def explain_missing_name(name: str, first_line: str, begun: bool) -> str:
         return NO_GUESS.format(name)
     if first_line.startswith(CHECK_BEGINS):
         return NO_ANSWER.format(name)
-    return ''
+    # It is there if the lesson has tasks; no other notebook loads it for a sentence.
+    tasks = sys.modules.get('helpers.checks.tasks')
+    return tasks.who_makes(name) if tasks else ''

@@ -41,6 +41,12 @@ from numbers import Real
 import numpy as np
 
 from helpers.checks.errors import Failed, NeverEnds, place_of, sentence
+from helpers.checks.honest import (
+    CHANGED,
+    Untouched,
+    mend_new_classes,
+    refuse_what_equals_everything,
+)
 from helpers.notebook import frames, own_line, places
 
 Test = tuple[str, Callable[[], object], str]
@@ -169,6 +175,8 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
         f'A thread of yours ended with {sentence(error.exc_value or error.exc_type())}'
     )
     threads = set(threading.enumerate())
+    refuse_what_equals_everything()
+    untouched = Untouched()
     try:
         tests = _tests_of(points())
     except Exception as error:  # of the check, not of the student
@@ -178,6 +186,7 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
     for number, (what, test, _) in enumerate(tests):
         failures.clear()
         never_ends, hint = False, None
+        mend_new_classes()
         try:
             result = _result(test)
             ok, found = (False, result) if isinstance(result, str) else (True, '')
@@ -202,6 +211,8 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
             ]
             if left and ok:
                 ok, found = False, _still_runs(left[0])
+        if ok and (changed := untouched.look()):
+            ok, found, hint = False, CHANGED.format(changed), ''
         send(('point', (ok, found, hint)))
         if never_ends:
             break

@@ -4,7 +4,8 @@
 each task, such as `lose_messages be_the_queue`: the names of the lesson and of the task, and no
 numbers, which change when a lesson or a task is added before them. Lines of version 0.3 had a
 number, and are read as the task that had it then. What `checks.remember` keeps are lines that begin
-with `memory`. Lines are only ever added, so kernels that write at once lose nothing.
+with `memory`; `borrowed lose_messages be_the_queue` is a task that a student has gone on without,
+which is not solved by that. Lines are only ever added, so kernels that write at once lose nothing.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from jupyter_core.paths import jupyter_data_dir
 from helpers import notebook as text
 from helpers.lesson import FOLDER, Lesson, earlier_name, outlines, paths
 
+BORROWED = 'borrowed'  # begins the line of a task that a student has gone on without
 FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progress is kept
 LESSON = re.compile(r'(?:^|/)\d\d_(\w+)\.ipynb$')
 
@@ -39,7 +41,7 @@ def with_tasks() -> list[Lesson]:
 
     They are those in the folder of the running notebook, or else those of this checkout.
     """
-    return [lesson for lesson in outlines(_folder()) if lesson.tasks]
+    return [lesson for lesson in outlines(folder()) if lesson.tasks]
 
 
 def file() -> Path | None:
@@ -94,7 +96,7 @@ def lines_of(first_word: str) -> list[str]:
 
 def number_of(lesson: str) -> str:
     """Return the number of a lesson by its name, such as '02'; empty if there is no notebook."""
-    return next((path.name[:2] for path in paths(_folder()) if path.stem[3:] == lesson), '')
+    return next((path.name[:2] for path in paths(folder()) if path.stem[3:] == lesson), '')
 
 
 def about(task: str) -> list[str]:
@@ -181,7 +183,7 @@ def _runs(numbers: list[int]) -> str:
     )
 
 
-def _folder() -> Path:
+def folder() -> Path:
     """Return the folder of the notebooks: a student of a JupyterHub has a copy of their own."""
     here = Path.cwd()
     return here if any(here.glob('00_*.ipynb')) else FOLDER

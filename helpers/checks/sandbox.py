@@ -23,6 +23,7 @@ import contextlib
 import ctypes
 import faulthandler
 import gc
+import math
 import os
 import re
 import resource
@@ -44,6 +45,7 @@ from helpers.ros import leave_ros, remove_dead_segments
 
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 POLL_S = 0.05
+MOST_PATIENCE = 3.0
 DUMP_S = 0.5  # for the worker to write where its threads are
 MEMORY_BYTES = 1 << 30  # more than it has when it begins
 PRINTED_BYTES = 20_000  # that are kept of what it prints
@@ -54,10 +56,11 @@ CPU_TICKS = os.sysconf('SC_CLK_TCK')
 class Ending:
     """How a worker ended.
 
-    `reason` is 'done', 'computes' or 'waits' (a limit was reached), 'exit' (with its `status`) or
-    'signal' (with the signal's number as `status`). `frames` are the places where its threads were
-    when a limit was reached, the innermost first: file and line. `left` names the processes that it
-    had started and not ended. `printed` is what it printed, at most `PRINTED_BYTES` of it.
+    `reason` is 'done', 'computes' or 'waits' (a limit was reached), 'late' (the deadline of all was
+    reached), 'exit' (with its `status`) or 'signal' (with the signal's number as `status`).
+    `frames` are the places where its threads were when a limit was reached, the innermost first:
+    file and line. `left` names the processes that it had started and not ended. `printed` is what
+    it printed, at most `PRINTED_BYTES` of it.
     """
 
     reason: str = 'done'
@@ -72,8 +75,12 @@ class Sandbox:
 
     `function(send)` gets a function that sends any object that can be pickled. Each message begins
     the limits anew: `cpu_s` seconds of CPU of the worker itself, and `limit_s` seconds of the
-    clock. A message may bring its own limits: `send(message, cpu_s=20)`.
+    clock, which are more while other programs use this machine. A message may bring its own limits:
+    `send(message, cpu_s=20)`. `deadline`, of `time.monotonic()`, may be set at any message: then
+    the worker ends at the latest.
     """
+
+    deadline = math.inf
 
     def __init__(self, function: Callable, cpu_s: float, limit_s: float) -> None:
         self._function, self._limits = function, (cpu_s, limit_s)
@@ -94,6 +101,9 @@ class Sandbox:
                 guards_end.close()
                 os.close(alive)
             while True:
+                if not _comes(messages, self.deadline):
+                    self.ending = Ending('late')
+                    return
                 try:
                     message = messages.recv()
                 except (EOFError, OSError):
@@ -108,6 +118,13 @@ class Sandbox:
                 messages.close()
                 if guard:
                     os.waitpid(guard, 0)
+
+
+def _comes(messages: Connection, deadline: float) -> bool:
+    """Wait for a message, or for the end of those that send any, at most until the deadline."""
+    if deadline == math.inf:
+        return True
+    return messages.poll(max(0.0, deadline - time.monotonic()))
 
 
 def _fork() -> int:
@@ -193,7 +210,7 @@ def _watch(
             break  # what it left may still hold the pipes
         if status is None:
             computed = _cpu_s(worker) - since_cpu_s > cpu_s
-            if computed or time.monotonic() - since_s > limit_s:
+            if computed or time.monotonic() - since_s > limit_s * _patience():
                 ending.reason = 'computes' if computed else 'waits'
                 ending.frames = _frames(worker, dump)
                 break
@@ -202,6 +219,11 @@ def _watch(
         ending.status = os.WTERMSIG(status) if os.WIFSIGNALED(status) else os.WEXITSTATUS(status)
     ending.printed = kept.decode(errors='replace')
     return ending
+
+
+def _patience() -> float:
+    """Return how much longer a right answer may take, because other programs want the CPUs, too."""
+    return min(MOST_PATIENCE, max(1.0, os.getloadavg()[0] / len(os.sched_getaffinity(0))))
 
 
 def _send(messages: Connection, message: object) -> None:

@@ -32,29 +32,48 @@ raises is a mistake of the check: the task cannot be judged, and the verdict say
 
 from __future__ import annotations
 
+import math
+import os
 import re
 import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from IPython import get_ipython
 from IPython.core.error import UsageError
 from IPython.display import display
+from IPython.utils.capture import capture_output
 
 from helpers.checks import classroom, progress
+from helpers.checks.honest import CHANGED, Untouched
+from helpers.checks.needs import Needs, needs_of
 from helpers.checks.points import Test, judge_points
 from helpers.checks.sandbox import Ending, Sandbox
-from helpers.checks.verdict import Point, Verdict, bundle
-from helpers.lesson import check_call, earlier_name
-from helpers.notebook import names_of, own_line, somebody_watches
+from helpers.checks.verdict import AGAIN, BELOW, Point, Verdict, bundle
+from helpers.lesson import (
+    Lesson,
+    check_call,
+    code_of_solution,
+    earlier_name,
+    kept_solution,
+    outline,
+    path_of,
+)
+from helpers.notebook import names_of, own_line, somebody_watches, wrap
 from helpers.ros import change_domain_id
 
 CPU_LIMIT_S = 5.0  # of one point: an endless loop uses it up
-LIMIT_S = 30.0  # of one point by the clock
+LIMIT_S = 15.0  # of one point by the clock, on an idle machine
+TOGETHER_S = 15.0  # of all points, once one of them is wrong
 SHOW_AFTER_S = 1.0
 ENDLESS = 'it did not end. Is there an endless loop, or a spin() that never returns?'
 NOT_TRIED = 'not tried, because the one above did not end'
+NO_TIME = 'not tried, because those above took too long'
+TRIES_BEFORE_BORROWING = 3
+BORROWED = '<borrowed>'  # the file name of code that was borrowed: no traceback shows a line of it
+IS_GRADED = 'ROS2_NOTEBOOKS_GRADED'  # a variable of the environment: nothing can be borrowed
 # Magics that run the lines below them in the notebook:
 RUNS_PYTHON = re.compile(r'\A(\s*%%(time|capture)\b.*\n)+')
 
@@ -67,6 +86,7 @@ class Attempt:
     solved: bool = False
     failed: int = 0  # tries since the last one that passed
     given: dict[str, object] = field(default_factory=dict)  # names and values of its solution
+    stands_in: str = ''  # 'solution' or 'borrowed': what the lesson goes on with
 
 
 @dataclass(frozen=True)
@@ -93,6 +113,7 @@ class Tasks:
     def __init__(self) -> None:
         global _of_this_notebook
         self.judges: dict[str, Judge] = {}
+        self._added: dict[str, Judge] = {}  # the same, which nobody has a reason to change
         self.attempts: defaultdict[str, Attempt] = defaultdict(Attempt)
         _of_this_notebook = self
 
@@ -123,9 +144,8 @@ class Tasks:
             task = name or function.__name__
             if task in self.judges:
                 raise ValueError(f'This lesson has two tasks that are called {task}.')
-            self.judges[task] = Judge(
-                function, len(self.judges) + 1, limit_s, cpu_s, about, own_domain
-            )
+            judge = Judge(function, len(self.judges) + 1, limit_s, cpu_s, about, own_domain)
+            self.judges[task] = self._added[task] = judge
             return function
 
         return register if function is None else register(function)
@@ -141,13 +161,22 @@ class Tasks:
         arguments = called[1] if called and called[0] == task else None
         verdict = Verdict(task, judge.number)
         attempt = self.attempts[task]
-        verdict.note = _reason_not_to_judge(attempt, arguments, answer)
+        verdict.note = _reason_not_to_judge(attempt, arguments, answer) or self._needed(task)
         if not verdict.note:
             attempt.arguments = arguments
             hints = _judge(verdict, lambda: judge.points(answer), judge.cpu_s, judge.limit_s)
+            open_files = self._open(self.needs.files_before(task)) if self.needs else []
+            if open_files and verdict.points and not verdict.solved:
+                # What it has found may come from the files of these tasks: that is no try.
+                verdict.note = self._says(open_files, 'This may come from', 'check this one again')
+                _show(verdict)
+                return
             attempt.failed = 0 if verdict.solved else attempt.failed + 1
             if attempt.failed > 1:
                 verdict.add_hints(hints)
+            verdict.again = self._again(task)
+            if verdict.solved and (changed := self._what_has_changed(task)):
+                verdict.note = f'{CHANGED.format(changed).capitalize()}. Restart the kernel.'
         if not verdict.points:
             _show(verdict)
             return
@@ -158,6 +187,8 @@ class Tasks:
             verdict.total = progress.total()
         _show(verdict)
         attempt.solved = verdict.solved
+        if verdict.solved:
+            attempt.stands_in = ''
         classroom.tell_task(task, verdict.solved)
         if about:
             classroom.tell_about(task, about)
@@ -170,15 +201,12 @@ class Tasks:
             return
         shell = get_ipython()
         names = shell.user_ns
-        before = dict(names)
         code = shell.transform_cell(cell)
-        exec(compile(code, shell.compile.cache(code), 'exec'), names)
-        attempt.given = {
-            name: value
-            for name, value in names.items()
-            if name not in before or before[name] is not value
-        }
-        _cells.failed.difference_update(attempt.given)
+        self._run(task, code, shell.compile.cache(code))
+        attempt.stands_in = 'solution'
+        if needed := self._needed(task):
+            print(*wrap(f'The solution of task {judge.number} has run. {needed}'), sep='\n')
+            return
         if attempt.arguments is None:
             print(f'The solution of task {judge.number} has run, but its check has not.')
             return
@@ -186,6 +214,149 @@ class Tasks:
         verdict = Verdict(task, judge.number, of='solution')
         _judge(verdict, lambda: judge.points(answer), judge.cpu_s, judge.limit_s)
         _show(verdict)
+
+    def borrow(self, task: str) -> None:
+        """Put what the next steps need of a task into place, without showing it.
+
+        Who is stuck in an edition without solutions can go on. It is there after some tries, and is
+        not the student's: the task counts as borrowed, and not as solved.
+
+        Raises UsageError with a sentence if it cannot be borrowed.
+        """
+        judge, attempt = self._judge_of(task), self.attempts[task]
+        if attempt.solved:
+            print(f'Task {judge.number} is solved: the lesson goes on with your code.')
+            return
+        code = self._borrowable(task)
+        if not code:
+            raise UsageError('This edition of the lesson lends nothing: ask your teacher.')
+        left = TRIES_BEFORE_BORROWING - attempt.failed
+        if left > 0 and not attempt.stands_in:
+            raise UsageError(
+                f'Try task {judge.number} first: you can borrow it after '
+                f'{left} more {"try" if left == 1 else "tries"}.'
+            )
+        shell = get_ipython()
+        with capture_output():
+            self._run(task, shell.transform_cell(code), BORROWED)
+        attempt.stands_in = 'borrowed'
+        progress.add(f'{progress.BORROWED} {self.lesson_name} {task}')
+        text = (
+            f'Task {judge.number} is borrowed, not solved: what the next steps need is in place. '
+            'When you have another idea, run your own cell and its check again.'
+        )
+        print(*wrap(text), sep='\n')
+
+    def _run(self, task: str, code: str, file: str) -> None:
+        """Run code in place of the student's, and note which names it gives."""
+        names = get_ipython().user_ns
+        before = dict(names)
+        exec(compile(code, file, 'exec'), names)
+        given = {
+            name: value
+            for name, value in names.items()
+            if name not in before or before[name] is not value
+        }
+        self.attempts[task].given = given
+        _cells.runs_again(set(given))
+
+    @cached_property
+    def lesson_name(self) -> str:
+        """The name of the lesson whose judges these are; empty for those of a test."""
+        modules = (judge.function.__module__ or '' for judge in self.judges.values())
+        found = (re.match(r'helpers\.checks\.lessons\.(\w+)', module) for module in modules)
+        return next((match[1] for match in found if match), '')
+
+    @cached_property
+    def lesson(self) -> Lesson | None:
+        """The lesson as its notebook has it, None if there is no such notebook."""
+        try:
+            return outline(path_of(self.lesson_name, progress.folder()))
+        except ValueError:
+            return None
+
+    @cached_property
+    def needs(self) -> Needs | None:
+        return needs_of(self.lesson) if self.lesson else None
+
+    def why_not_to_run(self, source: str) -> str:
+        """Return the sentence of a cell that cannot run yet: it needs a task, or another cell."""
+        cell = self.needs.cells.get(source.strip()) if self.needs else None
+        if cell is None:
+            return ''
+        if tasks := self._open(cell.tasks):
+            return self._says(tasks, 'This cell needs', 'run this cell again')
+        if cell.compares and (tasks := self._open(cell.files)):
+            return self._says(tasks, 'This cell may need', 'run this cell again')
+        names = [*cell.names & _cells.unfinished.keys()]
+        return _cells.says(names[0]) if names else ''
+
+    def what_may_be_missing(self, source: str) -> str:
+        """Return a sentence for a cell that uses files which tasks have not written yet."""
+        cell = self.needs.cells.get(source.strip()) if self.needs else None
+        tasks = self._open(cell.files) if cell else []
+        return self._says(tasks, 'This cell may need', 'run this cell again') if tasks else ''
+
+    def who_makes(self, name: str) -> str:
+        """Return a sentence that says which cell gives a name its value, empty if none does."""
+        if name in _cells.unfinished:
+            return _cells.says(name)
+        maker = self.needs.makers.get(name) if self.needs else None
+        if isinstance(maker, str):
+            return f'{name} comes from the cell that begins with "{maker}": run it first.'
+        if maker:
+            return f'{name} is made in task {maker.number}, "{maker.title}": do it first.'
+        return ''
+
+    def _what_has_changed(self, task: str) -> str:
+        """Return what judges no more as it did when this module was imported; usually nothing."""
+        return task if self.judges[task] is not self._added[task] else _untouched.look()
+
+    def _needed(self, task: str) -> str:
+        needed = self.needs.of_tasks.get(task, set()) if self.needs else set()
+        tasks = self._open(self.needs.in_order(needed)) if needed else []
+        return self._says(tasks, 'This task needs', 'check this one again') if tasks else ''
+
+    def _open(self, tasks: Sequence[str]) -> list[str]:
+        """Return those of these tasks that have been neither solved nor replaced."""
+        attempts = ((task, self.attempts[task]) for task in tasks)
+        return [task for task, one in attempts if not one.solved and not one.stands_in]
+
+    def _says(self, tasks: Sequence[str], begin: str, then: str) -> str:
+        """Return the sentence that says which task is needed, and what helps."""
+        task = self.needs.tasks[tasks[0]]
+        helps = ['solve it']
+        if task.solutions:
+            helps = ['solve it, or run its solution']
+        elif self._lends(task.name):
+            helps = [f'solve it, or write `%borrow {task.name}`']
+        return (
+            f'{begin} task {task.number}, "{task.title}", which is not solved: {helps[0]}, then '
+            f'{then}.'
+        )
+
+    def _again(self, task: str) -> str:
+        """Return what a student can do whose answer is not right."""
+        known = self.needs.tasks.get(task) if self.needs else None
+        if known and known.solutions:
+            return BELOW
+        if self._lends(task):
+            return f'{AGAIN} If you are stuck: `%borrow {task}` lets you go on.'
+        return AGAIN
+
+    def _lends(self, task: str) -> bool:
+        tried = self.attempts[task].failed >= TRIES_BEFORE_BORROWING
+        return tried and bool(self._borrowable(task))
+
+    def _borrowable(self, task: str) -> str:
+        """Return the code of a solution that can be borrowed, empty if there is none."""
+        known = self.needs.tasks.get(task) if self.needs else None
+        if known is None or IS_GRADED in os.environ:
+            return ''
+        return '\n'.join(
+            [code_of_solution(cell.source) for cell in known.solutions]
+            or [kept_solution(cell) for cell in known.checks]
+        ).strip()
 
     def _judge_of(self, task: str) -> Judge:
         if task not in self.judges:
@@ -205,9 +376,15 @@ class Tasks:
         for attempt in self.attempts.values():
             for name in names & attempt.given.keys():
                 del attempt.given[name]
+                attempt.stands_in = ''
 
 
 _of_this_notebook: Tasks | None = None
+
+
+def who_makes(name: str) -> str:
+    """Return a sentence that says which cell gives a name its value, empty if none does."""
+    return _of_this_notebook.who_makes(name) if _of_this_notebook else ''
 
 
 def solution(line: str, cell: str) -> None:
@@ -220,6 +397,14 @@ def solution(line: str, cell: str) -> None:
         names = _of_this_notebook.names_in_words(line.strip()) if _of_this_notebook else ''
         raise UsageError(f'Write the name of a task of this lesson. {names}'.strip())
     _of_this_notebook.run_solution(line.strip(), cell)
+
+
+def borrow(line: str) -> None:
+    """Go on with what the course has for a task: `%borrow be_the_queue`. See `Tasks.borrow`."""
+    if _of_this_notebook is None or line.strip() not in _of_this_notebook.judges:
+        names = _of_this_notebook.names_in_words(line.strip()) if _of_this_notebook else ''
+        raise UsageError(f'Write the name of a task of this lesson. {names}'.strip())
+    _of_this_notebook.borrow(line.strip())
 
 
 # --- Judging --------------------------------------------------------------------------------------
@@ -246,6 +431,10 @@ def _judge(
                 if hint is not None:
                     hints[tried] = hint  # that of the point would be for another mistake
                 tried += 1
+                if not verdict.points[tried - 1].ok and sandbox.deadline == math.inf:
+                    # What builds or starts programs has needed its time before.
+                    since = started if limit_s <= LIMIT_S else time.monotonic()
+                    sandbox.deadline = since + TOGETHER_S
             running.update(time.monotonic() - started)
     verdict.seconds = time.monotonic() - started
     _add_ending(verdict, tried, sandbox.ending)
@@ -256,7 +445,7 @@ def _judge(
 
 def _add_ending(verdict: Verdict, tried: int, ending: Ending) -> None:
     """Say of the point that did not come back why, and of those after it that they wait."""
-    found = ''
+    found, rest = '', NO_TIME if ending.reason == 'late' else NOT_TRIED
     if ending.reason in ('computes', 'waits'):
         found = f'TimeoutError: {ENDLESS} {own_line(ending.frames)}'.strip()
     elif ending.reason == 'exit':
@@ -268,7 +457,7 @@ def _add_ending(verdict: Verdict, tried: int, ending: Ending) -> None:
     if found and not verdict.points:
         verdict.note = f'This task cannot be judged: {found}.'
     for point in verdict.points[tried:]:
-        point.ok, point.found = False, found or NOT_TRIED
+        point.ok, point.found = False, found or rest
         found = ''
     if ending.left and verdict.points:
         last = verdict.points[-1]
@@ -304,31 +493,73 @@ def _reason_not_to_judge(
 
 
 class Cells:
-    """The cell that runs, and names that are missing because their cells ended with an error."""
+    """The cell that runs, and names that are missing because their cells did not end well."""
 
     def __init__(self) -> None:
         self.running = ''
-        self.failed: set[str] = set()
+        self.failed: set[str] = set()  # their cells ended with an error
+        self.unfinished: dict[str, tuple[str, str]] = {}  # what became of their cell, and which
+        self.waits = False  # this cell has only said what it needs
+
+    def transform(self, lines: list[str]) -> list[str]:
+        """Let a cell that cannot run yet say why. IPython calls this for each cell."""
+        self.waits = False
+        if _of_this_notebook is None:
+            return lines
+        sentence = _of_this_notebook.why_not_to_run(''.join(lines))
+        if not sentence:
+            return lines
+        self.waits = True
+        return [f'print({line!r})\n' for line in wrap(sentence)]
 
     def begin(self, info: object) -> None:
         """IPython calls this before it runs a cell."""
         self.running = getattr(info, 'raw_cell', None) or ''
+        if _of_this_notebook is None or self.waits:
+            return
+        if sentence := _of_this_notebook.what_may_be_missing(self.running):
+            print(*wrap(sentence), sep='\n')
 
     def end(self, result: object) -> None:
         """IPython calls this after a cell; the result is None if the Interrupt came in its code."""
-        self.running = ''
-        if result is None:
+        source, self.running = self.running, ''
+        if self.waits:
+            self.waits = False
             return
-        names = names_of(RUNS_PYTHON.sub('', result.info.raw_cell or '')).given
-        if _of_this_notebook:
-            _of_this_notebook.is_written(names)
-        if result.success or isinstance(result.error_in_exec, KeyboardInterrupt):
-            self.failed.difference_update(names)
-        else:
-            self.failed.update(names)
+        error = KeyboardInterrupt()
+        if result is not None:
+            source, error = result.info.raw_cell or '', result.error_before_exec
+            error = error or result.error_in_exec
+        names = names_of(RUNS_PYTHON.sub('', source)).given
+        interrupted = isinstance(error, KeyboardInterrupt)
+        if result is not None:
+            if _of_this_notebook:
+                _of_this_notebook.is_written(names)
+            if error is None or interrupted:
+                self.failed.difference_update(names)
+            else:
+                self.failed.update(names)
+        what = 'was interrupted' if interrupted else 'ended with an error'
+        for name in names:
+            self.unfinished.pop(name, None)
+            if error is not None:
+                line = next((one for one in source.splitlines() if one.strip()), '')
+                self.unfinished[name] = what, line.strip()[:60]
+
+    def runs_again(self, names: set[str]) -> None:
+        """Note that these names have a value again."""
+        self.failed.difference_update(names)
+        for name in names:
+            self.unfinished.pop(name, None)
+
+    def says(self, name: str) -> str:
+        """Return the sentence of a cell that uses a name whose cell did not end well."""
+        what, line = self.unfinished[name]
+        return f'{name} comes from the cell that begins with "{line}", which {what}: run it first.'
 
 
 _cells = Cells()
+_untouched = Untouched()
 
 
 # --- Showing --------------------------------------------------------------------------------------
@@ -371,5 +602,7 @@ def _show(verdict: Verdict) -> None:
 
 if shell := get_ipython():
     shell.register_magic_function(solution, 'cell')
+    shell.register_magic_function(borrow, 'line')
+    shell.input_transformers_cleanup.insert(0, _cells.transform)
     shell.events.register('pre_run_cell', _cells.begin)
     shell.events.register('post_run_cell', _cells.end)

@@ -20,7 +20,7 @@ from helpers.notebook import wrap
 
 KEY = 'ros2_notebooks'
 SAME, LONG = 'the same', 40
-AGAIN = 'Try again, or go on with the solution below.'
+AGAIN, BELOW = 'Try again.', 'Try again, or go on with the solution below.'
 CARD = 'border-left:4px solid {};padding:.1em .8em;margin:.2em 0;line-height:1.45'
 TITLE = 'display:inline;font:inherit;margin:0;padding:0'
 INDENTED, FAINT = 'margin-left:1.5em', 'font-weight:normal;margin-left:1em;opacity:.75'
@@ -42,7 +42,7 @@ class Verdict:
     """What a check says of a task.
 
     `task` is its name, `number` its place in the lesson. `seconds` is how long the check took, and
-    `total` how many tasks are solved now, in words.
+    `total` how many tasks are solved now, in words. `again` is what helps if it is not solved.
     """
 
     task: str
@@ -52,6 +52,7 @@ class Verdict:
     note: str = ''
     seconds: float = 0.0
     total: str = ''
+    again: str = AGAIN
 
     @property
     def solved(self) -> bool:
@@ -74,10 +75,12 @@ class Verdict:
         name = f'Solution of task {self.number}' if self.of == 'solution' else f'Task {self.number}'
         if not self.points:
             return f'{name}: not judged.'
+        if self.note:
+            return f'{name}: not judged yet.'
         count = f'{name}: {sum(point.ok for point in self.points)} of {len(self.points)}.'
         if self.of == 'solution':
             return count
-        return f'{count} {"All done." if self.solved else AGAIN}'
+        return f'{count} {"All done." if self.solved else self.again}'
 
     def text(self) -> str:
         """Return the verdict as lines of text."""

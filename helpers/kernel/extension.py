@@ -6,28 +6,38 @@ import linecache
 import os
 import sys
 from subprocess import CalledProcessError
-from types import TracebackType
+from traceback import walk_tb
+from types import FrameType, TracebackType
 
 from IPython.core.error import UsageError
 from IPython.utils.process import system
 
-from helpers.notebook import run_command
+from helpers.notebook import own_line, run_command
 
 # The first cells of each lesson load one of them.
+IN_IMPORT, IN_TRACKER = '<frozen importlib', 'resource_tracker.py'
 OF_FIRST_CELLS = 'helpers.ros.session', 'helpers.workspace'
 
 
 def load_ipython_extension(shell) -> None:
     """Let `!ros2` be found, and a name or a magic that is missing say what to run.
 
-    An Interrupt of a `!command` ends its cell.
+    An Interrupt of a `!command` ends its cell. That of any cell is one line.
     """
     commands, path = os.path.join(sys.prefix, 'bin'), os.environ.get('PATH', os.defpath)
     if commands not in path.split(os.pathsep):
         os.environ['PATH'] = f'{commands}{os.pathsep}{path}'
 
     def explain(shell, kind, error, traceback, tb_offset=None) -> None:
+        if kind is KeyboardInterrupt and not _breaks_kernel(traceback):
+            line = own_line(
+                (frame.f_code.co_filename, number) for frame, number in _frames(traceback)
+            )
+            # private: an error that IPython shows, IPython 9.18
+            error._render_traceback_ = lambda: [f'Interrupted. {line}'.strip()]
         shell.showtraceback((kind, error, traceback), tb_offset=tb_offset)
+        if kind is KeyboardInterrupt:
+            return
         begun = any(module in sys.modules for module in OF_FIRST_CELLS)
         from helpers.checks import explain_missing_name  # no kernel waits for it when it starts
 
@@ -35,7 +45,7 @@ def load_ipython_extension(shell) -> None:
         if text := explain_missing_name(name, _first_line(traceback), begun):
             print(text)
 
-    shell.set_custom_exc((NameError, UsageError), explain)
+    shell.set_custom_exc((NameError, UsageError, KeyboardInterrupt), explain)
 
     def run(command: str) -> None:
         """Do what ipykernel's `system` does."""
@@ -54,6 +64,17 @@ def unload_ipython_extension(shell) -> None:
     """Let the shell be as IPython has it."""
     shell.set_custom_exc((), None)
     del shell.system
+
+
+def _frames(traceback: TracebackType) -> list[tuple[FrameType, int]]:
+    """Return the frames of a traceback and their lines, the innermost first."""
+    return [*walk_tb(traceback)][::-1]
+
+
+def _breaks_kernel(traceback: TracebackType) -> bool:
+    """Return whether an interrupt has left an import half done: who restarts the kernel sees it."""
+    files = (frame.f_code.co_filename for frame, _ in _frames(traceback))
+    return any(file.startswith(IN_IMPORT) or file.endswith(IN_TRACKER) for file in files)
 
 
 def _first_line(traceback: TracebackType) -> str:

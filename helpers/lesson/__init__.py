@@ -38,6 +38,8 @@ from helpers.lesson.cells import (
     has_heading,
     is_for_instructors,
     is_question,
+    keep_solution,
+    kept_solution,
     tags,
 )
 from helpers.lesson.earlier import earlier_name
@@ -125,6 +127,8 @@ __all__ = [
     'is_for_instructors',
     'is_question',
     'is_solution',
+    'keep_solution',
+    'kept_solution',
     'lessons',
     'links_to_tasks',
     'minutes_of_note',

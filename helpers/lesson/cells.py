@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
+import zlib
 
 LONGEST_NAME = 40  # letters of a cell's first line that are enough to find it
+KEPT = 'ros2_notebooks_lends'  # in the metadata of a check: what it lends
 QUESTION = '### Question '
 FOR_INSTRUCTORS = r'## \d+\. For instructors'
 
@@ -73,6 +76,24 @@ def _why_no_json(data: bytes | str) -> str:
 def tags(cell: Node) -> set[str]:
     """Return the tags of a cell."""
     return set(cell.metadata.get('tags', []))
+
+
+def keep_solution(cell: Node, source: str) -> None:
+    """Keep the code of a solution in a check, in a form that nobody reads by chance.
+
+    In an edition without solutions a student can borrow it, and go on. It is in the notebook, as
+    that is all that a student has for certain: on a hub, in an update, in a folder of one's own. It
+    is no secret: with it a student could solve the task, as with the solution of a friend.
+    """
+    cell.metadata[KEPT] = base64.b85encode(zlib.compress(source.encode(), 9)).decode()
+
+
+def kept_solution(cell: Node) -> str:
+    """Return the code of the solution that a check keeps, empty if it keeps none."""
+    try:
+        return zlib.decompress(base64.b85decode(cell.metadata.get(KEPT, ''))).decode()
+    except (ValueError, zlib.error, TypeError):
+        return ''
 
 
 def called(cell: Node) -> str:

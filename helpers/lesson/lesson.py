@@ -21,6 +21,7 @@ FOLDED = {'solution': MAGIC, 'notes': NOTE}  # what folded cells begin with, by 
 WRITTEN = {'exercise', 'predict'}  # the tags of the cells in which a student writes
 TAGS = {'predict', 'nbval-ignore-output', 'deck-break', *TASK, *FOLDED}
 HEADING = re.compile(r'^### ✎ Task (?P<number>\d+)(?P<star> ★)?(?P<rest>: (?P<title>.+))?$', re.M)
+ANY_HEADING = re.compile(r'^(?P<signs>##+) (?P<title>.*)', re.MULTILINE)
 STEP = re.compile(r'## (\d+)\. |## (\w+)')
 TIME = re.compile(r'^(\*\*Time\*\*.*)(?:\n\n(Steps and tasks with ★.*)\.)?$', re.MULTILINE)
 MEMORY = '## From memory\n'
@@ -355,6 +356,19 @@ class Lesson:
         if unknown:
             raise ValueError(f'{self.file}: step {unknown[0]} has no note with its minutes.')
         return sum(self.minutes_by_step.get(str(n), 0) for n in range(steps[0], steps[1] + 1))
+
+    @cached_property
+    def starred(self) -> list[Node]:
+        """The cells below a heading with a star: whoever leaves tasks out need not run them."""
+        found, level = [], 0  # of the heading with a star that is open; 0: none is
+        for cell in self.cells:
+            headings = ANY_HEADING.finditer(cell.source) if cell.cell_type == 'markdown' else ()
+            for heading in headings:
+                if not level or len(heading['signs']) <= level:
+                    level = len(heading['signs']) if '★' in heading['title'] else 0
+            if level:
+                found.append(cell)
+        return found
 
     def code_cells(self) -> Iterator[Node]:
         return (cell for cell in self.cells if cell.cell_type == 'code')
