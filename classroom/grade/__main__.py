@@ -8,18 +8,19 @@ import threading
 import zipfile
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from classroom.grade import alike, tables
 from classroom.grade.answers import Answers, Handed, answers_of, handed_out, lesson_of
 from classroom.grade.feedback import feedback
-from classroom.grade.results import Kept, digest_of, job_of, result_of
+from classroom.grade.results import TAKES_STARTER, Kept, Result, digest_of, job_of, result_of
 from classroom.grade.runner import Container, Said, Trusted, Where, run
 from classroom.grade.submissions import ARCHIVES, Submission, submissions_of, workspace_files
 from helpers.lesson import FOLDER, Node, cells_of, chosen
 
 LIMIT_MIN = 20.0
+DIFFERED = 'it failed beside the other answers, and passed when it was judged alone: it counts'
 # A browser, or a system that hides endings, adds one.
 NOTEBOOKS = ('.ipynb', '.ipynb.txt', '.ipynb.json', '.json')
 
@@ -142,6 +143,10 @@ def judge_all(
                     fail(work, said.trouble)
                     return
                 result = result_of(lesson, answers, work.files, said, digest)
+                trouble = judge_again(lesson, answers, work.files, result, where, options.limit)
+                if trouble:
+                    fail(work, trouble)
+                    return
                 kept.put(key, result)
             else:
                 again = ', judged before'
@@ -151,7 +156,8 @@ def judge_all(
             if result.trouble:
                 work.row.said.append(result.trouble)
             for task, outcome in result.tasks.items():
-                if outcome.why not in ('', 'not answered', result.trouble) and not outcome.of:
+                told = not outcome.of or outcome.why in (TAKES_STARTER, DIFFERED)
+                if outcome.why not in ('', 'not answered', result.trouble) and told:
                     work.row.said.append(f'task {lesson.tasks[task].number}: {outcome.why}')
             points = sum(result.tasks[task].solved for task in lesson.counted)
             work.row.points += points
@@ -168,6 +174,41 @@ def judge_all(
             where.stop()
             raise
     return failed
+
+
+def judge_again(
+    lesson: Handed,
+    answers: Answers,
+    files: dict[str, bytes],
+    result: Result,
+    where: Where,
+    limit_min: float,
+) -> str:
+    """Judge each answer that has failed once more, alone, before it costs a point.
+
+    The tasks before it are then as the lesson has them: neither another answer nor a busy machine
+    takes a point away. If it passes now, it counts, and the table says that the two differ.
+    Return why this could not be done, or nothing.
+    """
+    for name, task in lesson.tasks.items():
+        outcome = result.tasks[name]
+        if outcome.solved or outcome.why in ('not answered', TAKES_STARTER):
+            continue
+        ids = {cell.id for cell in task.exercises}
+        alone = replace(answers, sources={k: v for k, v in answers.sources.items() if k in ids})
+        job = job_of(lesson, alone, files)
+        if job is None:
+            continue
+        said = run(job, where, limit_min * 60)
+        if said.is_ours:
+            return said.trouble
+        again = result_of(lesson, alone, files, said, result.digest)
+        if again.tasks[name].solved:
+            result.tasks[name] = replace(again.tasks[name], why=DIFFERED)
+            cells = {cell.id for cell in (*task.exercises, *task.checks)}
+            result.outputs |= {id: found for id, found in again.outputs.items() if id in cells}
+        result.minutes += again.minutes
+    return ''
 
 
 def write(

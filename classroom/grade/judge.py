@@ -5,10 +5,16 @@ lost if this is ended:
 
     {"begin": true}                                  before any code of the student
     {"cell": "check-02-1", "outputs": [...]}         for each cell of a task
+    {"canary": "a_driver"}                           its check takes the starter, too: forged
     {"given_up": "a_driver", "why": "its code ended ..."}     a task hung, or ended the kernel
     {"end": true}
 
 After a task was given up, the lesson runs again, with the starter of that task.
+
+The code of a student runs in the kernel that judges it, and may have changed what judges. So when
+all is judged, each check that has taken an answer gets the starter in the same kernel. Starters are
+wrong: if one passes, nobody judges here any more. The answers of tasks that begin with a terminal
+are left out: what a terminal has made is still there.
 
 Job: `cells`, each with `id`, `source`, `kind` ('', 'exercise', 'check', 'solution'), `task`, and
 for an exercise its `starter`; `module`, the checks; `files`, of a workspace, in Base64, and
@@ -33,7 +39,8 @@ import psutil
 from jupyter_client.manager import KernelManager
 from nbformat.v4 import output_from_msg
 
-from helpers.checks.tasks import IS_GRADED
+from helpers.checks.progress import IS_GRADED
+from helpers.checks.verdict import KEY
 
 PR_SET_DUMPABLE = 4  # linux/prctl.h
 INTERRUPT_S = 5  # for a cell to end after an interrupt
@@ -145,6 +152,7 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
         here = folder / f'run_{attempt}'
         here.mkdir()
         task = ''  # the last one that was reached
+        passed: set[str] = set()  # tasks with an answer
         kernel = Kernel(here)
         try:
             for cell in job['cells']:
@@ -158,6 +166,8 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
                 # A check has limits of its own, for each of its points.
                 limit_s = job['cell_s'] * (CHECK_TIMES if cell['kind'] == 'check' else 1)
                 outputs = kernel.run(cell['starter' if starter else 'source'], limit_s)
+                if cell['kind'] == 'check' and task in answered - given_up and _is_solved(outputs):
+                    passed.add(task)
                 if cell['kind'] in ('exercise', 'check'):
                     yield {'cell': cell['id'], 'outputs': outputs}
         except HungError as why:
@@ -174,10 +184,36 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
                 yield {'end': True}
                 return
         else:
+            yield from _canaries(kernel, job, passed)
             yield {'end': True}
             return
         finally:
             kernel.close()
+
+
+def _canaries(kernel: Kernel, job: dict, passed: set[str]) -> Iterator[dict]:
+    """Let the checks that have passed judge the starters; yield the tasks whose starter passes."""
+    for task in dict.fromkeys(cell['task'] for cell in job['cells'] if cell['task'] in passed):
+        cells = [cell for cell in job['cells'] if cell['task'] == task]
+        starters = [cell['starter'] for cell in cells if cell['kind'] == 'exercise']
+        if not starters or any(one.startswith('%%terminal') for one in starters):
+            continue
+        try:
+            for starter in starters:
+                kernel.run(starter, job['cell_s'])
+            kernel.run(f'from helpers.checks.lessons.{job["module"]} import check', 60)
+            checks = [cell for cell in cells if cell['kind'] == 'check']
+            found = [kernel.run(one['source'], job['cell_s'] * CHECK_TIMES) for one in checks]
+        except HungError:  # no starter does that: something in this kernel looks for them
+            yield {'canary': task}
+            return
+        if found and all(map(_is_solved, found)):
+            yield {'canary': task}
+
+
+def _is_solved(outputs: list[dict]) -> bool:
+    verdicts = [output.get('metadata', {}).get(KEY) for output in outputs]
+    return any(isinstance(one, dict) and one.get('solved') is True for one in verdicts)
 
 
 # In the kernel of the student: what the archive has takes the place of what the cells wrote.

@@ -15,7 +15,8 @@ from classroom.grade.runner import LATE, Said
 from helpers.checks.verdict import KEY
 from helpers.lesson import ROOT, Task, tags
 
-FORM = 3  # of the files
+TAKES_STARTER = 'its check also takes the starter: what judges was changed. Read the answers'
+FORM = 4  # of the files
 LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # copies, by Python and JupyterLab
 INTERRUPTED = re.compile(r'Interrupted after (\d+) s\.')  # as judge.py says it
 UNKNOWN = re.compile(r"NameError: name '(\w+)' is not defined")
@@ -142,6 +143,8 @@ def result_of(
                 outcome.why = next((str(one['note'])[:200] for one in found if 'note' in one), '')
             else:
                 outcome.why = _error(task, outputs) or said.trouble or 'no verdict'
+        if name in said.canaries:
+            outcome.solved, outcome.why = False, TAKES_STARTER
         result.tasks[name] = outcome
     return result
 

@@ -31,6 +31,7 @@ class Said:
 
     outputs: dict[str, list[dict]] = field(default_factory=dict)
     given_up: dict[str, str] = field(default_factory=dict)
+    canaries: list[str] = field(default_factory=list)  # tasks whose checks take the starter, too
     begun: bool = False  # before any code of a student
     ended: bool = False
     trouble: str = ''  # why it did not end by itself
@@ -162,6 +163,8 @@ def _read(line: bytes, said: Said) -> None:
     outputs, given_up = event.get('outputs'), event.get('given_up')
     if isinstance(event.get('cell'), str) and isinstance(outputs, list):
         said.outputs[event['cell']] = [one for one in outputs if isinstance(one, dict)]
+    elif isinstance(event.get('canary'), str):
+        said.canaries.append(event['canary'][:200])
     elif isinstance(given_up, str):
         said.given_up[given_up] = str(event.get('why', ''))[:200]
     said.begun |= event.get('begin') is True

@@ -417,12 +417,12 @@ def test_a_second_run_goes_on_where_the_first_one_ended(submit, capsys):
     where = Stand()
     folder = submit(**files)
     assert main([str(folder)], where) == 0
-    assert where.count == 4
+    assert where.count == 4 + 2  # each wrong answer once more
     assert f'Student 001: lesson 00: 1 of {OF}\n' in capsys.readouterr().out
     changed = next(iter(files))
     submit(**{changed: with_answer(RIGHT), 'New_9_assignsubmission_file/a.ipynb': files[changed]})
     assert main([str(folder), '--jobs', '2'], where) == 0
-    assert where.count == 6
+    assert where.count == 6 + 1 + 2
     assert f'Student 001: lesson 00: 1 of {OF}, judged before' in capsys.readouterr().out
     assert [row['points'] for row in rows_of(folder)] == ['0', '1', '1', '0', '1']
 
@@ -433,7 +433,7 @@ def test_two_hundred_students(submit, capsys):
     files[broken] = b'{'
     where = Stand()
     assert main([str(submit(**files)), '--jobs', '4'], where) == 0
-    assert where.count == 199
+    assert where.count == 199 + 100  # each wrong answer once more
     lines = capsys.readouterr().out.splitlines()
     assert sum(line.startswith('Student') for line in lines) == 200
     assert 'Student 007: lesson.ipynb cannot be read: it is broken: it is no JSON' in lines
@@ -706,3 +706,42 @@ def test_real_checks_judge_and_survive(submit, capsys):
         f'Bob: lesson 00: 0 of {OF}',
         f'Cy: lesson 00: 0 of {OF}; task 1: its code ended the kernel',
     ]
+
+
+FORGERY = """
+import sys
+
+judge = sys.modules['helpers.checks.points']
+judge._result = lambda test: True
+sys.modules['helpers.checks.honest'].Untouched.look = lambda self: ''
+"""
+
+
+def test_a_forged_pass_is_shown_by_the_starter(submit, capsys):
+    """It changes what judges, and what would notice that: then the starter passes as well."""
+    folder = submit(**{'Ada/a.ipynb': with_answer(FORGERY + WRONG)})
+    assert main([str(folder), '--trust']) == 0
+    [line] = capsys.readouterr().out.splitlines()[:1]
+    assert line.startswith(f'Ada: lesson 00: 0 of {OF}')
+    assert 'task 1 reaches for what judges it: read it yourself' in line
+    assert f'task 1: {results.TAKES_STARTER}' in line
+
+
+ONCE = """
+from pathlib import Path
+
+once = Path({!r})
+if not once.exists():
+    once.touch()
+    raise OSError('the machine is busy')
+"""
+
+
+def test_an_answer_that_fails_once_is_judged_again_alone(submit, capsys, tmp_path):
+    folder = submit(**{'Ada/a.ipynb': with_answer(ONCE.format(str(tmp_path / 'once')) + RIGHT)})
+    assert main([str(folder), '--trust']) == 0
+    [line] = capsys.readouterr().out.splitlines()[:1]
+    assert line == (
+        f'Ada: lesson 00: 1 of {OF}; task 1: it failed beside the other answers, and passed when '
+        'it was judged alone: it counts'
+    )

@@ -14,7 +14,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_outp
 from support.checkouts import git
 
 from classroom import handout, update
-from helpers.lesson import PICTURES, ROOT
+from helpers.lesson import PICTURES, ROOT, kept_solution, lessons
 
 SOLVED = '%%solution 1\nsolved = 2'
 FILES = {'README.md', 'Makefile', 'notebooks/01_publish.ipynb', 'classroom/update.py'}
@@ -147,6 +147,18 @@ def test_solutions_of_the_weeks_before(checkout, tmp_path):
         handout.write_lessons(checkout / 'notebooks', tmp_path / 'hub', solutions=solutions)
         lessons = sorted((tmp_path / 'hub').glob('*.ipynb'))
         assert ['solved = 2' in lesson.read_text() for lesson in lessons] == have
+
+
+@pytest.mark.parametrize('borrow', [True, False])
+def test_without_solutions_no_cell_speaks_of_them(tmp_path, borrow):
+    handout.write_lessons(ROOT / 'notebooks', tmp_path, solutions='no', borrow=borrow)
+    texts, lent = '', 0
+    for one in lessons(tmp_path):
+        texts += '\n'.join(cell.source for cell in one.cells)
+        lent += sum(bool(kept_solution(cell)) for task in one.tasks for cell in task.checks)
+    assert re.findall(r'.*\bsolutions?\b.*', texts, re.IGNORECASE) == []
+    assert ('%borrow' in texts) == borrow
+    assert bool(lent) == borrow
 
 
 def test_the_lessons_of_a_hub_have_their_pictures(tmp_path):

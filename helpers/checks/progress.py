@@ -23,6 +23,7 @@ from helpers import notebook as text
 from helpers.lesson import FOLDER, Lesson, earlier_name, outlines, paths
 
 BORROWED = 'borrowed'  # begins the line of a task that a student has gone on without
+IS_GRADED = 'ROS2_NOTEBOOKS_GRADED'  # a variable of the environment: nothing can be borrowed
 FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progress is kept
 LESSON = re.compile(r'(?:^|/)\d\d_(\w+)\.ipynb$')
 
@@ -153,6 +154,13 @@ def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
         done = len(lesson.tasks) - len(left)
         sums = [sums[0] + done, sums[1] + len(lesson.tasks)]
         words = f'task{"s" * (len(left) > 1)} {_runs(left)}' if left else ''
+        borrowed = [
+            task.number
+            for task in lesson.tasks
+            if task.number in left and f'{BORROWED} {lesson.name} {task.name}' in solved
+        ]
+        if borrowed:
+            words += f' (borrowed: {_runs(borrowed)})'
         rows.append([f'{lesson.number} {_title(lesson)}', f'{done} of {len(lesson.tasks)}', words])
     return f'{text.table(rows)}\n{sums[0]} of {sums[1]} tasks are solved.'
 

@@ -73,7 +73,6 @@ NOT_TRIED = 'not tried, because the one above did not end'
 NO_TIME = 'not tried, because those above took too long'
 TRIES_BEFORE_BORROWING = 3
 BORROWED = '<borrowed>'  # the file name of code that was borrowed: no traceback shows a line of it
-IS_GRADED = 'ROS2_NOTEBOOKS_GRADED'  # a variable of the environment: nothing can be borrowed
 # Magics that run the lines below them in the notebook:
 RUNS_PYTHON = re.compile(r'\A(\s*%%(time|capture)\b.*\n)+')
 
@@ -351,7 +350,7 @@ class Tasks:
     def _borrowable(self, task: str) -> str:
         """Return the code of a solution that can be borrowed, empty if there is none."""
         known = self.needs.tasks.get(task) if self.needs else None
-        if known is None or IS_GRADED in os.environ:
+        if known is None or progress.IS_GRADED in os.environ:
             return ''
         return '\n'.join(
             [code_of_solution(cell.source) for cell in known.solutions]
