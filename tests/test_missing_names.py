@@ -35,3 +35,15 @@ def test_a_kernel_says_it_before_any_helper_is_imported():
         said = kernel.run('print(something)')
         assert "name 'something' is not defined" in said
         assert NOT_RUN not in said
+
+
+def test_a_cell_that_was_not_finished_is_named_where_another_one_needs_it():
+    with Kernel() as kernel:
+        kernel.run('%load_ext helpers.kernel')
+        assert 'has not run' not in kernel.run('# The run.\ntables = {}\n1 / 0\nlost = 3')
+        missing = kernel.run('print(lost)')
+        assert 'lost comes from the cell that begins with\n    tables = {}\n' in missing
+        assert 'tables comes from the cell' in kernel.run("tables['C']")  # it is half made
+        assert 'has not run' not in kernel.run('1 / 0')
+        assert kernel.run('tables, lost = {}, 3') == ''
+        assert 'has not run' not in kernel.run("tables['C']")

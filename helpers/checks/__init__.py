@@ -3,10 +3,11 @@
 from helpers.checks.classroom import guess, join_class, leave_class, lower_hand, raise_hand
 from helpers.checks.guesses import compare_prediction
 from helpers.checks.memory import questions, remember
-from helpers.checks.missing_names import explain_missing_name
+from helpers.checks.missing_names import Unfinished, explain_missing_name
 from helpers.checks.other_robots import next_robot
 
 __all__ = [
+    'Unfinished',
     'compare_prediction',
     'explain_missing_name',
     'guess',

@@ -1,4 +1,7 @@
-"""The extension: `!ros2` is found, an Interrupt ends a `!command`, a missing name is explained."""
+"""The extension: `!ros2` is found, an Interrupt ends a `!command`, and an error is explained.
+
+What is explained: a name that is missing, and a cell that needs one which has not run to its end.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ OF_FIRST_CELLS = 'helpers.ros.session', 'helpers.workspace'
 
 
 def load_ipython_extension(shell) -> None:
-    """Let `!ros2` be found, and a name or a magic that is missing say what to run.
+    """Let `!ros2` be found, and a cell that fails say which other cell is to be run first.
 
     An Interrupt of a `!command` ends its cell.
     """
@@ -36,6 +39,7 @@ def load_ipython_extension(shell) -> None:
             print(text)
 
     shell.set_custom_exc((NameError, UsageError), explain)
+    shell.events.register('post_run_cell', _explain_unfinished)
 
     def run(command: str) -> None:
         """Do what ipykernel's `system` does."""
@@ -53,7 +57,26 @@ def load_ipython_extension(shell) -> None:
 def unload_ipython_extension(shell) -> None:
     """Let the shell be as IPython has it."""
     shell.set_custom_exc((), None)
+    shell.events.unregister('post_run_cell', _explain_unfinished)
     del shell.system
+
+
+_unfinished = None  # until a cell has failed: no kernel waits for helpers.checks before
+
+
+def _explain_unfinished(result) -> None:
+    """Say below the error of a cell whether it needs one that has not run to its end."""
+    global _unfinished
+    if result.success and _unfinished is None:
+        return
+    from helpers.checks import Unfinished
+
+    _unfinished = _unfinished or Unfinished()
+    source = result.info.raw_cell
+    interrupted = isinstance(result.error_in_exec, KeyboardInterrupt)
+    if not result.success and not interrupted and (text := _unfinished.explain(source)):
+        print(text)
+    _unfinished.ended(source, result.success)
 
 
 def _first_line(traceback: TracebackType) -> str:
