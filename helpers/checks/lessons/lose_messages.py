@@ -1,5 +1,6 @@
 """What the tasks of the lesson "Lose messages" are judged by."""
 
+import math
 import os
 import signal
 import threading
@@ -62,8 +63,8 @@ def publish_numbers(MinimalPublisher, PERIOD_S):
 
 @tasks.add
 def a_slow_subscriber(SlowSubscriber):
-    def hear_once(text, callback_s=0.0):
-        """Return what the node logs of one message, and how long its callback takes and sleeps."""
+    def hear(*texts, callback_s=0.0):
+        """Return what the node logs, and a `Took` for each of its callbacks."""
         override(SlowSubscriber, CALLBACK_S=callback_s)
         with Bench() as bench:
             node, executor = SlowSubscriber(10), SingleThreadedExecutor()
@@ -71,32 +72,35 @@ def a_slow_subscriber(SlowSubscriber):
             topic, callback, took = node.subscription.topic_name, node.subscription.callback, []
 
             def call(message):
-                begun_s, before_s = time.monotonic(), awake_s()
-                callback(message)
-                took_s = time.monotonic() - begun_s
-                took.append((took_s, took_s - (awake_s() - before_s)))
+                took.append(Took(bench, lambda: callback(message)))
 
             node.subscription.callback = call
             executor.add_node(node)
-            bench.publisher('topic', String).publish(String(data=text))
-            executor.spin_once(timeout_sec=1)
+            for text in texts:
+                bench.publisher('topic', String).publish(String(data=text))
+            for _ in texts:
+                executor.spin_once(timeout_sec=1)
             log = bench.log('slow_subscriber')
         if not took:
             raise Failed(f'a message on topic did not come: it receives {topic}')
-        return log, *took[0]
+        return log, took
 
-    def logs(text):
-        log, _, _ = hear_once(text)
-        return expect(log, [f'[INFO] [slow_subscriber]: I heard: "{text}"'], 'its log is')
+    def logs(*texts):
+        log, _ = hear(*texts)
+        right = [f'[INFO] [slow_subscriber]: I heard: "{text}"' for text in texts]
+        return expect(log, right, 'its log is')
+
+    def sleeps_once():
+        _, [once] = hear('Hello World: 1', callback_s=0.7)
+        if not 0.7 <= once.took_s <= 1.2:
+            return f'with CALLBACK_S = 0.7 the callback took {once.took_s:.1f} s'
+        if once.slept_s < 0.35:
+            return 'with CALLBACK_S = 0.7 the callback is busy all the time, and does not sleep'
+        return once.logged_s < 0.35 or 'it sleeps first, and logs then'
 
     def sleeps():
-        _, took_s, slept_s = hear_once('Hello World: 1', 0.7)
-        if took_s < 0.7:
-            return f'with CALLBACK_S = 0.7 the callback took {took_s:.2f} s'
-        if slept_s < 0.35:
-            return 'with CALLBACK_S = 0.7 the callback is busy all the time, and does not sleep'
-        _, took_s, _ = hear_once('Hello World: 1')
-        return took_s < 1 or 'with CALLBACK_S = 0 it took a second'
+        found = sleeps_once()
+        return found is True or sleeps_once()  # a busy computer may be late, but hardly twice
 
     def subscription(*arguments, **options):
         with ros_session():
@@ -116,11 +120,36 @@ def a_slow_subscriber(SlowSubscriber):
     call = 'create_subscription(type, topic, callback, qos, **options)'
     return [
         ('it logs "Hello World: 7"', lambda: logs('Hello World: 7'), f'At INFO. {quotes}'),
-        ('it logs "Hello World: 12"', lambda: logs('Hello World: 12'), 'message.data is the text.'),
+        ('it logs each message', lambda: logs('one', 'two'), 'message.data is the text.'),
         ('the callback takes CALLBACK_S seconds', sleeps, 'time.sleep takes seconds.'),
         ('qos is its depth', depths, call),
         ('it passes **options on', passes_options_on, 'The same call: ..., qos, **options).'),
     ]
+
+
+class Took:
+    """How long a callback took and slept, and when its log was seen: seconds from its start."""
+
+    def __init__(self, bench, callback):
+        self.logged_s = math.inf
+        ended = threading.Event()
+
+        def look():
+            while not ended.wait(0.01):
+                if bench.log('slow_subscriber'):
+                    self.logged_s = time.monotonic() - begun_s
+                    return
+
+        watcher = threading.Thread(target=look)
+        begun_s, before_s = time.monotonic(), awake_s()
+        watcher.start()
+        try:
+            callback()
+        finally:
+            self.took_s = time.monotonic() - begun_s
+            self.slept_s = self.took_s - (awake_s() - before_s)
+            ended.set()
+            watcher.join()
 
 
 def awake_s():
@@ -184,7 +213,9 @@ def be_the_queue(MyQueue):
         if taken != real:
             return f'your queue gives {taken}, the real one {real}'
         pushed_out = [number for number in range(come) if number not in real]
-        lost = sorted(queue.lost) if isinstance(queue.lost, Iterable) else queue.lost
+        lost = queue.lost
+        if isinstance(lost, Iterable) and all(isinstance(number, int) for number in lost):
+            lost = sorted(lost)  # in any order
         return expect(lost, pushed_out, f'0 to {come - 1} came, and self.lost is')
 
     first = 'Is there room? If not, which one goes?'
@@ -252,8 +283,11 @@ def count_the_losses(LossCounter):
             for _ in numbers:
                 executor.spin_once(timeout_sec=1)
             took_s = time.monotonic() - begun_s
+            logged = len(bench.log('slow_subscriber'))
         if took_s < 0.02 * len(numbers):
             return 'it does not do what a slow subscriber does'
+        if logged > len(numbers):
+            return f'for {len(numbers)} messages it calls super() {logged} times'
         must_have(node, 'missing')
         missing = [*node.missing] if isinstance(node.missing, Iterable) else node.missing
         return expect(missing, right, f'{numbers} came, and self.missing is')
@@ -285,6 +319,22 @@ except KeyboardInterrupt:
     node.destroy_node()
     rclpy.try_shutdown()
 """
+# It prints the depth and the text of each message that it publishes.
+PUBLISHED = 'published:'
+TELLS = """
+import runpy
+from rclpy.publisher import Publisher
+
+publish = Publisher.publish
+
+def tell(self, message):
+    if self.topic_name == '/topic':
+        print('published:', self.qos_profile.depth, message.data)
+    publish(self, message)
+
+Publisher.publish = tell
+runpy.run_path({file!r}, run_name='__main__')
+"""
 LISTENER = 'the listener'  # a program with the name of the talker would end it
 LONGER_THAN_PUBLISHING_S = 2.0
 WAITS_AT_MOST_S = 12.0
@@ -306,7 +356,8 @@ def a_program_of_its_own(workspace, file):
         if talker.exit_code():
             raise Failed(talker.error)
 
-    def last_ones(depth):
+    @cached
+    def last_ten():
         """Subscribe, and spin only when the program has ended."""
         heard = []
         with Bench() as bench:
@@ -314,20 +365,29 @@ def a_program_of_its_own(workspace, file):
             executor.add_node(node)
             with run_python(workspace, file) as talker:
                 comes(bench, talker)
-                node.create_subscription(String, 'topic', lambda m: heard.append(m.data), depth)
+                node.create_subscription(String, 'topic', lambda m: heard.append(m.data), 10)
                 ends_well(talker)
             bench.spin(node, executor=executor)
             bench.quiet()
-        if heard == [f'Hello World: {number}' for number in range(50 - depth, 50)]:
+        if heard == [f'Hello World: {number}' for number in range(40, 50)]:
             return True
         numbers = ', '.join(text.removeprefix('Hello World: ') for text in heard) or 'none'
-        return f'with depth {depth}, these were received: {numbers}; right is {50 - depth} to 49'
+        return f'with depth 10, these were received: {numbers}; right is 40 to 49'
 
-    last_ten = cached(lambda: last_ones(10))
-
-    def last_three():
+    def publishes_all():
+        """Run the program so that it prints what it publishes: a queue may lose messages."""
         last_ten()  # what raises there would raise here, too
-        return last_ones(3)
+        with Bench() as bench:
+            bench.hear('topic', String)
+            with run_python(workspace, '-c', TELLS.format(file=file)) as talker:
+                ends_well(talker)
+        said = [line.split(maxsplit=2)[1:] for line in talker.lines if line.startswith(PUBLISHED)]
+        texts, depths = [text for _, text in said], [int(depth) for depth, _ in said]
+        if texts != (right := [f'Hello World: {number}' for number in range(50)]):
+            return expect(texts, right, 'it publishes')
+        if min(depths) < 10:
+            return f'the depth of its publisher is {min(depths)}, not 10'
+        return True
 
     def too_early(talker):
         ends_well(talker)
@@ -349,15 +409,18 @@ def a_program_of_its_own(workspace, file):
                     return too_early(talker)
                 os.kill(talker.pid, signal.SIGCONT)
                 early = talker.has_ended(LONGER_THAN_PUBLISHING_S)
+                says_so = talker.says('The talker has ended.')
             if early:
                 ends_well(talker)
-        return not early or 'it ended although a slow subscriber had not got the messages'
+        if early:
+            return 'it ended although a slow subscriber had not got the messages'
+        return not says_so or 'it says that it has ended before all messages have arrived'
 
     numbers = 'Which numbers does range(50) give?'
     last = 'Call publisher.wait_for_all_acked(Duration(seconds=10)) last.'
     return [
         ('depth 10 keeps the last ten', last_ten, numbers),
-        ('depth 3 keeps the last three', last_three, 'First wait, then publish.'),
+        ('it publishes all fifty numbers', publishes_all, 'First wait, then publish.'),
         ('it ends when all have arrived', waits_for_all, last),
     ]
 
