@@ -14,7 +14,7 @@ from jupyter_core.paths import jupyter_config_dir
 
 from classroom.deck.copies import FOLDER, Copies
 from helpers import lesson
-from helpers.workspace import BEGIN_EMPTY
+from helpers.notebook import BEGIN_EMPTY
 from tools.lab import open_lab, parser
 
 EXTENSIONS = Path(__file__).with_name('deck')  # of JupyterLab

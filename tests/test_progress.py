@@ -105,7 +105,7 @@ def test_a_borrowed_task_is_open_and_named(kept, capsys, folder):
     progress.add('borrowed lose_them a_queue')
     assert '\n92 Lose them    0 of 2  tasks 1, 2 (borrowed: 1)\n' in shown(capsys)
     progress.record('a_queue')
-    assert '\n92 Lose them    1 of 2  task 1\n' in shown(capsys)
+    assert '\n92 Lose them    1 of 2  task 2\n' in shown(capsys)
 
 
 def pressed(solved):

@@ -319,7 +319,7 @@ def test_what_nbval_compares_does_not_move():
 @pytest.mark.parametrize('shown', [replay(predict(0.05, 0.2, 10, 1, 41), 10), FreePlay()])
 def test_size(shown):
     page = html(shown)
-    assert len(page) <= 33_500
+    assert len(page) <= 34_500
     assert not re.search(r'https?://(?!www\.w3\.org)', page)
 
 

@@ -48,8 +48,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from helpers.checks import progress
-from helpers.notebook import somebody_watches, wrap
-from helpers.workspace import BEGIN_EMPTY
+from helpers.notebook import BEGIN_EMPTY, somebody_watches, wrap
 
 if TYPE_CHECKING:
     from helpers.guesses import Guess, Kind

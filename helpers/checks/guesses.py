@@ -9,15 +9,19 @@ the same in every fresh run from top to bottom.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Set
 from numbers import Integral, Real
+from typing import TYPE_CHECKING
 
 from IPython import get_ipython
 from IPython.display import display
 
 from helpers.checks import classroom
-from helpers.guesses import Gap, Guess
 from helpers.notebook import can_ask
+
+if TYPE_CHECKING:
+    from helpers.guesses import Guess
 
 NO_GUESS = 'No guess yet. Write one in place of the three dots, run that cell, then this one again.'
 
@@ -51,7 +55,9 @@ def compare_prediction(
 
     Raises TypeError for an outcome of another kind.
     """
-    if isinstance(guess, Guess):
+    # Loaded where a guess was made in a picture, and by nothing else: it is heavy.
+    pictures = sys.modules.get('helpers.guesses')
+    if pictures and isinstance(guess, pictures.Guess):
         _compare(question, guess, outcome, tolerance, because)
         return
     outcome, guess = _plain(outcome), _plain(guess)
@@ -96,6 +102,8 @@ def _compare(
         if answer := guess.kind.answer(outcome):
             print(f'  The answer is {answer}.')
     else:
+        from helpers.guesses import Gap
+
         display(Gap(guess, outcome))
         classroom.tell_outcome(question, guess.kind.told(_plain(outcome['at'])))
     if because:

@@ -15,7 +15,7 @@ MODULES = {
     'names': ('names_of',),
     'on_demand': ('load_on_demand',),
     'own_code': ('is_students', 'own_line', 'places'),
-    'progress_bar': ('ProgressBar', 'somebody_watches'),
+    'progress_bar': ('BEGIN_EMPTY', 'ProgressBar', 'somebody_watches'),
     'tables': ('check_columns', 'column_of_numbers'),
     'text': ('table', 'wrap'),
     'threads': ('frames',),

@@ -9,6 +9,8 @@ from helpers.notebook.kernel import can_ask
 
 SHOW_AFTER_S = 2.0
 REFRESH_S = 0.2
+# Set by a program that shows lessons from their start, such as slides: begin each workspace empty.
+BEGIN_EMPTY = 'ROS2_NOTEBOOKS_BEGIN_EMPTY'
 
 
 class ProgressBar:

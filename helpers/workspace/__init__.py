@@ -33,7 +33,7 @@ from helpers.workspace.processes import DIED, Process, show_launch, wait_until
 from helpers.workspace.rosdep import rosdep, run_rosdep
 from helpers.workspace.tf2_msgs import provide_tf2_msgs
 from helpers.workspace.wheels import fix_wheels
-from helpers.workspace.workspace import BEGIN_EMPTY, SMALL_RCLCPP, Workspace
+from helpers.workspace.workspace import SMALL_RCLCPP, Workspace
 
 __all__ = [
     'play_colleague',
@@ -51,7 +51,6 @@ __all__ = [
     'first_error',
     'error_in',
     'compile_error',
-    'BEGIN_EMPTY',
     'DIED',
     'SMALL_RCLCPP',
     'TRACEBACK',

@@ -24,7 +24,7 @@ from helpers.machine import (
     name_beside,
     tools_of_a_build,
 )
-from helpers.notebook import ProgressBar, somebody_watches, uninterrupted
+from helpers.notebook import BEGIN_EMPTY, ProgressBar, somebody_watches, uninterrupted
 from helpers.ros import graph_environment
 from helpers.workspace.build_output import BuildResult, read_result, without_folders
 from helpers.workspace.processes import POLL_S, Process
@@ -43,8 +43,6 @@ CONFIGURE_SHARE = 0.4  # of a build's time, before make says how much it has don
 
 # The parts of the files that several cells write, in a workspace.
 PARTS = '.parts.json'
-# Set by a program that shows lessons from their start, such as slides: begin each workspace empty.
-BEGIN_EMPTY = 'ROS2_NOTEBOOKS_BEGIN_EMPTY'
 
 AS_LEFT = 'Your files are as you left them: {} in {}. To begin with an empty workspace: '
 AS_LEFT += '`workspace.begin_anew()`. It keeps a copy.'
