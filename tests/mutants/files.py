@@ -204,6 +204,15 @@ def a_word_gone(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
 
 
 @rule
+def in_another_folder(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
+    """A build in src, where its folders do not belong."""
+    for at in sorted(written) if kind == 'commands' else ():
+        line = lines[at] if at < len(lines) else ''
+        if line.lstrip().startswith('colcon '):
+            yield _with(lines, at, f'cd src; {line.lstrip()}')
+
+
+@rule
 def another_word_of_c(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
     """Another operator or name of the same kind in C++, or a condition turned round."""
     for at in sorted(written) if kind in ('c++', 'cmake') else ():
