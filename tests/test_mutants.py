@@ -235,6 +235,7 @@ FILES = [
     ('%%terminal', 'colcon build', 'cd src; colcon build'),
     ('%%terminal', 'cd src\ngit clone -b x y', 'git clone -b x y'),
     ('%%terminal', 'colcon build --packages-up-to x', 'colcon build --packages-up-to'),
+    ('%%terminal', 'colcon build --packages-up-to x', 'colcon build --packages-select x'),
 ]
 
 

@@ -118,6 +118,10 @@ def _order_says_nothing(program: Program, first: cst.CSTNode, second: cst.CSTNod
     Of one that gives a name a new object, the other may do what it wants, if it has not this name.
     """
     assigned = [_assigned(program, one) for one in (first, second)]
+    for one, other in ((first, second), (second, first)):
+        kept = only(other, cst.Assign)
+        if program.code(one).strip().startswith('super().__init__(') and kept:
+            return isinstance(kept.value, cst.Name | cst.Integer | cst.Float | cst.SimpleString)
     for names, one, other in zip(assigned, (first, second), (second, first), strict=True):
         if names and _is_new(program, one) and not _mentions(program, other, names):
             return True
@@ -490,7 +494,7 @@ def twice(program: Program) -> Made:
     for block, at, one in program.statements():
         call = call_in(one)
         name = name_of(call.func) if call else ''
-        again = call and name not in ONCE_IS_ENOUGH and not name.startswith('wait')
+        again = call and name not in ONCE_IS_ENOUGH and not name.startswith(('wait', '__'))
         if again or only(one, cst.AugAssign):
             yield program.put(block, at, one, one.with_changes(leading_lines=[]))
 
@@ -737,7 +741,8 @@ def a_depth_for_a_profile(program: Program) -> Made:
         yield program.changed(call, '10')
     for call in program.calls('create_publisher', 'create_subscription'):
         for one in call.args:
-            if isinstance(one.value, cst.Name) and one.value.value.isupper():
+            name = one.value.value if isinstance(one.value, cst.Name) else ''
+            if name.isupper() and 'DEPTH' not in name:
                 yield program.changed(one.value, '10')
 
 
