@@ -212,6 +212,19 @@ def test_a_rule_makes_these_mistakes(rule, solution, wrong):
     assert_makes(rule, solution, *wrong)
 
 
+@pytest.mark.parametrize(
+    'solution',
+    [
+        'def f(m):\n    if m.status < m.FIX:\n        return []\n    x = m.place\n    return x',
+        'def f(m):\n    return m.status < NavSatStatus.STATUS_FIX',
+        'def __init__(self, work):\n    super().__init__("a")\n    self.work = work',
+    ],
+)
+def test_what_is_as_good_is_no_mistake(solution):
+    for rule in ('behind_the_next_one', 'what_is_not_a_number', 'twice'):
+        assert not made_by(rule, solution)
+
+
 def test_a_timer_repeats_what_came_last():
     source = (
         "class A:\n    def __init__(self):\n        self.create_subscription(T, 't', self.on, 1)"

@@ -122,6 +122,8 @@ def _order_says_nothing(program: Program, first: cst.CSTNode, second: cst.CSTNod
         kept = only(other, cst.Assign)
         if program.code(one).strip().startswith('super().__init__(') and kept:
             return isinstance(kept.value, cst.Name | cst.Integer | cst.Float | cst.SimpleString)
+    if _is_taken_above_a_question(program, first, second, assigned[1]):
+        return True
     for names, one, other in zip(assigned, (first, second), (second, first), strict=True):
         if names and _is_new(program, one) and not _mentions(program, other, names):
             return True
@@ -130,6 +132,20 @@ def _order_says_nothing(program: Program, first: cst.CSTNode, second: cst.CSTNod
     return not any(
         _mentions(program, other, names)
         for names, other in zip(assigned, (second, first), strict=True)
+    )
+
+
+def _is_taken_above_a_question(
+    program: Program, question: cst.CSTNode, value: cst.CSTNode, names: list[str]
+) -> bool:
+    """Return whether a plain value stands above an if that leaves, and does not ask for it."""
+    if not isinstance(question, cst.If) or not names or _mentions(program, question, names):
+        return False
+    guards = re.search(r'\b(None|not|len)\b', program.code(question.test))
+    return (
+        leaves(question.body.body[-1])
+        and not guards
+        and not re.search(r'[(\[/]', program.code(value))
     )
 
 
@@ -686,6 +702,8 @@ def what_is_not_a_number(program: Program) -> Made:
         if operator not in opposite:
             continue
         left, right = program.code(compared.left), program.code(compared.comparisons[0].comparator)
+        if '.' in right and right.split('.')[-1].isupper():  # of a message: a whole number
+            continue
         if isinstance(node, cst.UnaryOperation) and isinstance(node.operator, cst.Not):
             yield program.changed(node, f'({left} {opposite[operator]} {right})')
         elif isinstance(node, cst.Comparison) and not isinstance(
