@@ -65,6 +65,16 @@ EXAMPLES = [
     ),
     ('behind_the_try', CAUGHT, 'def run():\n    spin()\n    stop()'),
     (
+        'behind_the_finally',
+        'try:\n    f()\nfinally:\n    stop()\n    shutdown()',
+        'try:\n    f()\nfinally:\n    stop()\nshutdown()',
+    ),
+    (
+        'a_spin_in_place_of_a_loop',
+        'while rclpy.ok():\n    rclpy.spin_once(node, timeout_sec=0.1)',
+        'rclpy.spin(node)',
+    ),
+    (
         'other_errors',
         'try:\n    f()\nexcept (A, B):\n    stop()',
         'try:\n    f()\nexcept A:\n    stop()',
@@ -147,6 +157,7 @@ EXAMPLES = [
     ),
     ('twice', 'publish(x)', 'publish(x)\npublish(x)'),
     ('the_first_only', 'for x in xs:\n    f(x)', 'for x in list(xs)[:1]:\n    f(x)'),
+    ('the_first_only', 'y = [f(x) for x in xs]', 'y = [f(x) for x in list(xs)[:1]]'),
     ('the_first_only', 'while x:\n    f()', 'if x:\n    f()'),
     ('the_other_end', 'x = a[-1]', 'x = a[0]'),
     ('the_other_end', 'x = a.pop(0)', 'x = a.pop()'),
@@ -181,6 +192,13 @@ EXAMPLES = [
     ('not_awaited', 'async def f():\n    x = await g()', 'async def f():\n    x = g()'),
     ('logged_once', "self.get_logger().info('x')", "self.get_logger().info('x', once=True)"),
     ('a_depth_for_a_profile', 'x = QoSProfile(depth=1)', 'x = 10'),
+    (
+        'a_depth_for_a_profile',
+        "node.create_subscription(T, 't', f, LASER)",
+        "node.create_subscription(T, 't', f, 10)",
+    ),
+    ('a_conversion_gone', 'x = math.radians(a)', 'x = a'),
+    ('a_function_gone', 'def f():\n    pass\n\n\ndef g():\n    f()', 'def g():\n    f()'),
     ('forgets_to_give_back', 'def f():\n    return x', 'def f():\n    x'),
     ('a_statement_gone', 'f()\ng()', 'g()', 'f()'),
     ('one_half_of_a_condition', 'x = a and b', 'x = a', 'x = b', 'x = a or b'),
@@ -192,6 +210,19 @@ EXAMPLES = [
 @pytest.mark.parametrize(('rule', 'solution', 'wrong'), [(*one[:2], one[2:]) for one in EXAMPLES])
 def test_a_rule_makes_these_mistakes(rule, solution, wrong):
     assert_makes(rule, solution, *wrong)
+
+
+@pytest.mark.parametrize(
+    'solution',
+    [
+        'def f(m):\n    if m.status < m.FIX:\n        return []\n    x = m.place\n    return x',
+        'def f(m):\n    return m.status < NavSatStatus.STATUS_FIX',
+        'def __init__(self, work):\n    super().__init__("a")\n    self.work = work',
+    ],
+)
+def test_what_is_as_good_is_no_mistake(solution):
+    for rule in ('behind_the_next_one', 'what_is_not_a_number', 'twice'):
+        assert not made_by(rule, solution)
 
 
 def test_a_timer_repeats_what_came_last():
@@ -214,8 +245,10 @@ FILES = [
     ('%%write a.cpp', '  timer_ = create_timer(x);', '  auto local = create_timer(x);'),
     ('%%write a.launch.xml', '<node pkg="a" exec="b"/>\n<node/>', '<node exec="b"/>\n<node/>'),
     ('%%write a.srv', 'float64 x\n---\nbool y', 'float32 x\n---\nbool y'),
+    ('%%terminal', 'colcon build', 'cd src; colcon build'),
     ('%%terminal', 'cd src\ngit clone -b x y', 'git clone -b x y'),
     ('%%terminal', 'colcon build --packages-up-to x', 'colcon build --packages-up-to'),
+    ('%%terminal', 'colcon build --packages-up-to x', 'colcon build --packages-select x'),
 ]
 
 

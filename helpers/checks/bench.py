@@ -21,6 +21,7 @@ The words of a judge for nodes:
     scan(0.5), scan(ranges, age_s=3)       a scan of the laser
     must_have(node, 'timer')               an attribute is not there yet
     must_define(Driver, '__init__')        a method is not there yet
+    must_be_called(node, 'driver')         a node has another name
     override(Driver, PERIOD_S=0.1)         another value for a constant of the notebook
     with one_cpu() as counted:             an executor that is made here counts one CPU
 
@@ -383,6 +384,13 @@ def must_define(a_class: type, *methods: str) -> None:
     for method in methods:
         if method not in vars(a_class):
             raise Failed(f'the class has no {method} yet')
+
+
+def must_be_called(node: Node, name: str) -> None:
+    """Raise Failed if a node of the student has another name than the task says."""
+    if node.get_name() != name:
+        found = f'the name of the node is {node.get_name()}, not {name}'
+        raise Failed(found, hint=f"super().__init__('{name}') in its __init__.")
 
 
 def override(written: type | Callable, **constants: object) -> None:

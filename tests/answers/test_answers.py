@@ -71,9 +71,7 @@ def judge(kernel: Kernel, sources: list[str], key: str, cells: Cells) -> None:
         said = run_all(kernel, files, [source])
         for _ in range(2):
             said += run_all(kernel, cells['check'])
-            solved = [verdict['solved'] for verdict in kernel.verdicts]
-            # A name that the answer does not define is an error of the cell, not a verdict.
-            if solved != [kind == 'right'] and not (kind != 'right' and not solved):
+            if kernel.judged != ('right' if kind == 'right' else 'wrong'):
                 pytest.fail(
                     f'{WHY.get(kind, WHY["wrong"]).format(key)}\n{source}\n\n'
                     f'The check said:\n{said}',

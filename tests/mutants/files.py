@@ -30,6 +30,10 @@ C_WORDS = (
     ('PRIVATE', 'INTERFACE'), ('PUBLIC', 'PRIVATE'),
 )  # fmt: skip
 C_TOKEN = re.compile(r'"[^"]*"|\w+|[<>=!]=|&&|\|\||\+\+|--|->|<<|>>|::|[-+*/<>]')
+OPTIONS = (
+    ('--packages-up-to', '--packages-select'), ('-p', '-r'), ('--once', '--times 2'),
+    ('--start-offset', '--delay'),
+)  # fmt: skip
 DEPENDS = ('depend', 'exec_depend', 'build_depend', 'test_depend', 'buildtool_depend')
 TYPES = {
     'float64': 'float32', 'float32': 'int32', 'int32': 'float64', 'int64': 'int32',
@@ -201,6 +205,27 @@ def a_word_gone(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
         for found in re.finditer(r'(?<=[\s(])[^\s()]+', line):
             if _is_code(found[0]) and line[: found.start()].strip():
                 yield _with(lines, at, (line[: found.start()].rstrip(' ') + line[found.end() :]))
+
+
+@rule
+def another_option(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
+    """An option of a command that sounds nearly the same."""
+    for at in sorted(written) if kind == 'commands' else ():
+        line = lines[at] if at < len(lines) else ''
+        for found in re.finditer(r'(?<=\s)-[\w-]+(?=\s)', line):
+            for pair in OPTIONS:
+                if found[0] in pair:
+                    other = pair[1 - pair.index(found[0])]
+                    yield _with(lines, at, line[: found.start()] + other + line[found.end() :])
+
+
+@rule
+def in_another_folder(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
+    """A build in src, where its folders do not belong."""
+    for at in sorted(written) if kind == 'commands' else ():
+        line = lines[at] if at < len(lines) else ''
+        if line.lstrip().startswith('colcon '):
+            yield _with(lines, at, f'cd src; {line.lstrip()}')
 
 
 @rule

@@ -50,6 +50,9 @@ CLOCKS = {
     'ClockType.ROS_TIME': ['ClockType.SYSTEM_TIME', 'ClockType.STEADY_TIME'],
     'Clock(clock_type=ClockType.STEADY_TIME)': ['self.get_clock()', 'Clock()'],
 }
+CONVERSIONS = {
+    'radians', 'degrees', 'float', 'int', 'str', 'sorted', 'reversed', 'remainder', 'strip',
+}  # fmt: skip
 CHANGES = (
     'get_clock', 'monotonic', 'time', 'get_parameter', 'get_subscription_count',
     'get_publisher_count', 'count_publishers', 'count_subscribers', 'is_set', 'done',
@@ -115,6 +118,12 @@ def _order_says_nothing(program: Program, first: cst.CSTNode, second: cst.CSTNod
     Of one that gives a name a new object, the other may do what it wants, if it has not this name.
     """
     assigned = [_assigned(program, one) for one in (first, second)]
+    for one, other in ((first, second), (second, first)):
+        kept = only(other, cst.Assign)
+        if program.code(one).strip().startswith('super().__init__(') and kept:
+            return isinstance(kept.value, cst.Name | cst.Integer | cst.Float | cst.SimpleString)
+    if _is_taken_above_a_question(program, first, second, assigned[1]):
+        return True
     for names, one, other in zip(assigned, (first, second), (second, first), strict=True):
         if names and _is_new(program, one) and not _mentions(program, other, names):
             return True
@@ -123,6 +132,20 @@ def _order_says_nothing(program: Program, first: cst.CSTNode, second: cst.CSTNod
     return not any(
         _mentions(program, other, names)
         for names, other in zip(assigned, (second, first), strict=True)
+    )
+
+
+def _is_taken_above_a_question(
+    program: Program, question: cst.CSTNode, value: cst.CSTNode, names: list[str]
+) -> bool:
+    """Return whether a plain value stands above an if that leaves, and does not ask for it."""
+    if not isinstance(question, cst.If) or not names or _mentions(program, question, names):
+        return False
+    guards = re.search(r'\b(None|not|len)\b', program.code(question.test))
+    return (
+        leaves(question.body.body[-1])
+        and not guards
+        and not re.search(r'[(\[/]', program.code(value))
     )
 
 
@@ -215,6 +238,18 @@ def other_errors(program: Program) -> Made:
 
 
 @rule
+def behind_the_finally(program: Program) -> Made:
+    """The last statement of a finally stands below it: an error that goes on leaves it out."""
+    for block, at, one in program.statements():
+        if isinstance(one, cst.Try) and one.finalbody:
+            body = [*one.finalbody.body.body]
+            if len(body) > 1 and program.is_written(body[-1]):
+                rest = one.finalbody.body.with_changes(body=body[:-1])
+                kept = one.with_changes(finalbody=one.finalbody.with_changes(body=rest))
+                yield program.put(block, at, kept, body[-1])
+
+
+@rule
 def without_super(program: Program) -> Made:
     """A method that does not call the one that it replaces."""
     super_call = m.Call(func=m.Attribute(value=m.Call(func=m.Name('super'))))
@@ -286,6 +321,18 @@ def a_busy_loop_in_place_of_a_wait(program: Program) -> Made:
         if sleeps:
             rest = [one for one in loop.body.body if one not in sleeps]
             yield program.changed(loop, with_body(loop, *rest))
+
+
+@rule
+def a_spin_in_place_of_a_loop(program: Program) -> Made:
+    """`rclpy.spin(node)`, where the loop also looks at something else."""
+    for loop in program.each(cst.While):
+        for one in loop.body.body:
+            call = call_in(one)
+            if call and program.code(call.func).endswith('.spin_once'):
+                owner = program.code(call.func).rpartition('.')[0]
+                given = [program.code(arg.value) for arg in call.args if arg.keyword is None]
+                yield program.replaced(loop, f'{owner}.spin({", ".join(given[:1])})')
 
 
 def _sleeps(one: cst.CSTNode) -> bool:
@@ -463,7 +510,7 @@ def twice(program: Program) -> Made:
     for block, at, one in program.statements():
         call = call_in(one)
         name = name_of(call.func) if call else ''
-        again = call and name not in ONCE_IS_ENOUGH and not name.startswith('wait')
+        again = call and name not in ONCE_IS_ENOUGH and not name.startswith(('wait', '__'))
         if again or only(one, cst.AugAssign):
             yield program.put(block, at, one, one.with_changes(leading_lines=[]))
 
@@ -474,6 +521,10 @@ def the_first_only(program: Program) -> Made:
     for loop in program.each(cst.For):
         values = program.code(loop.iter)
         for part in ('[:1]', '[:-1]', '[1:]'):
+            yield program.changed(loop, loop.with_changes(iter=expression(f'list({values}){part}')))
+    for loop in program.each(cst.CompFor):
+        values = program.code(loop.iter)
+        for part in ('[:1]', '[1:]'):
             yield program.changed(loop, loop.with_changes(iter=expression(f'list({values}){part}')))
     for loop in program.each(cst.While):
         if loop.orelse is None and program.code(loop.test) != 'True':
@@ -651,6 +702,8 @@ def what_is_not_a_number(program: Program) -> Made:
         if operator not in opposite:
             continue
         left, right = program.code(compared.left), program.code(compared.comparisons[0].comparator)
+        if '.' in right and right.split('.')[-1].isupper():  # of a message: a whole number
+            continue
         if isinstance(node, cst.UnaryOperation) and isinstance(node.operator, cst.Not):
             yield program.changed(node, f'({left} {opposite[operator]} {right})')
         elif isinstance(node, cst.Comparison) and not isinstance(
@@ -704,6 +757,32 @@ def a_depth_for_a_profile(program: Program) -> Made:
     """A depth in place of a whole QoS profile."""
     for call in program.calls('QoSProfile'):
         yield program.changed(call, '10')
+    for call in program.calls('create_publisher', 'create_subscription'):
+        for one in call.args:
+            name = one.value.value if isinstance(one.value, cst.Name) else ''
+            if name.isupper() and 'DEPTH' not in name:
+                yield program.changed(one.value, '10')
+
+
+@rule
+def a_conversion_gone(program: Program) -> Made:
+    """Degrees for radians, a number that is still a text, an angle that goes on round and round."""
+    for call in program.calls(*CONVERSIONS):
+        args = [program.code(one.value) for one in call.args if one.keyword is None]
+        if args and not isinstance(program.parent(call), cst.Expr):
+            yield program.changed(call, f'({args[0]})')
+
+
+@rule
+def a_function_gone(program: Program) -> Made:
+    """A function that others call, or a method that replaces another, is not there."""
+    for block, body in program.blocks():
+        for at, one in enumerate(body):
+            if isinstance(one, cst.FunctionDef) and program.is_written(one):
+                name = one.name.value
+                is_private = name.startswith('_') and name != '__init__'
+                if len(body) > 1 and not is_private:
+                    yield program.put(block, at)
 
 
 @rule

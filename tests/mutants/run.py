@@ -31,29 +31,11 @@ from mutants.made import Mutant, entry_of
 SEED = 1
 LIMIT_S = 120  # of a cell: what takes longer has no verdict
 NOTICED, SURVIVED, NO_VERDICT = 'noticed', 'survived', 'no verdict'
+HOW = {'right': SURVIVED, 'wrong': NOTICED, 'not judged': NO_VERDICT}
 STOP_EARLY = """
-def stop_early():
-    import helpers.checks.tasks as tasks
+import helpers.checks.tasks
 
-    class Enough(BaseException):
-        pass
-
-    def until_one_is_wrong(points, send, judge_points=tasks.judge_points):
-        def send_on(message, **limits):
-            send(message, **limits)
-            if message[0] == 'point' and not message[1][0]:
-                raise Enough
-
-        try:
-            judge_points(points, send_on)
-        except Enough:
-            pass
-
-    tasks.judge_points = until_one_is_wrong
-
-
-stop_early()
-del stop_early
+helpers.checks.tasks.TOGETHER_S = 0
 """
 
 
@@ -111,6 +93,20 @@ class Judge:
             self.close()
         return Judged(task, mutant, how, time.monotonic() - started, said)
 
+    def judge_all(self, task: str, mutants: list[Mutant]) -> list[Judged]:
+        """Return what the check of a task says of its mutants, if it takes the solution itself.
+
+        A check that refuses everything would notice all of them.
+        """
+        if not mutants:
+            return []
+        solution = mutants[0].solution
+        control = self.judge(task, Mutant('solution', solution, solution))
+        if control.how == SURVIVED:
+            return [self.judge(task, mutant) for mutant in mutants]
+        said = f'The check does not take the solution itself. {control.said}'
+        return [Judged(task, mutant, NO_VERDICT, control.seconds, said) for mutant in mutants]
+
 
 def _verdict_of(lesson: Lesson, cells: Cells, mutant: Mutant) -> tuple[str, str]:
     files = cells['exercise'] if len(cells['exercise']) > 1 else []
@@ -121,8 +117,7 @@ def _verdict_of(lesson: Lesson, cells: Cells, mutant: Mutant) -> tuple[str, str]
         lesson.kernel.km.interrupt_kernel()
         return NOTICED, 'Its cell does not end.'
     said += run_all(lesson.kernel, cells['check'])
-    solved = [verdict['solved'] for verdict in lesson.kernel.verdicts]
-    return SURVIVED if solved == [True] else NOTICED, said
+    return HOW[lesson.kernel.judged], said
 
 
 def judge_part(name: str, mutants: dict[str, list[Mutant]]) -> list[Judged]:
@@ -130,7 +125,7 @@ def judge_part(name: str, mutants: dict[str, list[Mutant]]) -> list[Judged]:
     judge, judged = Judge(name), []
     try:
         for task, of_task in mutants.items():
-            judged += [judge.judge(task, mutant) for mutant in of_task]
+            judged += judge.judge_all(task, of_task)
             if of_task:
                 left = sum(one.task == task and one.how != NOTICED for one in judged)
                 print(
@@ -198,6 +193,7 @@ def report_of(name: str, one: Judged) -> str:
             textwrap.indent(one.mutant.difference, '    '),
             f'  if it is equal, below `{one.task} equal:` of tests/answers/{name}.yaml:',
             textwrap.indent(entry.rstrip(), '    '),
+            *([f'  It was not judged: {one.said}'] if one.how == NO_VERDICT else []),
             '',
         ]
     )

@@ -7,6 +7,7 @@ from nbclient import NotebookClient
 
 from helpers.checks.verdict import KEY
 
+OWN_ERROR = 'ended with an error. Mend it'  # in the note of an answer that was not judged
 NOTEBOOKS = Path(__file__).resolve().parents[2] / 'notebooks'
 
 
@@ -38,7 +39,22 @@ class Kernel(NotebookClient):
         self.execute_cell(cell, len(self.nb.cells) - 1)
         data = [output.get('metadata', {}).get(KEY) for output in cell.outputs]
         self.verdicts = [verdict for verdict in data if verdict]
+        self._has_error = any(output['output_type'] == 'error' for output in cell.outputs)
         return ''.join(map(_text, cell.outputs))
+
+    @property
+    def judged(self) -> str:
+        """How the check in the last cell has judged an answer: 'right', 'wrong', or 'not judged'.
+
+        An answer whose own cell ends with an error is wrong. One that needs another task, or has
+        changed what judges it, is not judged: then nothing is known of the check.
+        """
+        if not self.verdicts:
+            return 'wrong' if self._has_error else 'not judged'
+        verdict = self.verdicts[-1]
+        if verdict['solved']:
+            return 'right'
+        return 'not judged' if 'note' in verdict and OWN_ERROR not in verdict['note'] else 'wrong'
 
 
 def _text(output: dict) -> str:

@@ -1,5 +1,6 @@
 """What the tasks of the lesson "Choose the number of threads" are judged by."""
 
+import math
 import threading
 import time
 
@@ -10,7 +11,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
-from helpers.checks.bench import Bench, must_define, must_have
+from helpers.checks.bench import Bench, must_be_called, must_define, must_have
 from helpers.checks.points import all_of, expect, rows
 from helpers.checks.tasks import Tasks
 from helpers.recording import explain, predict
@@ -21,6 +22,8 @@ check = tasks.check
 
 QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
 ENDS_S = 0.3  # for a callback that waits for nothing
+GATE_S = 60
+BUSY = 500  # times in ENDS_S: a callback that asks without a pause, on any machine
 SPINS_S = 5.0  # for two calls of spin_once, of 0.1 s each
 
 
@@ -30,7 +33,11 @@ def a_gate(GatedSubscriber):
         must_define(GatedSubscriber, '__init__')
         with Bench() as bench:
             node, begun, ended = GatedSubscriber(depth, group, events), [], []
+            must_be_called(node, 'gated_subscriber')
             must_have(node, 'gate', 'subscription')
+            if not isinstance(node.gate, threading.Event):
+                return f'self.gate is a {type(node.gate).__name__}, not a threading.Event'
+            gate = node.gate = WatchedGate()
             subscription, callback = node.subscription, node.subscription.callback
 
             def call(message):
@@ -52,8 +59,12 @@ def a_gate(GatedSubscriber):
             return f'depth {depth} and its group were asked for, but not passed on'
         if bool(handlers) == (events is QUIET):
             return 'event_callbacks=events is not passed on'
+        if gate.asked > BUSY:
+            return 'it asks is_set() without a pause: that takes a whole CPU'
         if held < messages:
             return f'{messages - held} of {messages} callbacks ended before the gate was opened'
+        if gate.longest_s > GATE_S or gate.longest_s < GATE_S and not gate.asked:
+            return expect(gate.longest_s, GATE_S, 'it waits at the gate for at most', unit='s')
         return expect(len(ended), messages, 'messages received after the gate was opened:')
 
     wait = 'self.gate.wait(timeout=60) in the callback.'
@@ -67,6 +78,24 @@ def a_gate(GatedSubscriber):
             call,
         ),
     ]
+
+
+class WatchedGate(threading.Event):
+    """An Event that knows for how long somebody would wait for it, and how often it was asked."""
+
+    def __init__(self):
+        super().__init__()
+        self.longest_s, self.asked = 0.0, 0
+
+    def wait(self, timeout=None):
+        """Wait for it, as every Event does."""
+        self.longest_s = max(self.longest_s, math.inf if timeout is None else timeout)
+        return super().wait(timeout)
+
+    def is_set(self):
+        """Return whether it is set."""
+        self.asked += 1
+        return super().is_set()
 
 
 def numbers(count):
@@ -146,6 +175,7 @@ def publish_numbers(NumberPublisher):
         with Bench() as bench:
             heard = bench.hear('number', Int32)
             node = NumberPublisher(messages, period_s)
+            must_be_called(node, 'number_publisher')
             must_have(node, 'publisher')
             topic = node.publisher.topic_name
             if topic != '/number':
@@ -176,6 +206,7 @@ def work_at_once(WorkingSubscriber, DEPTH):
         with Bench() as bench:
             gate = bench.gate()
             node = WorkingSubscriber(lambda: gate.hold())  # not with a message
+            must_be_called(node, 'working_subscriber')
             must_have(node, 'subscription')
             depth = node.subscription.qos_profile.depth
             handlers = len(node.subscription.event_handlers)

@@ -383,4 +383,9 @@ def a_gate(is_taken):
         ('across a long ellipse', lambda: judges(False, (0.0, 2.0), long), divide),
         ('a tilted ellipse', two_on_a_tilted_one, whole),
         ('another gate', lambda: judges(False, (2.0, 0.0), circle, 1.5), 'Use gate.'),
+        (
+            'what is not a number is not taken',
+            lambda: judges(False, (math.nan, 0.0), circle),
+            'Every comparison with NaN is false: ask what is taken, not what is left out.',
+        ),
     ]

@@ -1,9 +1,8 @@
 """What the tasks of the lesson "Run callbacks in parallel" are judged by."""
 
-import itertools
 import threading
 import time
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -184,7 +183,7 @@ class LateEvent(threading.Event):
         super().set()
         end_s = time.monotonic() + 1
         while not self.finished and time.monotonic() < end_s:
-            time.sleep(SWITCH_S)
+            time.sleep(POLL_S)
 
 
 @tasks.add
@@ -217,7 +216,7 @@ def an_odometer(Odometer):
     forty, fewer = two_trials(Odometer, 'total', 'longest')
 
     def shows(trial, count):
-        right = {'total': sum(range(count)), 'longest': count - 1}
+        right = {'total': sum(range(1, count + 1)), 'longest': count}
         wrong = [name for name in right if trial().values[name] != right[name]]
         if wrong:
             return f'after {count} distances, wrong: self.{" and self.".join(wrong)}'
@@ -234,16 +233,16 @@ def an_odometer(Odometer):
 
 
 def two_trials(node_class, *names):
-    """Let a node hear 0 to 39, and another one 23 to 0: the longest comes first then."""
+    """Let a node hear 1 to 40, and another one 24 to 1: the longest comes first then."""
 
     @cached
     def forty():
-        return hear_numbers(node_class, range(40), names)
+        return hear_numbers(node_class, range(1, 41), names)
 
     @cached
     def fewer():
         forty()  # what it raises is found again, without another wait
-        return hear_numbers(node_class, range(23, -1, -1), names)
+        return hear_numbers(node_class, range(24, 0, -1), names)
 
     return forty, fewer
 
@@ -257,29 +256,8 @@ def work_overlaps(trial):
 
 # --- Threads that switch at the worst moments
 
-SWITCH_S = 0.005
-
-
-class SlowLock:
-    """A lock after whose release another thread takes its turn."""
-
-    def __init__(self, lock):
-        self.lock = lock
-
-    def acquire(self, *arguments, **options):
-        """Wait for the lock, as the one that it holds does."""
-        return self.lock.acquire(*arguments, **options)
-
-    def release(self):
-        """Give the lock back, and let another thread run."""
-        self.lock.release()
-        time.sleep(SWITCH_S)
-
-    def __enter__(self):
-        return self.acquire()
-
-    def __exit__(self, *error):
-        self.release()
+STANDS_S = 2.0  # without another callback that ends, the others wait for what is held
+POLL_S = 0.002
 
 
 class Trial:
@@ -288,8 +266,13 @@ class Trial:
     Its numbers only grow. `went_back` has what was written over a larger one.
     """
 
-    def __init__(self):
+    def __init__(self, messages):
         self.values, self.at_work, self.went_back = {}, [], []
+        self.node = None  # until it is made, nothing is held
+        self._messages = messages
+        self._places, self._held = set(), 0
+        self._one_by_one = threading.Lock()
+        self._waits_for = {}  # a watched lock, by the thread that waits for it
 
     @property
     def never_goes_back(self):
@@ -299,40 +282,106 @@ class Trial:
         )
 
     def watch(self, name):
-        """Return a property whose number is read slowly, and whose every second write is late.
+        """Return a property: the first callback that has read it is held, and one that writes it.
 
-        So other threads read it meanwhile, and write before.
+        So all others read and write in between, if no lock keeps them away.
         """
-        turns = itertools.count()
 
         def read(node):
             if name not in self.values:
                 raise AttributeError(f'there is no self.{name} yet')
             value = self.values[name]
-            time.sleep(SWITCH_S)
+            self.hold(f'has read {name}')
             return value
 
         def write(node, value):
-            time.sleep(2 * SWITCH_S * (next(turns) % 2))
+            self.hold(f'will write {name}')
             if value < self.values.get(name, value):
                 self.went_back.append(f'self.{name} was {self.values[name]}, and is {value}')
             self.values[name] = value
 
         return property(read, write)
 
+    def watch_locks(self, node):
+        """Let the locks of a node say which thread has them, and which waits for them."""
+        kinds = type(threading.Lock()), type(threading.RLock())
+        owners = [*reversed(type(node).__mro__), node]
+        named = {name: value for owner in owners for name, value in vars(owner).items()}
+        for name, value in named.items():
+            if type(value) in kinds:
+                setattr(node, name, WatchedLock(value, self))
+
+    def hold(self, place):
+        """Hold the first callback that comes to a place, until all others end or wait for it."""
+        with self._one_by_one:
+            node = self.node
+            if node is None or place in self._places:
+                return
+            self._places.add(place)
+            self._held += 1
+        me, ended, end_s = threading.get_ident(), -1, 0.0
+        while self.node and not self._is_waited_for(me):
+            if len(node.finished) != ended:
+                ended, end_s = len(node.finished), time.monotonic() + STANDS_S
+            if ended + self._held >= self._messages:
+                break
+            if time.monotonic() > end_s:  # a lock that we do not watch keeps the others away
+                self.node = None
+            time.sleep(POLL_S)
+        with self._one_by_one:
+            self._held -= 1
+
+    def _is_waited_for(self, thread):
+        return any(lock.holder == thread for lock in [*self._waits_for.values()])
+
+    @contextmanager
+    def waiting_for(self, lock):
+        """Note that this thread waits for a lock."""
+        self._waits_for[threading.get_ident()] = lock
+        yield
+        del self._waits_for[threading.get_ident()]
+
+
+class WatchedLock:
+    """A lock that knows its holder. The first callback that has given it back is held."""
+
+    def __init__(self, lock, trial):
+        self._lock, self._trial = lock, trial
+        self.holder, self._depth = None, 0
+
+    def acquire(self, *arguments, **options):
+        """Wait for the lock, as the one that it holds does."""
+        with self._trial.waiting_for(self):
+            acquired = self._lock.acquire(*arguments, **options)
+        if acquired:
+            self.holder, self._depth = threading.get_ident(), self._depth + 1
+        return acquired
+
+    def release(self):
+        """Give the lock back, and let others run."""
+        if self._depth == 1:
+            self.holder = None
+        self._depth -= 1
+        self._lock.release()
+        self._trial.hold('has given a lock back')
+
+    def locked(self):
+        """Return whether somebody has it."""
+        return self.holder is not None
+
+    def __enter__(self):
+        return self.acquire()
+
+    def __exit__(self, *error):
+        self.release()
+
 
 def hear_numbers(node_class, numbers, names):
     """Let a node hear numbers in eight threads, which switch when it reads or writes `names`."""
     must_define(node_class, '__init__')
-    trial, working = Trial(), []
+    trial, working = Trial(len(numbers)), []
 
     class Tried(node_class):
-        def __init__(self):
-            super().__init__()
-            for name, value in list(vars(self).items()):
-                if type(value) in (type(threading.Lock()), type(threading.RLock())):
-                    setattr(self, name, SlowLock(value))
-
         def work(self):
             working.append(self)
             trial.at_work.append(len(working))
@@ -342,8 +391,11 @@ def hear_numbers(node_class, numbers, names):
     for name in names:
         setattr(Tried, name, trial.watch(name))
     with Bench() as bench:
-        node = bench.spin(Tried(), threads=8)
+        node = Tried()
         must_have(node, 'finished', *names)
+        trial.watch_locks(node)
+        trial.node = node
+        bench.spin(node, threads=8)
         messages = [Int32(data=number) for number in numbers]
         bench.say('number', *messages, qos=100, at_once=True)
         if not bench.wait(lambda: len(node.finished) == len(messages), 8):
