@@ -2,7 +2,7 @@
 // drawn into it, if the record has it.
 
 function show(root, record) {
-  const kind = { place: () => placeKind, level: () => levelKind, options: () => optionsKind }[record.kind]();
+  const kind = { place: () => placeKind, level: () => levelKind, options: () => optionsKind, rows: () => rowsKind }[record.kind]();
   const kept = memory(root, record);
   const says = element('p', { 'aria-live': 'polite', class: 'guess-says' });
   const shown = kind.draw(record, root.querySelector('img'), kept.set);
