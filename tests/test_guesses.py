@@ -119,6 +119,7 @@ def asked(capsys, *typed, **on):
         (ROWS, [2, 'no'], [2, 1], 'lost: 2, it stops: no.'),
         (ROWS, {'it stops': True, 'lost': 0}, [0, 0], 'lost: 0, it stops: yes.'),
         (ROWS, '1, yes', [1, 0], 'lost: 1, it stops: yes.'),
+        (dict.fromkeys('12', ('A', 'B', '-')), 'B-', [1, 2], '1: B, 2: -.'),
     ],
 )
 def test_whatever_says_it_is_read(capsys, on, typed, value, said):

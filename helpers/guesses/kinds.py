@@ -198,7 +198,8 @@ class Rows:
     def read(self, typed: object) -> list[int]:
         """Return the place of an option for each row, of a list or of a dict with their names."""
         if isinstance(typed, str):
-            typed = typed.replace(',', ' ').split()
+            words = typed.replace(',', ' ').split()
+            typed = words if len(words) == len(self.rows) else [*''.join(words)]
         if isinstance(typed, Mapping) and set(typed) == set(self.rows):
             typed = [typed[name] for name in self.rows]
         if not isinstance(typed, Sequence) or len(typed) != len(self.rows):

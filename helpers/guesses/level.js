@@ -1,6 +1,6 @@
 // A level: a number on an axis. `said` and `gap` need no page.
 const levelKind = (() => {
-  const [WIDE, TALL, LEFT, RIGHT, LINE] = [800, 144, 40, 40, 84];
+  const [WIDE, TALL, LEFT, RIGHT, LINE] = [800, 144, 60, 40, 84];
   const rounded = ({ step }, value) => +(Math.round(value / step) * step).toFixed(3);
   const one = ({ unit }, value) => (value === 1 ? unit.replace(/s$/, '') : unit);
   const named = ({ unit = '', step }, value) => [`${+value.toFixed(3)}`, Number.isInteger(step) ? one({ unit }, value) : unit].filter(Boolean).join(' ');
@@ -28,9 +28,9 @@ const levelKind = (() => {
   };
 
   function draw(record, image, set) {
-    const { low, high, step, unit, marks, outcome } = record;
+    const { low, high, step, unit, marks = {}, outcome } = record;
     const x = value => LEFT + (WIDE - LEFT - RIGHT) * (value - low) / (high - low);
-    const svg = svgElement('svg', { viewBox: `0 0 ${WIDE} ${TALL}`, 'font-size': 18, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' });
+    const svg = svgElement('svg', { viewBox: `0 0 ${WIDE} ${unit ? TALL : TALL - 24}`, 'font-size': 18, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' });
     const rough = (high - low) / 8;
     const power = 10 ** Math.floor(Math.log10(rough));
     const tick = Math.max([1, 2, 5, 10].find(n => n * power >= rough) * power, Number.isInteger(step) ? 1 : 0);
@@ -62,13 +62,12 @@ const levelKind = (() => {
       svg.append(svgElement('text', { class: 'came-out', x: at, y: 18, 'text-anchor': 'middle' }, named(record, +outcome.at.toPrecision(3))));
     }
     let now = null;
-    const begin = rounded(record, (low + high) / 2);
 
+    // Before a guess it stands beside the axis: a place on it would be a hint.
     function put(value) {
       now = value;
-      const at = value ?? begin;
-      you.setAttribute('transform', `translate(${x(at)})`);
-      you.setAttribute('aria-valuenow', at);
+      you.setAttribute('transform', `translate(${value === null ? LEFT / 2 - 8 : x(value)})`);
+      you.setAttribute('aria-valuenow', value ?? low);
       you.setAttribute('aria-valuetext', value === null ? 'not yet' : said(record, value));
       if (outcome && value !== null) measure(x(value), x(Math.min(Math.max(outcome.at, low), high)));
     }
@@ -101,7 +100,7 @@ const levelKind = (() => {
         const ends = { Home: low, End: high }[event.key];
         if (!(event.key in KEYS) && ends === undefined) return;
         event.preventDefault();
-        to(ends ?? (now ?? begin) + KEYS[event.key] * step);
+        to(ends ?? (now === null ? low : now + KEYS[event.key] * step));
       });
     }
     return { node: svg, put };

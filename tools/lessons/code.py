@@ -39,7 +39,9 @@ def given_away(source: str, question: str, answer: str) -> Iterator[str]:
                     yield f'the outcome is written, {ast.unparse(outcome)}'
                 for word in node.keywords:
                     reason = texts.get(getattr(word.value, 'id', ''), word.value)
-                    if word.arg == 'because' and _names(reason, answer):
+                    if word.arg == 'because' and _is_written(reason):
+                        yield 'because= is a text that one reads before, write it below'
+                    elif word.arg == 'because' and _names(reason, answer):
                         yield f'because= names {answer}'
             case ast.Compare(_, [ast.Eq()], [value]) if answer not in TOO_SHORT:
                 if _is_number(value) and str(value.value) == answer:
