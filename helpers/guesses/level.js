@@ -52,7 +52,7 @@ const levelKind = (() => {
       svgElement('text', { class: 'you-label', y: 18 }, 'you'));
     const ghosts = svgElement('g', { class: 'class' });
     svg.append(ghosts, gapLine, gapLabel, you);
-    classOf(record, values => ghosts.replaceChildren(...values.map(value => svgElement('path', {
+    classOf(record, values => ghosts.replaceChildren(...values.filter(Number.isFinite).map(value => svgElement('path', {
       d: `M${x(Math.min(Math.max(value, low), high))} ${LINE}v-40`, stroke: 'var(--look-you)', 'stroke-width': 6, 'stroke-opacity': 0.3,
     }))));
     if (outcome) {

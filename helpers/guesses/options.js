@@ -30,7 +30,17 @@ const optionsKind = (() => {
 
     const node = element('div', { class: 'guess-options', role: one ? 'radiogroup' : 'group', 'aria-label': label, onkeydown }, ...buttons);
     const press = places => buttons.forEach((button, place) => button.setAttribute('aria-checked', places.includes(place)));
-    return { node, press };
+
+    // How many of a class have chosen each: `values` are their words, none at all before they are shown.
+    function count(values) {
+      buttons.forEach((button, place) => {
+        const students = values.filter(value => value === names[place]).length;
+        if (students) button.dataset.class = `${students}`;
+        else delete button.dataset.class;
+      });
+    }
+
+    return { node, press, count };
   }
 
   function draw(record, image, set) {
@@ -41,6 +51,8 @@ const optionsKind = (() => {
     const pressed = value => (value === null ? [] : value.length === 0 ? [none] : [value].flat());
     const shown = row(none < 0 ? names : [...names, 'none of them'], record.question, one, outcome && pressed(outcome.at), choose);
     let now = null;
+    // A list that is empty says none of them. An option that is the text of a number comes as one.
+    classOf(record, values => shown.count(values.flatMap(value => ([].concat(value).length ? value : ['none of them'])).map(String)));
 
     function choose(place) {
       if (one) return set(place);

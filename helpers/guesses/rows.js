@@ -11,7 +11,8 @@ const rowsKind = (() => {
     return { right, says: right ? `Right: ${listed(rows, at)}.` : `${wrong.filter(Boolean).join('. ')}.` };
   }
 
-  function draw({ rows, outcome }, image, set) {
+  function draw(record, image, set) {
+    const { rows, outcome } = record;
     let now = rows.map(() => null);
     const shown = rows.map(({ name, names }, i) => optionsKind.row(names, name, true, outcome && [outcome.at[i]], place => {
       now[i] = place;
@@ -19,6 +20,8 @@ const rowsKind = (() => {
       if (!now.includes(null)) set([...now]);
     }));
     const press = () => shown.forEach(({ press: one }, i) => one([now[i]]));
+
+    classOf(record, values => shown.forEach(({ count }, i) => count(values.map(value => String(value[i]).replace(`${rows[i].name}: `, '')))));
 
     function put(value) {
       // Until each row is answered, what was chosen is here alone.
