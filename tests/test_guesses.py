@@ -92,6 +92,7 @@ def test_an_outcome_of_no_known_kind_is_refused(capsys):
 # Guesses that one makes in a picture
 
 END = 'Where does it end?'
+ROWS = {'lost': range(3), 'it stops': bool}
 
 
 def asked(capsys, *typed, **on):
@@ -115,6 +116,10 @@ def asked(capsys, *typed, **on):
         (bool, False, 1, 'no.'),
         (('A', 'B', 'C'), ' b', 1, 'B.'),
         ({'hits the wall': 'hit', 'stops': 'stop'}, 'Stops', 1, 'stops.'),
+        (ROWS, [2, 'no'], [2, 1], 'lost: 2, it stops: no.'),
+        (ROWS, {'it stops': True, 'lost': 0}, [0, 0], 'lost: 0, it stops: yes.'),
+        (ROWS, '1, yes', [1, 0], 'lost: 1, it stops: yes.'),
+        (dict.fromkeys('12', ('A', 'B', '-')), 'B-', [1, 2], '1: B, 2: -.'),
     ],
 )
 def test_whatever_says_it_is_read(capsys, on, typed, value, said):
@@ -140,6 +145,12 @@ def test_several_options_are_typed_in_any_form(capsys, typed):
         ({'on': bool}, 1, '1 is none of the options. Typed in place of the dots: True or False.'),
         ({'on': ('A', 'B')}, 'C', "'C' is none of the options."),
         ({'on': range(9), 'several': 3}, [1, 2], 'These are 2, and 3 are asked for.'),
+        ({'on': ROWS}, [1], '[1] is no answer for 2 rows.'),
+        (
+            {'on': ROWS},
+            [3, True],
+            '3 is none of the options. Typed in place of the dots: 0, 1 or 2.',
+        ),
     ],
 )
 def test_a_wrong_form_is_said_at_once(capsys, on, typed, why):
@@ -149,7 +160,7 @@ def test_a_wrong_form_is_said_at_once(capsys, on, typed, why):
 
 
 def test_what_may_be_answered_is_visible_before(capsys):
-    for on in (CORRIDOR, range(42), bool, ('A', 'B')):
+    for on in (CORRIDOR, range(42), bool, ('A', 'B'), ROWS):
         made, printed = asked(capsys, ..., on=on)
         assert made.value is None
         assert made.kind.forms in printed
@@ -188,12 +199,15 @@ def test_the_gap_to_a_drive_is_one_sentence(capsys, typed, record, said):
 @pytest.mark.parametrize(
     ('on', 'typed', 'outcome', 'said'),
     [
-        ({'on': range(42)}, 41, 14, 'It is 14: you said 27 too many.'),
+        ({'on': range(42)}, 41, 14, 'It is 14: you said 41.'),
         ({'on': range(42)}, 14, np.int64(14), 'Right: it is 14.'),
+        ({'on': range(42), 'unit': 'scans'}, 41, 1, 'It is 1 scan: you said 40 too many.'),
         ({'on': Level(0.0, 2.0, 's')}, 0.5, 1.1, 'It is 1.1 s: you said 0.6 s too little.'),
         ({'on': bool}, 'yes', np.bool_(False), 'It is no: you said yes.'),
         ({'on': ('A', 'B', 'C'), 'several': True}, {'A', 'B'}, {'B'}, 'It is B: you said A, B.'),
         ({'on': ('A', 'B', 'C'), 'several': True}, set(), set(), 'Right: none.'),
+        ({'on': ROWS}, [1, 'no'], [2, False], 'lost is 2, and you said 1.'),
+        ({'on': ROWS}, [2, 'no'], {'lost': 2, 'it stops': False}, 'Right: lost: 2, it stops: no.'),
     ],
 )
 def test_the_gap_to_a_number_and_to_options(capsys, on, typed, outcome, said):

@@ -215,7 +215,7 @@ class ClassStore:
         return found | {
             'shown': True,
             'bars': bars(answers, measured),
-            'values': [answer for answer in map(_plain, answers) if _is_number(answer)],
+            'values': [*map(_plain, answers)],
             'measured': [label(value) for value in measured],
             'by': len(outcomes),
         }

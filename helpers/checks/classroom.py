@@ -42,7 +42,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -116,6 +116,7 @@ def guess(
     several: bool | int = False,
     unit: str = '',
     line_m: float | None = None,
+    marks: Mapping[str, float] | None = None,
 ) -> object:
     """Return the answer that a student gives to a question; `...` if there is none yet.
 
@@ -127,14 +128,15 @@ def guess(
     changes with what one sets there, or what one types in place of the dots:
 
     - a floor: your robot stands where you put it, in front of a wall; `line_m` (m) draws a line;
-    - a range, or a pair such as (0, 2) with a `unit`: a line on an axis;
+    - a range, or a pair such as (0, 2) with a `unit`: a line on an axis, which also shows `marks`;
     - `bool`, a tuple, or a dict of words and values: options, of which one is chosen, `several`
-      (True), or just so many (a number).
+      (True), or just so many (a number);
+    - a dict of such options: a row for each, and one is chosen in each row.
 
     What is no answer gets a sentence at once. Raises TypeError for another `on`.
     """
     if on is not None:
-        return _guess_on(_kind(on, several, unit, line_m), question, *(answers or [...]))
+        return _guess_on(_kind(on, several, unit, line_m, marks), question, *(answers or [...]))
     if len(answers) != 1:
         print(*wrap(ONE_ANSWER), sep='\n')
         return ...
@@ -148,13 +150,19 @@ def guess(
     return value
 
 
-def _kind(on: object, several: bool | int, unit: str, line_m: float | None) -> Kind:
+def _kind(
+    on: object,
+    several: bool | int,
+    unit: str,
+    line_m: float | None,
+    marks: Mapping[str, float] | None,
+) -> Kind:
     # Slow to load, and most guesses have no floor.
     from helpers.guesses import kind_of
     from helpers.robot import Floor
 
     if not isinstance(on, Floor):
-        return kind_of(on, several, unit)
+        return kind_of(on, several, unit, marks)
     from helpers.robot_view import Place
 
     return Place(on, line_m)

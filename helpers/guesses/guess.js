@@ -2,14 +2,14 @@
 // drawn into it, if the record has it.
 
 function show(root, record) {
-  const kind = { place: () => placeKind, level: () => levelKind, options: () => optionsKind }[record.kind]();
+  const kind = { place: () => placeKind, level: () => levelKind, options: () => optionsKind, rows: () => rowsKind }[record.kind]();
   const kept = memory(root, record);
   const says = element('p', { 'aria-live': 'polite', class: 'guess-says' });
   const shown = kind.draw(record, root.querySelector('img'), kept.set);
 
   function tell(value) {
     root.classList.toggle('guess-new', value === null);
-    if (value === null) says.textContent = '';
+    if (value === null) says.textContent = record.outcome ? '' : record.asks;
     else if (record.outcome) says.textContent = kind.gap(record, value, record.outcome).says;
     else says.replaceChildren('You say: ', element('b', {}, kind.said(record, value)));
   }
@@ -25,7 +25,7 @@ function show(root, record) {
   });
   root.querySelector('figure')?.remove();
   root.querySelector('.replay-static').replaceWith(
-    ...(record.outcome ? [] : [element('p', { class: 'guess-asks' }, record.asks)]), shown.node, says,
+    says, shown.node,
     ...(document.querySelector('.jp-LabShell, .jp-NotebookShell') && !record.outcome ? [element('p', { class: 'guess-typed' }, record.forms)] : []));
   const value = kept.get();
   shown.put(value);

@@ -1,11 +1,11 @@
-"""The kinds of a guess that need no floor: a level on an axis, and options."""
+"""The kinds of a guess that need no floor: a level on an axis, options, and rows of them."""
 
 from __future__ import annotations
 
 import numbers
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from helpers.guesses.guess import Kind
@@ -19,12 +19,15 @@ MOST_STEPS = 100  # of the keys, from one end of an axis to the other
 class Level:
     """A number on an axis from `low` to `high`, whole if both are whole, in `unit`.
 
+    `marks` are other numbers on the axis, by what they are called there.
+
     Raises ValueError unless `low` is below `high`.
     """
 
     low: float
     high: float
     unit: str = ''
+    marks: Mapping[str, float] = field(default_factory=dict)
 
     scripts = (HERE / 'level.js',)
 
@@ -44,7 +47,7 @@ class Level:
     def forms(self) -> str:
         of = f' of {self.unit}' if self.unit else ''
         kind = 'a whole number' if self.is_whole else 'a number'
-        return f'Typed in place of the dots: {kind}{of} from {self.low} to {self.high}.'
+        return f'Typed in place of the dots: {kind}{of} from {self.low:g} to {self.high:g}.'
 
     def record(self) -> dict:
         step = 1 if self.is_whole else (self.high - self.low) / MOST_STEPS
@@ -54,13 +57,14 @@ class Level:
             'high': self.high,
             'unit': self.unit,
             'step': step,
+            'marks': dict(self.marks),
         }
 
     def picture(self) -> str:
         return ''
 
     def words(self) -> str:
-        return f'An axis from {self.low} to {self.high} {self.unit}'.rstrip() + '.'
+        return f'An axis from {self.low:g} to {self.high:g} {self.unit}'.rstrip() + '.'
 
     def read(self, typed: object) -> float:
         """Return a number, also of a text such as '0,9 s'."""
@@ -165,27 +169,94 @@ class Options:
         return ', '.join(names[i] for i in (at if isinstance(at, list) else [at])) or 'none'
 
 
-def kind_of(on: object, several: bool | int = False, unit: str = '') -> Kind:
-    """Return the kind of a guess that `on` names: `bool`, an axis, or options.
+@dataclass(frozen=True)
+class Rows:
+    """A row for each thing that is asked about, by its name, and one option chosen in each."""
 
-    With a unit, a pair of numbers is an axis.
+    rows: Mapping[str, Options]
+
+    scripts = (HERE / 'rows.js', HERE / 'options.js')
+    asks = 'Choose one in each row.'
+
+    @property
+    def forms(self) -> str:
+        first = [repr(next(iter(one.values.values()))) for one in self.rows.values()]
+        return (
+            f'Typed in place of the dots: a list, one for each row, such as [{", ".join(first)}].'
+        )
+
+    def record(self) -> dict:
+        rows = [{'name': name, 'names': [*one.values]} for name, one in self.rows.items()]
+        return {'kind': 'rows', 'rows': rows}
+
+    def picture(self) -> str:
+        return ''
+
+    def words(self) -> str:
+        return ' '.join(f'{name}: {one.words()}' for name, one in self.rows.items())
+
+    def read(self, typed: object) -> list[int]:
+        """Return the place of an option for each row, of a list or of a dict with their names."""
+        if isinstance(typed, str):
+            words = typed.replace(',', ' ').split()
+            typed = words if len(words) == len(self.rows) else [*''.join(words)]
+        if isinstance(typed, Mapping) and set(typed) == set(self.rows):
+            typed = [typed[name] for name in self.rows]
+        if not isinstance(typed, Sequence) or len(typed) != len(self.rows):
+            raise ValueError(f'{typed!r} is no answer for {len(self.rows)} rows. {self.forms}')
+        return [one.read(each) for one, each in zip(self.rows.values(), typed, strict=True)]
+
+    def told(self, value: list[int]) -> list[str]:
+        rows = zip(self.rows.items(), value, strict=True)
+        return [f'{name}: {one.told(place)}' for (name, one), place in rows]
+
+    def outcome(self, measured: object, run: object, tolerance: float) -> dict:
+        """Return the places of what was measured. Raises ValueError for what is no option."""
+        return {'at': self.read(measured)}
+
+    def answer(self, outcome: Mapping) -> str:
+        rows = zip(self.rows.values(), outcome['at'], strict=True)
+        return ', '.join(one.told(place) for one, place in rows)
+
+
+def kind_of(
+    on: object,
+    several: bool | int = False,
+    unit: str = '',
+    marks: Mapping[str, float] | None = None,
+) -> Kind:
+    """Return the kind of a guess that `on` names: `bool`, an axis, options, or rows of them.
+
+    With a unit, a pair of numbers is an axis. A dict of options is several rows.
 
     Raises TypeError for anything else.
     """
-    if isinstance(on, Level | Options):
+    if isinstance(on, Level | Options | Rows):
         return on
+    if unit and isinstance(on, tuple) and len(on) == 2:
+        return Level(*map(float, on), unit, marks or {})
+    if isinstance(on, range) and not several:
+        return Level(on[0], on[-1], unit, marks or {})
+    if isinstance(on, Mapping) and on and all(map(_is_options, on.values())):
+        return Rows({name: _options(one) for name, one in on.items()})
+    if isinstance(on, Mapping) or _is_options(on):
+        return _options(on, several)
+    raise TypeError(f'A guess is made on a floor, an axis or options, not on {on!r}.')
+
+
+def _is_options(on: object) -> bool:
+    return on is bool or (
+        isinstance(on, Collection) and not isinstance(on, str | Mapping) and len(on) > 1
+    )
+
+
+def _options(on: object, several: bool | int = False) -> Options:
     if on is bool:
         return Options({'yes': True, 'no': False})
-    if unit and isinstance(on, tuple) and len(on) == 2:
-        return Level(*map(float, on), unit)
-    if isinstance(on, range) and not several:
-        return Level(on[0], on[-1], unit)
     if isinstance(on, Mapping):
         return Options(dict(on), several)
-    if isinstance(on, Collection) and not isinstance(on, str) and len(on) > 1:
-        values = sorted(on, key=str) if isinstance(on, AbstractSet) else on
-        return Options({str(value): value for value in values}, several)
-    raise TypeError(f'A guess is made on a floor, an axis or options, not on {on!r}.')
+    values = sorted(on, key=str) if isinstance(on, AbstractSet) else on
+    return Options({str(value): value for value in values}, several)
 
 
 def number_of(typed: object, unit: str = '') -> float | None:

@@ -1,8 +1,9 @@
 // A level: a number on an axis. `said` and `gap` need no page.
 const levelKind = (() => {
-  const [WIDE, TALL, LEFT, RIGHT, LINE] = [800, 130, 40, 40, 84];
+  const [WIDE, TALL, LEFT, RIGHT, LINE] = [800, 144, 60, 40, 84];
   const rounded = ({ step }, value) => +(Math.round(value / step) * step).toFixed(3);
-  const named = ({ unit }, value) => [`${+value.toFixed(3)}`, unit].filter(Boolean).join(' ');
+  const one = ({ unit }, value) => (value === 1 ? unit.replace(/s$/, '') : unit);
+  const named = ({ unit = '', step }, value) => [`${+value.toFixed(3)}`, Number.isInteger(step) ? one({ unit }, value) : unit].filter(Boolean).join(' ');
 
   const said = (record, value) => `${named(record, value)}.`;
 
@@ -10,10 +11,13 @@ const levelKind = (() => {
     const right = Math.abs(value - at) <= tolerance;
     const exact = +at.toPrecision(3);
     if (right) return { right, says: `Right: it is ${named(record, exact)}.` };
-    const whole = Number.isInteger(record.step);
-    const [much, little] = whole ? ['many', 'few'] : ['much', 'little'];
-    const far = named(whole ? {} : record, +Math.abs(value - at).toPrecision(2));
-    return { right, says: `It is ${named(record, exact)}: you said ${far} too ${value > at ? much : little}.` };
+    if (!record.unit) return { right, says: `It is ${exact}: you said ${value}.` };
+    const [much, little] = Number.isInteger(record.step) ? ['many', 'few'] : ['much', 'little'];
+    return { right, says: `It is ${named(record, exact)}: you said ${apart(record, value, at)} too ${value > at ? much : little}.` };
+  }
+
+  function apart(record, value, at) {
+    return named(Number.isInteger(record.step) ? {} : record, +Math.abs(value - at).toPrecision(2));
   }
 
   const svgElement = (name, attributes = {}, text = '') => {
@@ -24,9 +28,9 @@ const levelKind = (() => {
   };
 
   function draw(record, image, set) {
-    const { low, high, step, unit, outcome } = record;
+    const { low, high, step, unit, marks = {}, outcome } = record;
     const x = value => LEFT + (WIDE - LEFT - RIGHT) * (value - low) / (high - low);
-    const svg = svgElement('svg', { viewBox: `0 0 ${WIDE} ${TALL}`, 'font-size': 18, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' });
+    const svg = svgElement('svg', { viewBox: `0 0 ${WIDE} ${unit ? TALL : TALL - 24}`, 'font-size': 18, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' });
     const rough = (high - low) / 8;
     const power = 10 ** Math.floor(Math.log10(rough));
     const tick = Math.max([1, 2, 5, 10].find(n => n * power >= rough) * power, Number.isInteger(step) ? 1 : 0);
@@ -35,30 +39,48 @@ const levelKind = (() => {
       svg.append(svgElement('path', { d: `M${x(n * tick)} ${LINE}v8`, stroke: 'currentColor', 'stroke-width': 2 }),
         svgElement('text', { x: x(n * tick), y: LINE + 28, 'text-anchor': 'middle' }, `${+(n * tick).toPrecision(6)}`));
     }
-    svg.append(svgElement('text', { x: WIDE - RIGHT, y: TALL - 2, 'text-anchor': 'end' }, unit));
+    svg.append(svgElement('text', { x: WIDE - RIGHT, y: TALL - 8, 'text-anchor': 'end' }, unit));
+    for (const [name, value] of Object.entries(marks)) {
+      svg.append(svgElement('path', { d: `M${x(value)} ${LINE}V62`, stroke: 'currentColor', 'stroke-width': 2, 'stroke-dasharray': '3 4' }),
+        svgElement('text', { x: x(value), y: 54, 'text-anchor': 'middle' }, name));
+    }
+    const gapLine = svgElement('path', { stroke: 'var(--look-lost)', 'stroke-width': 4, fill: 'none', d: '' });
+    const gapLabel = svgElement('text', { y: LINE - 20, 'text-anchor': 'middle', class: 'gap-label' });
     const you = svgElement('g', { class: 'you', tabindex: outcome ? -1 : 0, role: 'slider', 'aria-label': 'Your line', 'aria-valuemin': low, 'aria-valuemax': high });
     you.append(svgElement('path', { class: 'you-round', d: `M0 ${LINE}V34`, stroke: 'var(--look-you)', 'stroke-width': 4 }),
       svgElement('circle', { cy: 34, r: 9, fill: 'var(--look-you)' }),
       svgElement('text', { class: 'you-label', y: 18 }, 'you'));
     const ghosts = svgElement('g', { class: 'class' });
-    svg.append(ghosts, you);
-    classOf(record, values => ghosts.replaceChildren(...values.map(value => svgElement('path', {
+    svg.append(ghosts, gapLine, gapLabel, you);
+    classOf(record, values => ghosts.replaceChildren(...values.filter(Number.isFinite).map(value => svgElement('path', {
       d: `M${x(Math.min(Math.max(value, low), high))} ${LINE}v-40`, stroke: 'var(--look-you)', 'stroke-width': 6, 'stroke-opacity': 0.3,
     }))));
     if (outcome) {
       const at = x(Math.min(Math.max(outcome.at, low), high));
       svg.append(svgElement('path', { d: `M${at} ${LINE}V34`, stroke: 'var(--look-robot)', 'stroke-width': 4 }),
         svgElement('circle', { cx: at, cy: 34, r: 9, fill: 'var(--look-robot)' }));
+      svg.append(svgElement('text', { class: 'came-out', x: at, y: 18, 'text-anchor': 'middle' }, named(record, +outcome.at.toPrecision(3))));
     }
     let now = null;
-    const begin = rounded(record, (low + high) / 2);
 
+    // Before a guess it stands beside the axis: a place on it would be a hint.
     function put(value) {
       now = value;
-      const at = value ?? begin;
-      you.setAttribute('transform', `translate(${x(at)})`);
-      you.setAttribute('aria-valuenow', at);
+      you.setAttribute('transform', `translate(${value === null ? LEFT / 2 - 8 : x(value)})`);
+      you.setAttribute('aria-valuenow', value ?? low);
       you.setAttribute('aria-valuetext', value === null ? 'not yet' : said(record, value));
+      if (outcome && value !== null) measure(x(value), x(Math.min(Math.max(outcome.at, low), high)));
+    }
+
+    // The gap between the two lines, and how far it is. Two lines that are near share one name.
+    function measure(yours, real) {
+      const wide = Math.abs(real - yours);
+      you.querySelector('text').textContent = wide < 90 ? '' : 'you';
+      if (wide < 24) return;
+      const y = LINE - 12;
+      gapLine.setAttribute('d', `M${yours} ${y - 6}v12M${real} ${y - 6}v12M${yours} ${y}H${real}`);
+      gapLabel.setAttribute('x', (yours + real) / 2);
+      gapLabel.textContent = apart(record, now, outcome.at);
     }
 
     const to = value => set(rounded(record, Math.min(Math.max(value, low), high)));
@@ -78,7 +100,7 @@ const levelKind = (() => {
         const ends = { Home: low, End: high }[event.key];
         if (!(event.key in KEYS) && ends === undefined) return;
         event.preventDefault();
-        to(ends ?? (now ?? begin) + KEYS[event.key] * step);
+        to(ends ?? (now === null ? low : now + KEYS[event.key] * step));
       });
     }
     return { node: svg, put };

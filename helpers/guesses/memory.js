@@ -41,7 +41,7 @@ function memory(root, { question, value }) {
   };
 }
 
-// On a slide, `see` gets what the class has guessed, numbers, as soon as they are shown: [] before.
+// On a slide, `see` gets what the class has guessed, as soon as it is shown: [] before.
 function classOf({ question }, see) {
   document.addEventListener('class', ({ detail }) => see(detail.find(one => one.question === question)?.values ?? []));
   document.dispatchEvent(new CustomEvent('class-wanted'));

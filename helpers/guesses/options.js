@@ -10,24 +10,13 @@ const optionsKind = (() => {
     return { right, says: right ? `Right: ${listed(names, at)}.` : `It is ${listed(names, at)}: you said ${listed(names, value)}.` };
   }
 
-  function draw(record, image, set) {
-    const { names, several, outcome } = record;
-    const one = several === null;
-    let now = null;
+  // Return a row of buttons and `press(places)`. `choose` gets the place of one that is clicked, or
+  // reached by an arrow key, if only `one` is chosen. `right` are the places of what came out.
+  function row(names, label, one, right, choose) {
     const buttons = names.map((name, place) => element('button', {
-      type: 'button', role: one ? 'radio' : 'checkbox', disabled: outcome ? '' : undefined, onclick: () => choose(place),
-      class: outcome && [outcome.at].flat().includes(place) ? 'guess-true' : undefined,
+      type: 'button', role: one ? 'radio' : 'checkbox', disabled: right ? '' : undefined, onclick: () => choose(place),
+      class: right?.includes(place) ? 'guess-true' : undefined,
     }, name));
-    const node = element('div', { class: 'guess-options', role: one ? 'radiogroup' : 'group', 'aria-label': record.question, onkeydown }, ...buttons);
-
-    function choose(place) {
-      if (one) return set(place);
-      const before = now ?? [];
-      const after = before.includes(place) ? before.filter(other => other !== place) : [...before, place].sort((a, b) => a - b);
-      // One more than are asked for takes the place of the last one.
-      if (several && after.length > several) after.splice(after.findIndex(other => other !== place), 1);
-      return set(after);
-    }
 
     function onkeydown(event) {
       const way = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 }[event.key];
@@ -39,14 +28,49 @@ const optionsKind = (() => {
       if (one) next.click();
     }
 
-    function put(value) {
-      now = value;
-      const chosen = value === null ? [] : [value].flat();
-      buttons.forEach((button, place) => button.setAttribute('aria-checked', chosen.includes(place)));
+    const node = element('div', { class: 'guess-options', role: one ? 'radiogroup' : 'group', 'aria-label': label, onkeydown }, ...buttons);
+    const press = places => buttons.forEach((button, place) => button.setAttribute('aria-checked', places.includes(place)));
+
+    // How many of a class have chosen each: `values` are their words, none at all before they are shown.
+    function count(values) {
+      buttons.forEach((button, place) => {
+        const students = values.filter(value => value === names[place]).length;
+        if (students) button.dataset.class = `${students}`;
+        else delete button.dataset.class;
+      });
     }
 
-    return { node, put };
+    return { node, press, count };
   }
 
-  return { said, gap, draw };
+  function draw(record, image, set) {
+    const { names, several, outcome } = record;
+    const one = several === null;
+    // Of any number, none is an answer, too.
+    const none = several === 0 ? names.length : -1;
+    const pressed = value => (value === null ? [] : value.length === 0 ? [none] : [value].flat());
+    const shown = row(none < 0 ? names : [...names, 'none of them'], record.question, one, outcome && pressed(outcome.at), choose);
+    let now = null;
+    // A list that is empty says none of them. An option that is the text of a number comes as one.
+    classOf(record, values => shown.count(values.flatMap(value => ([].concat(value).length ? value : ['none of them'])).map(String)));
+
+    function choose(place) {
+      if (one) return set(place);
+      if (place === none) return set([]);
+      const before = now ?? [];
+      const after = before.includes(place) ? before.filter(other => other !== place) : [...before, place].sort((a, b) => a - b);
+      // One more than are asked for takes the place of the last one.
+      if (several && after.length > several) after.splice(after.findIndex(other => other !== place), 1);
+      return set(after);
+    }
+
+    function put(value) {
+      now = value;
+      shown.press(pressed(value));
+    }
+
+    return { node: shown.node, put };
+  }
+
+  return { said, gap, draw, row };
 })();

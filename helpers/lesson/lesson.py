@@ -112,18 +112,22 @@ def code_of_solution(source: str) -> str:
 
 @dataclass(frozen=True)
 class Guess:
-    """A guess: the name of its variable, its question, its value, and the cell that asks."""
+    """A guess: its variable, its question, its value, the cell, and whether it shows the answers.
+
+    It shows them by `on=`, which says what may be answered.
+    """
 
     variable: str
     question: str
     value: object
     cell: Node
+    shows_answers: bool
 
 
 def guess_of(cell: Node) -> Guess | None:
     """Return the guess of a cell with the tag predict, None for other cells.
 
-    It ends in `my_guess = guess('How many are heard?', 41)`.
+    It ends in `my_guess = guess('How many are received?', 41, on=range(42))`.
     """
     if 'predict' not in tags(cell):
         return None
@@ -133,10 +137,11 @@ def guess_of(cell: Node) -> Guess | None:
                 *_,
                 ast.Assign(
                     [ast.Name(variable)],
-                    ast.Call(ast.Name('guess'), [ast.Constant(str(question)), value]),
+                    ast.Call(ast.Name('guess'), [ast.Constant(str(question)), value], words),
                 ),
             ]:
-                return Guess(variable, question, ast.literal_eval(value), cell)
+                shows = any(word.arg == 'on' for word in words)
+                return Guess(variable, question, ast.literal_eval(value), cell, shows)
     except (SyntaxError, ValueError):  # of a lesson that is being written
         pass
     return None

@@ -62,7 +62,7 @@ const placeKind = (() => {
     // The robots of a class, one beside the other. Those who were right light up at the end.
     const ghosts = make('g', { class: 'class' });
     group.insertBefore(ghosts, you);
-    classOf(record, values => ghosts.replaceChildren(...values.map((value, i) => {
+    classOf(record, values => ghosts.replaceChildren(...values.filter(Number.isFinite).map((value, i) => {
       const [cx, cy] = along(Math.max(value, radius), ((i * 37) % 9 - 4) * 0.1);
       const ghost = make('circle', { cx, cy, r: r / 2, fill: 'var(--look-you)', 'fill-opacity': 0.35 });
       ghost.dataset.at = value;

@@ -4,7 +4,7 @@ import nbformat
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from support.lab_page import WIDER
 
-from helpers.guesses import Gap, Guess, Level, Options
+from helpers.guesses import Gap, Guess, Level, Options, kind_of
 from helpers.robot import CORRIDOR
 from helpers.robot_view import Place
 from tools.lessons.clean import NOTEBOOK_METADATA
@@ -13,6 +13,8 @@ PLACE = Guess('Where does it end?', Place(CORRIDOR, 0.6))
 LEVEL = Guess('How many are received?', Level(0, 41, 'messages'))
 OPTIONS = Guess('Which three wait?', Options({str(n): n for n in range(5)}, 3))
 ONE = Guess('Does it stop?', Options({'yes': True, 'no': False}))
+ANY = Guess('Which are lost?', Options({name: name for name in 'ABC'}, True))
+ROWS = Guess('How many are lost?', kind_of({'depth 1': range(4), 'depth 2': range(4)}))
 
 
 def group(page, guess):
@@ -25,7 +27,7 @@ def says(page, guess):
 
 def test_all_kinds_by_keys_alone_on_a_phone(phone, artefacts):
     page = phone(PLACE, LEVEL, OPTIONS, ONE)
-    assert says(page, PLACE) == ''
+    assert says(page, PLACE) == PLACE.kind.asks
     robot = group(page, PLACE).get_by_role('slider')
     assert robot.get_attribute('aria-valuetext') == 'not yet'
     page.keyboard.press('Tab')
@@ -55,6 +57,33 @@ def test_all_kinds_by_keys_alone_on_a_phone(phone, artefacts):
     page.reload()
     assert says(page, PLACE) == 'You say: it stops 0.61 m before the wall.'
     assert says(page, ONE) == 'You say: no.'
+
+
+def test_a_row_for_each_thing_and_none_of_the_options(phone, artefacts):
+    page = phone(ROWS, ANY)
+    first, second = (group(page, ROWS).get_by_role('radiogroup', name=f'depth {n}') for n in (1, 2))
+    first.get_by_role('radio', name='3').click()
+    assert says(page, ROWS) == ROWS.kind.asks  # there is another row
+    second.get_by_role('radio', name='0').press('ArrowRight')
+    assert says(page, ROWS) == 'You say: depth 1: 3, depth 2: 1.'
+    group(page, ANY).get_by_role('checkbox', name='none of them').click()
+    assert says(page, ANY) == 'You say: none.'
+    group(page, ANY).get_by_role('checkbox', name='B', exact=True).click()
+    assert says(page, ANY) == 'You say: B.'
+    # On a slide each option says how many of the class have chosen it.
+    told = [
+        {'question': ROWS.question, 'values': [['depth 1: 3', 'depth 2: 0']] * 2},
+        {'question': ANY.question, 'values': [['A', 'B'], ['B'], []]},
+    ]
+    page.evaluate(
+        "told => document.dispatchEvent(new CustomEvent('class', { detail: told }))", told
+    )
+    shown = page.locator('[data-class]').evaluate_all(
+        'nodes => nodes.map(one => `${one.textContent} ${one.dataset.class}`)'
+    )
+    assert shown == ['3 2', '0 2', 'A 1', 'B 2', 'none of them 1']
+    assert not page.evaluate(WIDER)
+    page.screenshot(path=artefacts / 'guess_rows.png', full_page=True)
 
 
 def test_a_finger_puts_the_robot_there(file_page, tmp_path):

@@ -65,7 +65,7 @@ KEPT = [
     ),
 ]
 
-GUESS = code("my_first = guess('How many?', ...)", 'predict')
+GUESS = code("my_first = guess('How many?', ..., on=range(50))", 'predict')
 ANSWER = new_output('stream', name='stdout', text='How many?\n  The answer is 14.\n')
 COMPARED = code("compare_prediction('How many?', my_first, len(heard))", outputs=[ANSWER])
 MOVES = code("compare_prediction('How many?', my_first, len(heard), 3)")
@@ -78,7 +78,14 @@ GIVEN_AWAY = [
     [
         GUESS,
         code(
-            "why = 'The queue keeps 10, and 4 are in flight: 14.'\n"
+            "compare_prediction('How many?', my_first, len(heard), because='Most are lost.')",
+            outputs=[ANSWER],
+        ),
+    ],
+    [
+        GUESS,
+        code(
+            "why = f'The queue keeps {depth}, and 4 are in flight: 14.'\n"
             "compare_prediction('How many?', my_first, len(heard), because=why)",
             outputs=[ANSWER],
         ),
@@ -110,6 +117,13 @@ def test_an_answer_before_its_question_is_found(cells):
 @pytest.mark.parametrize('cells', KEPT_SECRET)
 def test_code_that_gives_no_answer_away_is_left_alone(cells):
     assert complaints(rules.answers_come_after_guesses, *cells) == []
+
+
+def test_a_guess_shows_what_may_be_answered():
+    typed = code("my_first = guess('How many?', ...)", 'predict')
+    [sentence] = complaints(rules.guesses_are_compared, typed, COMPARED)
+    assert 'does not show what may be answered' in sentence
+    assert complaints(rules.guesses_are_compared, GUESS, COMPARED) == []
 
 
 def test_a_heading_with_the_answer_is_found():

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 from IPython.core.inputtransformer2 import TransformerManager
 
+TOO_SHORT = '', 'True', 'False', 'yes', 'no'  # such a word is in many a sentence, and tells nothing
+
 
 def given_away(source: str, question: str, answer: str) -> Iterator[str]:
     """Yield what in the code of a cell gives away the answer of a guess.
@@ -37,9 +39,11 @@ def given_away(source: str, question: str, answer: str) -> Iterator[str]:
                     yield f'the outcome is written, {ast.unparse(outcome)}'
                 for word in node.keywords:
                     reason = texts.get(getattr(word.value, 'id', ''), word.value)
-                    if word.arg == 'because' and _names(reason, answer):
+                    if word.arg == 'because' and _is_written(reason):
+                        yield 'because= is a text that one reads before, write it below'
+                    elif word.arg == 'because' and _names(reason, answer):
                         yield f'because= names {answer}'
-            case ast.Compare(_, [ast.Eq()], [value]) if answer not in ('', 'True', 'False'):
+            case ast.Compare(_, [ast.Eq()], [value]) if answer not in TOO_SHORT:
                 if _is_number(value) and str(value.value) == answer:
                     yield ast.unparse(node)
             case ast.Compare(left, [ast.Lt() | ast.LtE()], [_]) if not answer:
@@ -67,7 +71,7 @@ def _is_written(node: ast.AST) -> bool:
 
 def _names(reason: ast.AST, answer: str) -> bool:
     """Return whether a reason that stands in the code has the answer as a word of its own."""
-    if answer in ('', 'True', 'False'):
+    if answer in TOO_SHORT:
         return False
     parts = [node.value for node in ast.walk(reason) if isinstance(node, ast.Constant)]
     text = ' '.join(part for part in parts if isinstance(part, str))
