@@ -22,6 +22,7 @@ HERE = Path(__file__).parent
 PROGRAMS, INSIDE = HERE / 'programs.yaml', HERE / 'inside'
 NOT_RUN = {'exercise', 'check', 'predict'}
 OF_LESSONS = ('helpers.checks', 'helpers.plots')  # what a program does not need
+PUBLISHES = re.compile(r'create_publisher\b[^)]*cmd_vel')
 MAGIC = re.compile(r'%%(write|terminal)(?: (.*))?\n')
 
 
@@ -30,6 +31,17 @@ def declared() -> dict[str, dict[str, Any]]:
     """Return what programs.yaml says of each program."""
     found = yaml.safe_load(PROGRAMS.read_text(encoding='utf-8'))
     return {name: found['all'] | one for name, one in found['programs'].items()}
+
+
+def nodes_of(declared: dict[str, Any]) -> list[str]:
+    """Return the calls that make the nodes of a program: `Driver(0.5, 0.0)`."""
+    return [one['node'] for one in declared['processes'].values() if 'node' in one]
+
+
+@cache
+def left_out() -> dict[str, dict[str, str]]:
+    """Return which programs are not tried, by lesson and name, and why."""
+    return yaml.safe_load(PROGRAMS.read_text(encoding='utf-8'))['left_out']
 
 
 @cache
@@ -46,6 +58,20 @@ def shown(lesson: Lesson) -> Iterator[tuple[str, str]]:
     for cell in lesson.code_cells():
         if not NOT_RUN.intersection(tags(cell)):
             yield cell.id, code_of_solution(cell.source)
+
+
+def publishers(lesson: Lesson) -> Iterator[tuple[str, str]]:
+    """Yield id and name of what publishes on cmd_vel: a class of a cell, or a file that one writes.
+
+    A class that only inherits its publisher is not found.
+    """
+    for cell, code in shown(lesson):
+        magic = MAGIC.match(code)
+        if magic and magic[1] == 'write' and PUBLISHES.search(code):
+            yield cell, magic[2].split()[0]
+        for statement in [] if magic else statements(code):
+            if isinstance(statement, ast.ClassDef) and PUBLISHES.search(ast.unparse(statement)):
+                yield cell, statement.name
 
 
 # --- Nodes of cells
@@ -182,8 +208,7 @@ class Prepared:
             self.workspace.write(path, text)
 
     def _write_nodes(self) -> None:
-        calls = [one['node'] for one in self.declared['processes'].values() if 'node' in one]
-        wanted = {call.split('(')[0] for call in calls}
+        wanted = {call.split('(')[0] for call in nodes_of(self.declared)}
         if self.declared['floor'].isupper():
             wanted.add(self.declared['floor'])
         if wanted:

@@ -7,6 +7,7 @@ import json
 import os
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -155,6 +156,8 @@ def of_program(program: Prepared, options: argparse.Namespace) -> Iterator[Job]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the ordeal, and return 1 if what stands is not what known.yaml says."""
     options = parser().parse_args(arguments)
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # in the background of a shell
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     results: list[Job] = []
     for name in chosen_programs(options):
         program = Prepared(name)

@@ -39,7 +39,6 @@ from ordeal.robot import Second, TroubledRobot, base_of
 from ordeal.troubles import Trouble
 
 START_S, END_S, POLL_S = 40.0, 8.0, 0.02
-LONG_S = 9.0  # a trouble in which the robot may go on lasts until it is at the wall
 AFTER_S = 12.0  # so long a program has to do what it promises
 NEAR_M = 1.6  # before the wall: so near, a robot has stopped for it
 PLACE_M = 0.5  # so near its goal a job has arrived
@@ -124,7 +123,7 @@ class Trial:
 
     def _lasts_s(self) -> float:
         may_go_on = not self.trouble.must_stand and self.declared['promises'] != 'drives'
-        return LONG_S if may_go_on else self.values['lasts_s']
+        return self.declared['long_s'] if may_go_on else self.values['lasts_s']
 
     def _judged(self, begun_s: float, ended_s: float, promised: bool | None) -> dict[str, Any]:
         record = self.robot.record
@@ -136,7 +135,7 @@ class Trial:
                 begun_s=begun_s,
                 ended_s=ended_s,
                 must_stand=self.trouble.must_stand,
-                within_s=self.declared['within_s'],
+                within_s=self.values.get('within_s', self.declared['within_s']),
                 from_start=self.trouble.what == 'silent from the start',
                 promised=promised,
             )
