@@ -81,6 +81,10 @@ mutants: set_up ## judge wrong answers that rules make: LESSON=05, TASK=2, SEED=
 	@$(PYTHON) tests/mutants --lesson "$(LESSON)" --task "$(TASK)" $(if $(SEED),--seed "$(SEED)") \
 		$(if $(COUNT),--count "$(COUNT)") $(if $(JOBS),--jobs "$(JOBS)") $(if $(filter yes,$(LIST)),--list)
 
+ordeal: set_up ## let each program that moves a robot meet troubles: LESSON=05, TASK=careful_brake, SEED=7, BASE=untimed, TROUBLE="scan: silent", COUNT=5, JOBS=2, WRITE=yes
+	@$(PYTHON) tests/ordeal --lesson "$(LESSON)" --task "$(TASK)" --base "$(BASE)" --trouble "$(TROUBLE)" \
+		$(if $(SEED),--seed "$(SEED)") $(if $(COUNT),--count "$(COUNT)") $(if $(JOBS),--jobs "$(JOBS)") $(if $(filter yes,$(WRITE)),--write)
+
 test-browser: ## test JupyterLab and the site in Chromium
 	@tools/set_up.sh browser && tools/set_up.sh site && $(PYTHON) -m tools.site
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/browser $(PYTEST_ARGS)
@@ -118,11 +122,11 @@ set_up:
 	@tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
-test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub notebooks lesson task soak left-out bench lint: groups := test
+test test-ros2 test-tools test-packages test-answers mutants ordeal test-browser test-classroom test-hub notebooks lesson task soak left-out bench lint: groups := test
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present class test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub image lab-container hub handout grade update notebooks \
+.PHONY: help lab present class test test-ros2 test-tools test-packages test-answers mutants ordeal test-browser test-classroom test-hub image lab-container hub handout grade update notebooks \
 	lesson task site soak left-out bench release lint lock licences clean set_up
 
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None
