@@ -16,7 +16,6 @@ from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
-import nbformat
 import pytest
 import rclpy
 from catkin_pkg.package import Package, parse_package
@@ -25,8 +24,10 @@ from geometry_msgs.msg import Twist, TwistStamped
 from packages.declared import undeclared
 from rclpy.executors import SingleThreadedExecutor
 from support.environments import OUTSIDE, SHARE, Environment, MissingError, needed_to_use
+from support.judged import stand_in
 from support.kernel import NOTEBOOKS, Kernel
 
+from helpers.lesson import code_of_solution, path_of, read
 from helpers.workspace import fix_wheels, lines_that_matter, without_folders
 
 LESSONS = [
@@ -73,21 +74,20 @@ def test_packages_need_what_they_name(lesson, tmp_path):
 
 def sources(lesson: str) -> dict[str, Path]:
     """Run the cells of a lesson with its solutions. Return the folder of each package it made."""
-    [path] = NOTEBOOKS.glob(f'[0-9][0-9]_{lesson}.ipynb')
-    check = ''
+    path = path_of(lesson, NOTEBOOKS)
+    cells = read(path.read_text(encoding='utf-8'), path.name)
+    ends = {task.solutions[-1].id: task for task in cells.tasks if task.solutions}
+    checks = {check.id for task in cells.tasks for check in task.checks}
     with Kernel() as kernel:
-        for cell in nbformat.read(path, 4).cells:
-            tags = cell.metadata.get('tags', [])
-            if cell.cell_type != 'code':
-                continue
-            if 'check' in tags:  # it would judge the starter
-                check = cell.source if lesson in WITH_CHECKS else ''
+        for cell in cells.code_cells():
+            if cell.id in checks:  # it would judge the starter
                 continue
             # Without its first line a solution is what a learner wrote.
-            run(kernel, cell.source.split('\n', 1)[1] if 'solution' in tags else cell.source)
-            if 'solution' in tags and check:
-                run(kernel, check)
-                check = ''
+            run(kernel, code_of_solution(cell.source))
+            if cell.id in ends:
+                for check in ends[cell.id].checks if lesson in WITH_CHECKS else []:
+                    run(kernel, check.source)
+                stand_in(kernel, ends[cell.id].name)
         folder = Path(run(kernel, 'print(workspace.path)').split()[-1])
     found = {}
     for top in (folder / 'src', folder / 'overlay' / 'src'):  # an overlay's package hides the other

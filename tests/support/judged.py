@@ -26,6 +26,14 @@ check.__self__.attempts[{task!r}].stands_in = 'solution'
 Cells = dict[str, list[str]]  # of a task, by their tag
 
 
+def stand_in(kernel: Kernel, task: str) -> None:
+    """Let the solution of a task stand in for it, though its cell was run without its first line.
+
+    Else what needs the task would not be run, or not be judged.
+    """
+    kernel.run(STANDS_IN.format(task=task))
+
+
 def builds(check: str) -> bool:
     """Return whether a check builds, clones or starts programs."""
     _, arguments = check_call(check)
@@ -83,8 +91,7 @@ class Lesson:
                 run_all(self.kernel, self.cells['exercise'], self.cells['solution'])
                 # What a check builds is used by the cells below it.
                 run_all(self.kernel, filter(builds, self.cells['check']))
-                # No check has seen most solutions, and what needs their tasks would not be judged.
-                self.kernel.run(STANDS_IN.format(task=self._names[self.reached]))
+                stand_in(self.kernel, self._names[self.reached])
             self._reach_next()
 
     @contextmanager

@@ -91,7 +91,7 @@ function begin(app, tracker, actions, { makeRequest }, dialogs) {
     if (deck && event.target.closest?.('.jp-MarkdownCell')) event.stopImmediatePropagation();
   }, true);
   window.addEventListener('message', onGuesses);
-  document.addEventListener('class-wanted', tellClass);
+  document.addEventListener('class-wanted', tellPictures);
   window.addEventListener('message', onNotesWindow);
   window.addEventListener('resize', () => deck && fit());
   // A dialog has no place on a projector, and would take the keys: a line says what it says, and its
@@ -431,7 +431,7 @@ async function showGuesses({ model, node }, place) {
 }
 
 // Pictures on the slide draw the numbers that the class has guessed: those of now, and later ones.
-function tellClass() {
+function tellPictures() {
   document.dispatchEvent(new CustomEvent('class', { detail: classGuesses }));
 }
 
@@ -440,7 +440,7 @@ function onGuesses({ source, data }) {
   if (!deck || source !== frame?.contentWindow) return;
   frame.style.height = `${Number(data.height)}px`;
   classGuesses = data.guesses;
-  tellClass();
+  tellPictures();
   frame.scrollIntoView({ block: 'nearest' }); // many bars are more than the slide has room for
   // A click on "Show" took the focus: the keys of the deck want it back.
   if (document.activeElement === frame) focusCell();
