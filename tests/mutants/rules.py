@@ -50,6 +50,9 @@ CLOCKS = {
     'ClockType.ROS_TIME': ['ClockType.SYSTEM_TIME', 'ClockType.STEADY_TIME'],
     'Clock(clock_type=ClockType.STEADY_TIME)': ['self.get_clock()', 'Clock()'],
 }
+KEPT_BY_THE_NODE = {
+    'create_publisher', 'create_subscription', 'create_timer', 'create_service', 'create_client',
+}  # fmt: skip
 CONVERSIONS = {
     'radians', 'degrees', 'float', 'int', 'str', 'sorted', 'reversed', 'remainder', 'strip',
 }  # fmt: skip
@@ -122,6 +125,9 @@ def _order_says_nothing(program: Program, first: cst.CSTNode, second: cst.CSTNod
         kept = only(other, cst.Assign)
         if program.code(one).strip().startswith('super().__init__(') and kept:
             return isinstance(kept.value, cst.Name | cst.Integer | cst.Float | cst.SimpleString)
+    made = [name_of(call.func) for call in map(call_in, (first, second)) if call]
+    if len(made) == 2 and KEPT_BY_THE_NODE.issuperset(made):
+        return True
     if _is_taken_above_a_question(program, first, second, assigned[1]):
         return True
     for names, one, other in zip(assigned, (first, second), (second, first), strict=True):
@@ -463,6 +469,9 @@ def a_local_name(program: Program) -> Made:
     for _, _, one in program.statements():
         target = target_of(one)
         if not is_attribute_of_self(target) or program.method_of(one) != '__init__':
+            continue
+        value = only(one, cst.Assign).value
+        if isinstance(value, cst.Call) and name_of(value.func) in KEPT_BY_THE_NODE:
             continue
         uses = len(re.findall(rf'\bself\.{target.attr.value}\b', program.module.code))
         if uses == 1:
