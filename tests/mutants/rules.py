@@ -36,7 +36,10 @@ ENDS_WORK = {
     'set', 'set_result', 'notify', 'notify_all', 'succeed', 'canceled', 'abort', 'put', 'release',
     'cancel', 'publish', 'publish_feedback', 'append', 'reset', 'clear',
 }  # fmt: skip
-ONCE_IS_ENOUGH = {'set', 'clear', 'cancel', 'notify', 'notify_all', 'join', 'shutdown', 'add_node'}
+ONCE_IS_ENOUGH = {
+    'set', 'clear', 'cancel', 'notify', 'notify_all', 'join', 'shutdown', 'try_shutdown',
+    'add_node', 'spin',
+}  # fmt: skip
 EXECUTORS = ('SingleThreadedExecutor', 'MultiThreadedExecutor')
 GROUPS = ('MutuallyExclusiveCallbackGroup', 'ReentrantCallbackGroup')
 LIFECYCLE = ('on_configure', 'on_activate', 'on_deactivate', 'on_cleanup', 'on_shutdown')
