@@ -258,6 +258,24 @@ def test_files_have_mistakes_in_their_lines(magic, solution, wrong):
     assert f'{magic}\n{wrong}' in sources, sources
 
 
+@pytest.mark.parametrize(
+    ('magic', 'solution', 'equal'),
+    [
+        ('%%write a.cpp', '  best = a;\n  widest = b;', '  widest = b;\n  best = a;'),
+        ('%%write a.cpp', '  best = a;\n  f(best);', '  best = a;\n  best = a;\n  f(best);'),
+        (
+            '%%write CMakeLists.txt',
+            'find_package(a REQUIRED)\nfind_package(b REQUIRED)',
+            'find_package(b REQUIRED)\nfind_package(a REQUIRED)',
+        ),
+    ],
+)
+def test_files_have_no_mistakes_that_are_none(magic, solution, equal):
+    sources = [one.source for one in mutants_of(f'{magic}\n{solution}', [])]
+    assert sources
+    assert f'{magic}\n{equal}' not in sources
+
+
 def test_a_text_in_a_program_is_a_file_too():
     sources = [one.source for one in mutants_of('RULES = """\na: b\nc: d\n"""', [])]
     assert 'RULES = """\na: b\n"""' in sources

@@ -129,15 +129,31 @@ def lines_in_the_other_order(lines: Lines, written: set[int], kind: str) -> Iter
         return
     pieces = _pieces(lines, kind)
     for (begin, middle), (then, end) in zip(pieces, pieces[1:], strict=False):
+        if _order_says_nothing(lines[begin], lines[then]):
+            continue
         if middle <= then and not lines[middle:then] and not written.isdisjoint(range(begin, end)):
             yield [*lines[:begin], *lines[then:end], *lines[begin:middle], *lines[end:]]
+
+
+def _order_says_nothing(first: str, second: str) -> bool:
+    """Return whether two lines find packages, or give values that do not need each other."""
+    if all(line.strip().startswith('find_package(') for line in (first, second)):
+        return True
+    given = [re.match(r'\s*(?:[\w:<>]+ )*(\w+)(?: = [^=(]*)?;', line) for line in (first, second)]
+    if not all(given) or any(re.match(r'\s*(return|using)\b', one) for one in (first, second)):
+        return False
+    return not any(
+        re.search(rf'\b{found[1]}\b', other)
+        for found, other in zip(given, (second, first), strict=True)
+    )
 
 
 @rule
 def a_line_twice(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
     if kind in ('c++', 'commands'):
         for begin, end in _pieces(lines, kind):
-            is_call = re.match(r'\s*(?!return)[\w.:>-]+(\(| = )', lines[begin])
+            # What gets the same value twice has it.
+            is_call = re.match(r'\s*(?!return)([\w.:>-]+(\(| [+-]= )|[+-]{2}\w)', lines[begin])
             if end - begin == 1 and begin in written and (kind == 'commands' or is_call):
                 yield _with(lines, begin, lines[begin], lines[begin])
 
@@ -203,7 +219,8 @@ def a_word_gone(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
     for at in sorted(written):
         line = lines[at] if at < len(lines) else ''
         for found in re.finditer(r'(?<=[\s(])[^\s()]+', line):
-            if _is_code(found[0]) and line[: found.start()].strip():
+            is_there = found[0] == 'REQUIRED'  # which says something of another computer only
+            if _is_code(found[0]) and line[: found.start()].strip() and not is_there:
                 yield _with(lines, at, (line[: found.start()].rstrip(' ') + line[found.end() :]))
 
 

@@ -36,7 +36,10 @@ ENDS_WORK = {
     'set', 'set_result', 'notify', 'notify_all', 'succeed', 'canceled', 'abort', 'put', 'release',
     'cancel', 'publish', 'publish_feedback', 'append', 'reset', 'clear',
 }  # fmt: skip
-ONCE_IS_ENOUGH = {'set', 'clear', 'cancel', 'notify', 'notify_all', 'join', 'shutdown', 'add_node'}
+ONCE_IS_ENOUGH = {
+    'set', 'clear', 'cancel', 'notify', 'notify_all', 'join', 'shutdown', 'try_shutdown',
+    'add_node', 'spin',
+}  # fmt: skip
 EXECUTORS = ('SingleThreadedExecutor', 'MultiThreadedExecutor')
 GROUPS = ('MutuallyExclusiveCallbackGroup', 'ReentrantCallbackGroup')
 LIFECYCLE = ('on_configure', 'on_activate', 'on_deactivate', 'on_cleanup', 'on_shutdown')
@@ -50,6 +53,9 @@ CLOCKS = {
     'ClockType.ROS_TIME': ['ClockType.SYSTEM_TIME', 'ClockType.STEADY_TIME'],
     'Clock(clock_type=ClockType.STEADY_TIME)': ['self.get_clock()', 'Clock()'],
 }
+KEPT_BY_THE_NODE = {
+    'create_publisher', 'create_subscription', 'create_timer', 'create_service', 'create_client',
+}  # fmt: skip
 CONVERSIONS = {
     'radians', 'degrees', 'float', 'int', 'str', 'sorted', 'reversed', 'remainder', 'strip',
 }  # fmt: skip
@@ -122,6 +128,9 @@ def _order_says_nothing(program: Program, first: cst.CSTNode, second: cst.CSTNod
         kept = only(other, cst.Assign)
         if program.code(one).strip().startswith('super().__init__(') and kept:
             return isinstance(kept.value, cst.Name | cst.Integer | cst.Float | cst.SimpleString)
+    made = [name_of(call.func) for call in map(call_in, (first, second)) if call]
+    if len(made) == 2 and KEPT_BY_THE_NODE.issuperset(made):
+        return True
     if _is_taken_above_a_question(program, first, second, assigned[1]):
         return True
     for names, one, other in zip(assigned, (first, second), (second, first), strict=True):
@@ -464,6 +473,9 @@ def a_local_name(program: Program) -> Made:
         target = target_of(one)
         if not is_attribute_of_self(target) or program.method_of(one) != '__init__':
             continue
+        value = only(one, cst.Assign).value
+        if isinstance(value, cst.Call) and name_of(value.func) in KEPT_BY_THE_NODE:
+            continue
         uses = len(re.findall(rf'\bself\.{target.attr.value}\b', program.module.code))
         if uses == 1:
             assign = only(one, cst.Assign)
@@ -703,6 +715,8 @@ def what_is_not_a_number(program: Program) -> Made:
             continue
         left, right = program.code(compared.left), program.code(compared.comparisons[0].comparator)
         if '.' in right and right.split('.')[-1].isupper():  # of a message: a whole number
+            continue
+        if re.search(r'\b(\w+_)?(ns|nanoseconds|count|number|size)\b|\blen\(', f'{left} {right}'):
             continue
         if isinstance(node, cst.UnaryOperation) and isinstance(node.operator, cst.Not):
             yield program.changed(node, f'({left} {opposite[operator]} {right})')

@@ -9,7 +9,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from std_msgs.msg import Int32, String
 
-from helpers.checks.bench import Bench, must_define, must_have, one_cpu
+from helpers.checks.bench import Bench, must_be_called, must_define, must_have, one_cpu
 from helpers.checks.errors import Failed, NeverEnds
 from helpers.checks.points import all_of, cached, expect, rows
 from helpers.checks.tasks import Tasks
@@ -20,6 +20,8 @@ tasks = Tasks()
 check = tasks.check
 
 QUIET = SubscriptionEventCallbacks(use_default_callbacks=False)
+DEPTH = 10  # of `camera_and_battery`
+MORE_S = 0.3  # for a callback that no message has called
 
 
 @tasks.add
@@ -28,6 +30,7 @@ def a_subscriber_with_a_group(SlowSubscriber, DEPTH, CALLBACK_S):
         must_define(SlowSubscriber, '__init__')
         with Bench() as bench:
             node, executor = SlowSubscriber(group), SingleThreadedExecutor()
+            must_be_called(node, 'slow_subscriber')
             must_have(node, 'subscription')
             executor.add_node(node)
             bench.publisher('topic', String).publish(String(data='Hello World: 0'))
@@ -89,35 +92,57 @@ def name_of(thing):
 @tasks.add
 def camera_and_battery(TwoTopics, make_my_executor):
     def called(*topics, cpus=one_cpu):
-        """Send messages while the first picture is worked on. Return the topics of the calls."""
+        """Send messages while the first picture is worked on.
+
+        Return the topics of the calls until then, and of all calls when the work has ended.
+        """
+        must_define(TwoTopics, 'camera_callback', 'battery_callback')
         calls = []
         with Bench() as bench:
+            gate = bench.gate()
+
+            class Tried(TwoTopics):
+                def camera_callback(self, message):
+                    calls.append('camera')
+                    gate.hold()
+
+                def battery_callback(self, message):
+                    calls.append('battery')
+
             with cpus():
                 executor = make_my_executor()
-            node, gate = TwoTopics(), bench.gate()
+            node = Tried()
             found = {made.topic_name.strip('/'): made for made in node.subscriptions}
             for topic in ('camera', 'battery'):
                 if topic not in found:
                     raise Failed(f'there is no subscription on {topic}')
+                depth = found[topic].qos_profile.depth
+                if depth != DEPTH:
+                    raise Failed(f'the depth of {topic} is {depth}, not {DEPTH}', hint='')
                 without_event_handlers(node, found[topic])
-            found['camera'].callback = lambda _: (calls.append('camera'), gate.hold())
-            found['battery'].callback = lambda _: calls.append('battery')
             bench.spin(node, executor=executor)
             for topic in topics:
                 bench.say(topic, Int32())
-            return [*calls]
+            until_then = [*calls]
+            gate.open()
+            bench.wait(lambda: len(calls) > len(topics), MORE_S)
+            return until_then, [*calls]
 
     def battery_is_heard(*topics):
-        heard, wanted = called(*topics).count('battery'), topics.count('battery')
+        heard, wanted = called(*topics)[0].count('battery'), topics.count('battery')
         if heard == wanted:
             return True
         found = f'meanwhile {heard} of {wanted} battery messages were received'
-        needs_cpus = called(*topics, cpus=nullcontext).count('battery') == wanted
+        needs_cpus = called(*topics, cpus=nullcontext)[0].count('battery') == wanted
         return f'on a computer with one CPU, {found}' if needs_cpus else found
 
     def one_picture():
-        pictures = called('camera', 'camera', 'camera').count('camera')
-        return expect(pictures, 1, 'pictures that it worked on at the same time:')
+        until_then, calls = called('camera', 'camera', 'camera')
+        pictures = until_then.count('camera')
+        return all_of(
+            expect(pictures, 1, 'pictures that it worked on at the same time:'),
+            expect(len(calls), 3, 'for three messages, calls of camera_callback:'),
+        )
 
     hint = 'Which callback blocks which group? How many threads are still free?'
     more = 'camera', 'camera', 'battery', 'camera', 'battery'
@@ -216,6 +241,11 @@ def an_odometer(Odometer):
     forty, fewer = two_trials(Odometer, 'total', 'longest')
 
     def shows(trial, count):
+        if trial().name != 'odometer':
+            return expect(trial().name, 'odometer', 'the name of the node is')
+        for name, value in trial().first.items():
+            if value != 0:
+                return f'before the first distance, self.{name} is {value!r}, not 0'
         right = {'total': sum(range(1, count + 1)), 'longest': count}
         wrong = [name for name in right if trial().values[name] != right[name]]
         if wrong:
@@ -268,6 +298,7 @@ class Trial:
 
     def __init__(self, messages):
         self.values, self.at_work, self.went_back = {}, [], []
+        self.name, self.first = '', {}  # of the node; the values before a message came
         self.node = None  # until it is made, nothing is held
         self._messages = messages
         self._places, self._held = set(), 0
@@ -393,6 +424,7 @@ def hear_numbers(node_class, numbers, names):
     with Bench() as bench:
         node = Tried()
         must_have(node, 'finished', *names)
+        trial.name, trial.first = node.get_name(), {**trial.values}
         trial.watch_locks(node)
         trial.node = node
         bench.spin(node, threads=8)

@@ -8,6 +8,7 @@ import numpy as np
 from geometry_msgs.msg import Transform, TransformStamped, Vector3
 
 from helpers.checks.bench import Bench, override, scan
+from helpers.checks.errors import Failed
 from helpers.checks.lessons.put_the_sensors_on_the_robot.shared import in_text, tasks, tf_message
 from helpers.checks.points import all_of, expect
 from helpers.ros import quaternion, seconds_of, stamp_of, yaw_of
@@ -113,6 +114,9 @@ def look_it_up(Buffer):
     ]
 
 
+BROKEN_S = 99.0  # the time of a scan at which the buffer has an error of another kind
+
+
 @tasks.add
 def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
     def scan_of(t):
@@ -141,6 +145,19 @@ def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
         _, placed = after(*messages)
         came = ', '.join(f'{kind} of {t:g} s' for kind, t in messages)
         return expect(placed, right, f'{came}: after each of these it has placed')
+
+    def others_wait():
+        placed = places([0, 0, 0, 0, 2, 3], *three)
+        return placed if placed is not True else tells_another_error()
+
+    def tells_another_error():
+        """Let a scan come while the buffer has an error of another kind."""
+        try:
+            after(('tf', 1.0), ('scan', BROKEN_S))
+        except ValueError:
+            return True
+        hint = 'except ExtrapolationException, and nothing else.'
+        raise Failed('it hides every error: a ValueError of self.buffer is lost', hint=hint)
 
     def at_its_place():
         mapper, placed = after(*early)
@@ -171,7 +188,7 @@ def keep_it_until_its_transform_is_there(PatientMapper, in_robot):
             new_list,
         ),
         ('it is placed where the robot was', at_its_place, 'self.place(scan)'),
-        ('the others go on waiting', lambda: places([0, 0, 0, 0, 2, 3], *three), each),
+        ('the others go on waiting', others_wait, each),
         ('at most ten wait, the newest', not_for_ever, newest),
     ]
 
@@ -189,6 +206,8 @@ class OwnBuffer:
         self.places.append(stamped.transform.translation.x)
 
     def lookup(self, child, t):
+        if t == BROKEN_S:
+            raise ValueError(child)
         if t > self.times[-1]:
             raise self.error(self.future.format(t, self.times[-1]))
         return transform_of(float(np.interp(t, self.times, self.places)), 0.0, 0.0)

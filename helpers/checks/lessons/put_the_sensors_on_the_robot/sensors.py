@@ -9,6 +9,7 @@ from geometry_msgs.msg import TransformStamped, Vector3
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from helpers.checks.bench import Bench
+from helpers.checks.errors import Failed
 from helpers.checks.lessons.put_the_sensors_on_the_robot.shared import (
     SENSORS,
     described,
@@ -68,7 +69,12 @@ def a_message_for_each_joint(workspace, static_transforms):
     arm = cached(lambda: parsed(ARM))
 
     def transforms_of(robot):
-        return {transform.child_frame_id: transform for transform in static_transforms(robot)}
+        made = static_transforms(robot)
+        children = [transform.child_frame_id for transform in made]
+        for child in children:
+            if children.count(child) > 1:
+                raise Failed(f'there are {children.count(child)} messages for {child}', hint='')
+        return dict(zip(children, made, strict=True))
 
     def is_transform(robot, parent, child, xyz, rpy):
         transforms = transforms_of(robot)
@@ -117,9 +123,11 @@ def once_is_enough(workspace, StaticBroadcaster):
     def hears(robot, *frames):
         # rclpy would print which policy is incompatible: that is the answer.
         with contextlib.redirect_stdout(io.StringIO()), Bench() as bench:
-            broadcaster = bench.spin(StaticBroadcaster(robot))
-            bench.quiet()
             late = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+            early = bench.hear('/tf_static', tf_message(), qos=late)
+            broadcaster = bench.spin(StaticBroadcaster(robot))
+            bench.wait(lambda: early, 1.0)
+            bench.quiet()
             messages = bench.hear('/tf_static', tf_message(), qos=late)
             bench.wait(lambda: messages, 1.0)
             bench.quiet()
@@ -130,6 +138,7 @@ def once_is_enough(workspace, StaticBroadcaster):
         ]
         return all_of(
             expect(heard, [sorted(frames)], 'the frames in each message that a late node hears:'),
+            expect(len(early), 1, 'the number of messages that it publishes is'),
             not repeats or 'it has a timer that publishes again',
         )
 
