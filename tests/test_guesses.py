@@ -159,6 +159,13 @@ def test_a_wrong_form_is_said_at_once(capsys, on, typed, why):
     assert why in printed.replace('\n', ' ')
 
 
+def test_options_stand_at_their_points():
+    points = {'A': (0.5, 0.4), 'B': (4.0, -1.5)}
+    kind = guess('Which are taken?', ..., on=[*points], several=True, marks=points).kind
+    assert kind.record()['points'] == [(0.5, 0.4), (4.0, -1.5)]
+    assert kind.read({'B'}) == [1]
+
+
 def test_what_may_be_answered_is_visible_before(capsys):
     for on in (CORRIDOR, range(42), bool, ('A', 'B'), ROWS):
         made, printed = asked(capsys, ..., on=on)
