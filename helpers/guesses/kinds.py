@@ -45,9 +45,9 @@ class Level:
 
     @property
     def forms(self) -> str:
-        of = f' of {self.unit}' if self.unit else ''
+        unit = f' ({self.unit})' if self.unit else ''
         kind = 'a whole number' if self.is_whole else 'a number'
-        return f'Typed in place of the dots: {kind}{of} from {self.low:g} to {self.high:g}.'
+        return f'Typed in place of the dots: {kind} from {self.low:g} to {self.high:g}{unit}.'
 
     def record(self) -> dict:
         step = 1 if self.is_whole else (self.high - self.low) / MOST_STEPS
@@ -230,8 +230,8 @@ def kind_of(
 ) -> Kind:
     """Return the kind of a guess that `on` names: `bool`, an axis, options, or rows of them.
 
-    With a unit, a pair of numbers is an axis. A dict of options is several rows. `marks` are numbers
-    on the axis, or the points of the options, by their names.
+    With a unit, a pair of numbers is an axis. A dict of options is several rows. `marks` are
+    numbers on the axis, or the points of the options, by their names.
 
     Raises TypeError for anything else.
     """
