@@ -223,6 +223,17 @@ def test_the_gap_to_a_number_and_to_options(capsys, on, typed, outcome, said):
     assert capsys.readouterr().out.splitlines()[-1].strip() == said
 
 
+@pytest.mark.parametrize(
+    ('on', 'outcome', 'said'),
+    [({'on': (0.3, 0.5)}, 0.7, '0.7'), ({'on': ROWS}, [1], '1')],
+)
+def test_what_was_none_of_the_options_is_said(capsys, on, outcome, said):
+    made, _ = asked(capsys, ..., **on)
+    compare_prediction(END, made, outcome)
+    said = f'{END}\n  The answer is {said}: it was none of the options.\n'
+    assert capsys.readouterr().out == said
+
+
 def test_without_a_student_the_answer_is_words_that_never_move(capsys, monkeypatch):
     made, _ = asked(capsys, ..., on=CORRIDOR)
     compare_prediction(END, made, HIT)
