@@ -159,6 +159,13 @@ def test_a_wrong_form_is_said_at_once(capsys, on, typed, why):
     assert why in printed.replace('\n', ' ')
 
 
+def test_options_stand_at_their_points():
+    points = {'A': (0.5, 0.4), 'B': (4.0, -1.5)}
+    kind = guess('Which are taken?', ..., on=[*points], several=True, marks=points).kind
+    assert kind.record()['points'] == [(0.5, 0.4), (4.0, -1.5)]
+    assert kind.read({'B'}) == [1]
+
+
 def test_what_may_be_answered_is_visible_before(capsys):
     for on in (CORRIDOR, range(42), bool, ('A', 'B'), ROWS):
         made, printed = asked(capsys, ..., on=on)
@@ -214,6 +221,17 @@ def test_the_gap_to_a_number_and_to_options(capsys, on, typed, outcome, said):
     made, _ = asked(capsys, typed, **on)
     compare_prediction(END, made, outcome)
     assert capsys.readouterr().out.splitlines()[-1].strip() == said
+
+
+@pytest.mark.parametrize(
+    ('on', 'outcome', 'said'),
+    [({'on': (0.3, 0.5)}, 0.7, '0.7'), ({'on': ROWS}, [1], '1')],
+)
+def test_what_was_none_of_the_options_is_said(capsys, on, outcome, said):
+    made, _ = asked(capsys, ..., **on)
+    compare_prediction(END, made, outcome)
+    said = f'{END}\n  The answer is {said}: it was none of the options.\n'
+    assert capsys.readouterr().out == said
 
 
 def test_without_a_student_the_answer_is_words_that_never_move(capsys, monkeypatch):

@@ -116,7 +116,7 @@ def guess(
     several: bool | int = False,
     unit: str = '',
     line_m: float | None = None,
-    marks: Mapping[str, float] | None = None,
+    marks: Mapping[str, float | tuple[float, float]] | None = None,
 ) -> object:
     """Return the answer that a student gives to a question; `...` if there is none yet.
 
@@ -130,7 +130,7 @@ def guess(
     - a floor: your robot stands where you put it, in front of a wall; `line_m` (m) draws a line;
     - a range, or a pair such as (0, 2) with a `unit`: a line on an axis, which also shows `marks`;
     - `bool`, a tuple, or a dict of words and values: options, of which one is chosen, `several`
-      (True), or just so many (a number);
+      (True), or just so many (a number); they stand at the points (x, y in m) of `marks`;
     - a dict of such options: a row for each, and one is chosen in each row.
 
     What is no answer gets a sentence at once. Raises TypeError for another `on`.
@@ -155,7 +155,7 @@ def _kind(
     several: bool | int,
     unit: str,
     line_m: float | None,
-    marks: Mapping[str, float] | None,
+    marks: Mapping[str, float | tuple[float, float]] | None,
 ) -> Kind:
     # Slow to load, and most guesses have no floor.
     from helpers.guesses import kind_of

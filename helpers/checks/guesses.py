@@ -93,8 +93,12 @@ def _compare(
     question: str, guess: Guess, measured: object, tolerance: float, because: str | None
 ) -> None:
     """Show the gap between a guess that was made in a picture and what came out."""
-    outcome = guess.kind.outcome(_plain(measured), guess.run, tolerance)
     print(question)
+    try:
+        outcome = guess.kind.outcome(_plain(measured), guess.run, tolerance)
+    except ValueError:  # a student's own program may do what nobody has thought of
+        print(f'  The answer is {_written(_plain(measured))}: it was none of the options.')
+        return
     if guess.value is None:
         if _has_student():
             print(f'  No guess yet. {guess.kind.asks} Then run this cell again.')

@@ -45,9 +45,9 @@ class Level:
 
     @property
     def forms(self) -> str:
-        of = f' of {self.unit}' if self.unit else ''
+        unit = f' ({self.unit})' if self.unit else ''
         kind = 'a whole number' if self.is_whole else 'a number'
-        return f'Typed in place of the dots: {kind}{of} from {self.low:g} to {self.high:g}.'
+        return f'Typed in place of the dots: {kind} from {self.low:g} to {self.high:g}{unit}.'
 
     def record(self) -> dict:
         step = 1 if self.is_whole else (self.high - self.low) / MOST_STEPS
@@ -89,11 +89,13 @@ class Level:
 class Options:
     """Some options, of which one is chosen, or `several`: any number, or just so many.
 
-    `values` are the options by the words that a page shows.
+    `values` are the options by the words that a page shows. With `points`, where each of them is
+    (x, y in m, the robot at 0, 0), they stand there.
     """
 
     values: Mapping[str, object]
     several: bool | int = False
+    points: Mapping[str, tuple[float, float]] | None = None
 
     scripts = (HERE / 'options.js',)
 
@@ -116,6 +118,7 @@ class Options:
             'kind': 'options',
             'names': [*self.values],
             'several': several if self.several is not False else None,
+            'points': self.points and [self.points[name] for name in self.values],
         }
 
     def picture(self) -> str:
@@ -223,11 +226,12 @@ def kind_of(
     on: object,
     several: bool | int = False,
     unit: str = '',
-    marks: Mapping[str, float] | None = None,
+    marks: Mapping[str, float | tuple[float, float]] | None = None,
 ) -> Kind:
     """Return the kind of a guess that `on` names: `bool`, an axis, options, or rows of them.
 
-    With a unit, a pair of numbers is an axis. A dict of options is several rows.
+    With a unit, a pair of numbers is an axis. A dict of options is several rows. `marks` are
+    numbers on the axis, or the points of the options, by their names.
 
     Raises TypeError for anything else.
     """
@@ -240,7 +244,7 @@ def kind_of(
     if isinstance(on, Mapping) and on and all(map(_is_options, on.values())):
         return Rows({name: _options(one) for name, one in on.items()})
     if isinstance(on, Mapping) or _is_options(on):
-        return _options(on, several)
+        return _options(on, several, marks)
     raise TypeError(f'A guess is made on a floor, an axis or options, not on {on!r}.')
 
 
@@ -250,13 +254,13 @@ def _is_options(on: object) -> bool:
     )
 
 
-def _options(on: object, several: bool | int = False) -> Options:
+def _options(on: object, several: bool | int = False, points: Mapping | None = None) -> Options:
     if on is bool:
         return Options({'yes': True, 'no': False})
     if isinstance(on, Mapping):
-        return Options(dict(on), several)
+        return Options(dict(on), several, points)
     values = sorted(on, key=str) if isinstance(on, AbstractSet) else on
-    return Options({str(value): value for value in values}, several)
+    return Options({str(value): value for value in values}, several, points)
 
 
 def number_of(typed: object, unit: str = '') -> float | None:

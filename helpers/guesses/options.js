@@ -43,13 +43,35 @@ const optionsKind = (() => {
     return { node, press, count };
   }
 
+  // Put buttons where their points (m) are, around the robot. What has no point stands below.
+  function plane(node, points) {
+    const [wide, high] = [0, 1].map(axis => 1.2 * Math.max(...points.map(point => Math.abs(point[axis]))) + 0.5);
+    const place = (one, x, y) => Object.assign(one.style, { left: `${50 + 50 * x / wide}%`, top: `${50 - 50 * y / high}%` });
+    const label = (words, x, y) => {
+      const made = element('span', { 'aria-hidden': 'true' }, words);
+      place(made, x, y);
+      return made;
+    };
+    const shown = element('div', { class: 'guess-plane', style: `aspect-ratio: ${wide} / ${high}` });
+    for (let x = 2; x < wide; x += 2) shown.append(label(`-${x} m`, -x, 0), label(`${x} m`, x, 0));
+    for (let y = 2; y < high; y += 2) shown.append(label(`-${y} m`, -0.05 * wide, -y), label(`${y} m`, -0.05 * wide, y));
+    shown.append(label('➤', 0, 0));
+    points.forEach(([x, y], i) => {
+      place(node.children[0], x, y);
+      node.children[0].title = `x ${x} m, y ${y} m`;
+      shown.append(node.children[0]);
+    });
+    node.prepend(shown);
+  }
+
   function draw(record, image, set) {
-    const { names, several, outcome } = record;
+    const { names, several, points, outcome } = record;
     const one = several === null;
     // Of any number, none is an answer, too.
     const none = several === 0 ? names.length : -1;
     const pressed = value => (value === null ? [] : value.length === 0 ? [none] : [value].flat());
     const shown = row(none < 0 ? names : [...names, 'none of them'], record.question, one, outcome && pressed(outcome.at), choose);
+    if (points) plane(shown.node, points);
     let now = null;
     // A list that is empty says none of them. An option that is the text of a number comes as one.
     classOf(record, values => shown.count(values.flatMap(value => ([].concat(value).length ? value : ['none of them'])).map(String)));

@@ -42,7 +42,7 @@ def test_all_kinds_by_keys_alone_on_a_phone(phone, artefacts):
     page.keyboard.press('Tab')
     page.keyboard.press('Home')
     page.keyboard.press('ArrowUp')
-    assert says(page, LEVEL) == 'You say: 1 messages.'
+    assert says(page, LEVEL) == 'You say: 1 message.'
     page.keyboard.press('Tab')
     for _ in range(4):
         page.keyboard.press('Space')
