@@ -31,7 +31,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from helpers.robot import FLOORS, Floor, Pose
-from helpers.robot_view import replay_drive
 from helpers.ros import ros_session
 from ordeal.happen import happening
 from ordeal.law import Seen, broken
@@ -141,6 +140,8 @@ class Trial:
             )
         )
         if found:
+            from helpers.robot_view import replay_drive  # slow to load, and seldom needed
+
             replay = replay_drive(record, name=self.trouble.name)
             page = replay._repr_mimebundle_()['text/html']
             (self.folder / 'replay.html').write_text(page, encoding='utf-8')
