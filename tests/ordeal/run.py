@@ -101,7 +101,7 @@ def done(program: Prepared, jobs: Iterable[Job], at_once: int) -> Iterator[Job]:
                 job, process, since = entry
                 if process.poll() is None and time.monotonic() - since < TRIAL_S:
                     continue
-                process.kill()
+                process.terminate()
                 process.wait()
                 running.remove(entry)
                 job.result = result_of(job)
@@ -110,6 +110,7 @@ def done(program: Prepared, jobs: Iterable[Job], at_once: int) -> Iterator[Job]:
     finally:
         for _, process, _ in running:
             process.terminate()
+            process.wait()
 
 
 def result_of(job: Job) -> dict[str, Any]:

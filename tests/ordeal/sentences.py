@@ -41,7 +41,7 @@ OTHERS = {
 # The lesson that takes a trouble away. Where none is named, no program of the course stands it.
 FRESH, PROJECT = 'keep_what_is_fresh', 'build_a_robot_program'
 TAKEN_AWAY = {
-    **dict.fromkeys(['silent from the start', 'silent', 'old'], FRESH),
+    **dict.fromkeys(['silent from the start', 'silent', 'old', 'jumps'], FRESH),
     **dict.fromkeys(['frozen', 'SIGKILL', 'SIGSTOP', 'is cut'], PROJECT),
 }
 

@@ -7,6 +7,7 @@ run, and `result.json` what came of it.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib
 import json
 import math
@@ -104,8 +105,8 @@ class Trial:
                 self._start()
                 self._wait_for_nodes()
                 self._ask(2.0)
-                begun_s = self._now()
-                self._wait(begun_s + 3.0, lambda: bool(self.robot.bumps))
+                begun_s = 0.0
+                self._wait(self._now() + 3.0, lambda: bool(self.robot.bumps))
                 ended_s = self._now()
         else:
             self._start()
@@ -369,6 +370,8 @@ class Trial:
 
 
 def main() -> None:
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG: and it with the ordeal
     folder = Path(sys.argv[1])
     told = json.loads((folder / 'trial.json').read_text(encoding='utf-8'))
     result = Trial(told, folder).run()
