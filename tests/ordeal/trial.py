@@ -40,7 +40,7 @@ from ordeal.troubles import Trouble
 
 START_S, END_S, POLL_S = 40.0, 8.0, 0.02
 AFTER_S = 12.0  # so long a program has to do what it promises
-NEAR_M = 1.6  # before the wall: so near, a robot has stopped for it
+STAYS_S = 1.0  # what has stood so long before the wall has stopped for it
 PLACE_M = 0.5  # so near its goal a job has arrived
 NO_PROGRAMS = ('ros2', 'python', 'bash', 'sh')
 
@@ -345,16 +345,17 @@ class Trial:
         return self._wait(self._now() + AFTER_S, moves)
 
     def _brakes(self, since_s: float) -> bool:
-        robot = self.robot
+        robot, near_m, stood_s = self.robot, self.declared['near_m'], math.inf
 
-        def at_wall() -> bool:
+        def stays_at_wall() -> bool:
+            nonlocal stood_s
             step, (x, y, yaw) = robot.record.poses[-1], robot.pose
-            ahead = float(robot.floor.ranges(x, y, [yaw])[0][0])
-            return max(abs(step.v), abs(step.w)) < 0.01 and ahead < NEAR_M
+            ahead_m = float(robot.floor.ranges(x, y, [yaw])[0][0])
+            stands = max(abs(step.v), abs(step.w)) < 0.01 and ahead_m < near_m
+            stood_s = min(stood_s, self._now()) if stands else math.inf
+            return bool(robot.bumps) or self._now() - stood_s > STAYS_S
 
-        self._wait(self._now() + AFTER_S, lambda: bool(robot.bumps) or at_wall())
-        self._wait(self._now() + 0.5, lambda: bool(robot.bumps))
-        return at_wall()
+        return self._wait(self._now() + AFTER_S, stays_at_wall) and not robot.bumps
 
     def _arrives(self, since_s: float) -> bool:
         if self.result is None:  # the trouble was there before its goal
