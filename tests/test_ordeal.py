@@ -16,6 +16,7 @@ from ordeal.programs import (
     publishers,
 )
 from ordeal.run import differences, known, meet
+from ordeal.sentences import MARKED, out_of_date
 from ordeal.troubles import troubles
 
 from helpers.lesson import paths
@@ -79,6 +80,15 @@ def test_what_does_not_stand_is_of_the_programs():
         for trouble, bases in listed.items():
             assert bases, f'{name}, {trouble}'
             assert {*bases} <= {*declared()[name]['bases']}, f'{name}, {trouble}'
+
+
+def test_the_lessons_say_what_does_not_stand():
+    for path in paths():
+        here = lesson(path.stem[3:])
+        marked = [name for cell in here.cells for _, name, *_ in MARKED.findall(cell.source)]
+        assert [declared()[name]['lesson'] for name in marked] == [here.name] * len(marked)
+        assert {*marked} <= {*known()}
+        assert not out_of_date(here, known()), 'run: make ordeal WRITE=yes'
 
 
 def test_a_drawn_part_of_the_ordeal_is_as_it_is_known():

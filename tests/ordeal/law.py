@@ -13,8 +13,8 @@ class Seen:
     """What was seen of a trial. Times are seconds of the robot.
 
     `moves` are (t, v, w), `commands` the times of commands, `bumps` those of bumps. The trouble was
-    there from `begun_s` to `ended_s`. `must_stand` as in its `Trouble`; `within_s` is how soon the
-    program says that the robot stands. `from_start` is a trouble that was there before the program.
+    there from `begun_s` to `ended_s`. `must_stand` as in its `Trouble`; `within_s`: so soon it must
+    stand. `from_start`: the trouble was there before the program.
     """
 
     moves: Sequence[tuple[float, float, float]]

@@ -1,4 +1,4 @@
-"""What is beside a program: a robot whose sensors can be troubled, and others who speak."""
+"""What is beside a program: a robot whose sensors can be troubled, and others that speak."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from nav_msgs.msg import Odometry
+from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from sensor_msgs.msg import BatteryState, Imu, LaserScan, Range
@@ -109,11 +110,11 @@ def stamped(message: Any, nanoseconds: int) -> Any:
 
 
 class Second:
-    """A second node that speaks on a topic: messages, again and again, with stamps of now."""
+    """A second node that speaks on a topic: a message, again and again, with stamps of now."""
 
     def __init__(self, robot: Robot, topic: str, message: Any, qos: QoSProfile) -> None:
-        self.robot, self.message = robot, message
-        self.node = robot.context and _node('second', robot)
+        self.message = message
+        self.node = Node('second', context=robot.context)
         self.publisher = self.node.create_publisher(type(message), topic, qos)
         self.last_s = 0.0
 
@@ -127,12 +128,6 @@ class Second:
 
     def end(self) -> None:
         self.node.destroy_node()
-
-
-def _node(name: str, robot: Robot):
-    from rclpy.node import Node
-
-    return Node(name, context=robot.context)
 
 
 def voice(robot: Robot, v: float) -> Second:

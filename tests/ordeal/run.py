@@ -21,6 +21,7 @@ import yaml
 from helpers.lesson import ROOT, chosen
 from ordeal.network import possible
 from ordeal.programs import Prepared, declared
+from ordeal.sentences import write_sentences
 from ordeal.troubles import NOTHING, Trouble, troubles
 
 KNOWN = Path(__file__).with_name('known.yaml')
@@ -100,7 +101,7 @@ def done(program: Prepared, jobs: Iterable[Job], at_once: int) -> Iterator[Job]:
                 job, process, since = entry
                 if process.poll() is None and time.monotonic() - since < TRIAL_S:
                     continue
-                process.kill()
+                process.terminate()
                 process.wait()
                 running.remove(entry)
                 job.result = result_of(job)
@@ -109,6 +110,7 @@ def done(program: Prepared, jobs: Iterable[Job], at_once: int) -> Iterator[Job]:
     finally:
         for _, process, _ in running:
             process.terminate()
+            process.wait()
 
 
 def result_of(job: Job) -> dict[str, Any]:
@@ -169,6 +171,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             program.close()
         if options.write:
             write_known(results)
+            write_sentences(known())
     began = [job for job in results if job.began]
     stood = [job for job in began if job.stood]
     print(
@@ -214,9 +217,8 @@ def write_known(results: Iterable[Job]) -> None:
             found[job.program][job.trouble.name] = sorted(bases)
     kept = {}
     for name in declared():
-        listed = {trouble: bases for trouble, bases in sorted(found.get(name, {}).items()) if bases}
-        if listed:
-            kept[name] = listed
+        if name in found:
+            kept[name] = {what: bases for what, bases in sorted(found[name].items()) if bases}
     head = '# What does not stand, and on which bases. Written by `make ordeal WRITE=yes`.\n'
     text = yaml.safe_dump(kept, sort_keys=False, width=100, default_flow_style=None)
     KNOWN.write_text(head + text, encoding='utf-8')

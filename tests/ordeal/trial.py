@@ -7,6 +7,7 @@ run, and `result.json` what came of it.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib
 import json
 import math
@@ -31,7 +32,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from helpers.robot import FLOORS, Floor, Pose
-from helpers.robot_view import replay_drive
 from helpers.ros import ros_session
 from ordeal.happen import happening
 from ordeal.law import Seen, broken
@@ -40,7 +40,7 @@ from ordeal.troubles import Trouble
 
 START_S, END_S, POLL_S = 40.0, 8.0, 0.02
 AFTER_S = 12.0  # so long a program has to do what it promises
-NEAR_M = 1.6  # before the wall: so near, a robot has stopped for it
+STAYS_S = 1.0  # what has stood so long before the wall has stopped for it
 PLACE_M = 0.5  # so near its goal a job has arrived
 NO_PROGRAMS = ('ros2', 'python', 'bash', 'sh')
 
@@ -105,8 +105,8 @@ class Trial:
                 self._start()
                 self._wait_for_nodes()
                 self._ask(2.0)
-                begun_s = self._now()
-                self._wait(begun_s + 3.0, lambda: bool(self.robot.bumps))
+                begun_s = 0.0
+                self._wait(self._now() + 3.0, lambda: bool(self.robot.bumps))
                 ended_s = self._now()
         else:
             self._start()
@@ -141,6 +141,8 @@ class Trial:
             )
         )
         if found:
+            from helpers.robot_view import replay_drive  # slow to load, and seldom needed
+
             replay = replay_drive(record, name=self.trouble.name)
             page = replay._repr_mimebundle_()['text/html']
             (self.folder / 'replay.html').write_text(page, encoding='utf-8')
@@ -343,16 +345,17 @@ class Trial:
         return self._wait(self._now() + AFTER_S, moves)
 
     def _brakes(self, since_s: float) -> bool:
-        robot = self.robot
+        robot, near_m, stood_s = self.robot, self.declared['near_m'], math.inf
 
-        def at_wall() -> bool:
+        def stays_at_wall() -> bool:
+            nonlocal stood_s
             step, (x, y, yaw) = robot.record.poses[-1], robot.pose
-            ahead = float(robot.floor.ranges(x, y, [yaw])[0][0])
-            return max(abs(step.v), abs(step.w)) < 0.01 and ahead < NEAR_M
+            ahead_m = float(robot.floor.ranges(x, y, [yaw])[0][0])
+            stands = max(abs(step.v), abs(step.w)) < 0.01 and ahead_m < near_m
+            stood_s = min(stood_s, self._now()) if stands else math.inf
+            return bool(robot.bumps) or self._now() - stood_s > STAYS_S
 
-        self._wait(self._now() + AFTER_S, lambda: bool(robot.bumps) or at_wall())
-        self._wait(self._now() + 0.5, lambda: bool(robot.bumps))
-        return at_wall()
+        return self._wait(self._now() + AFTER_S, stays_at_wall) and not robot.bumps
 
     def _arrives(self, since_s: float) -> bool:
         if self.result is None:  # the trouble was there before its goal
@@ -368,6 +371,8 @@ class Trial:
 
 
 def main() -> None:
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
+    ctypes.CDLL(None).prctl(1, signal.SIGTERM)  # PR_SET_PDEATHSIG: and it with the ordeal
     folder = Path(sys.argv[1])
     told = json.loads((folder / 'trial.json').read_text(encoding='utf-8'))
     result = Trial(told, folder).run()
