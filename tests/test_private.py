@@ -23,9 +23,12 @@ import rclpy
 from ipykernel.comm.comm import BaseComm
 from ipykernel.kernelbase import Kernel
 from IPython.core import interactiveshell
-from rclpy.action import ActionClient
+from rclpy.action import ActionClient, ActionServer
+from rclpy.action.client import ClientGoalHandle
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
+from rclpy.task import Future, Task
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
@@ -53,6 +56,13 @@ def owners():
         'a client': node.create_client(Trigger, 'look'),
         'a lifecycle node': LifecycleNode('lifecycle', context=context),
         'an action client': ActionClient(node, Fibonacci, 'patrol'),
+        'an action server': ActionServer(node, Fibonacci, 'patrol', print),
+        'a goal handle': ClientGoalHandle,
+        'a MutuallyExclusiveCallbackGroup': MutuallyExclusiveCallbackGroup(),
+        'a future': Future(),
+        'a task': Task(print),
+        'a rate': node.create_rate(1),
+        'a Condition': threading.Condition(),
         'a ThreadPoolExecutor': ThreadPoolExecutor(),
         'sys': sys,
         'a kernel': Kernel,

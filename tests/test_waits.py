@@ -1,0 +1,114 @@
+"""What waits, and why: programs that hang for different reasons, and such as only take long.
+
+They are in tests/data/waits. A comment `# Says:` is a line that is explained; `# From:` names the
+public thread with a program of this form. Those whose name begins with `slow` must not be accused.
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PROGRAMS = sorted((ROOT / 'tests/data/waits').glob('*.py'))
+HANGS = [file for file in PROGRAMS if not file.stem.startswith('slow')]
+SLOW = [file for file in PROGRAMS if file.stem.startswith('slow')]
+TIMEOUT_S = 40
+ACCUSES = 'It cannot:'
+
+
+class Asked:
+    """A program that runs below `python -m helpers.waits`, and is asked what waits."""
+
+    def __init__(self, file, command=('-m', 'helpers.waits')):
+        self.said, self.news = '', threading.Condition()
+        variables = dict(os.environ, PYTHONUNBUFFERED='1', PYTHONPATH=str(ROOT))
+        self.process = subprocess.Popen(
+            [sys.executable, *command, str(file)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=variables,
+            cwd=ROOT,
+        )
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            with self.news:
+                self.said += line
+                self.news.notify()
+
+    def wait(self, condition, timeout_s=TIMEOUT_S):
+        with self.news:
+            return self.news.wait_for(lambda: condition(self.said), timeout_s)
+
+    def ask(self):
+        """Return the answer to one signal. The program may not be ready for it yet: then ''."""
+        before = self.said
+        self.process.send_signal(signal.SIGQUIT)
+        self.wait(lambda said: said != before, 1.0)
+        time.sleep(0.1)  # the rest of its lines
+        return self.said[len(before) :]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *why):
+        self.process.kill()
+        self.process.wait()
+        self.reader.join()
+
+
+def wanted(file):
+    return re.findall(r'^# Says: (.*)$', file.read_text(), re.MULTILINE)
+
+
+@pytest.fixture
+def own_domain(monkeypatch):
+    from helpers.ros.domain import reserve_domain_id
+
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(reserve_domain_id()))
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+
+
+@pytest.mark.parametrize('file', HANGS, ids=lambda file: file.stem)
+def test_a_program_that_hangs_is_explained(file, own_domain):
+    with Asked(file) as asked:
+        asked.wait(lambda said: 'kill -QUIT' in said)
+        end, answer = time.monotonic() + TIMEOUT_S, ''
+        while time.monotonic() < end:
+            answer = asked.ask()
+            if all(line in answer for line in wanted(file)):
+                break
+        assert [line for line in wanted(file) if line not in answer] == [], asked.said
+        assert ACCUSES in answer
+
+
+@pytest.mark.parametrize('file', SLOW, ids=lambda file: file.stem)
+def test_a_program_that_only_takes_long_is_not_accused(file, own_domain):
+    with Asked(file) as asked:
+        assert asked.wait(lambda said: 'now\n' in said), asked.said
+        for _ in range(3):
+            answer = asked.ask()
+            assert answer
+            assert ACCUSES not in answer
+        assert [line for line in wanted(file) if line not in answer] == [], answer
+
+
+def test_there_are_thirty_and_ten_and_ten_are_of_public_threads():
+    public = {
+        address
+        for file in HANGS
+        for address in re.findall(r'^# From: (https://\S+)$', file.read_text(), re.MULTILINE)
+    }
+    assert len(HANGS) >= 30
+    assert len(SLOW) >= 10
+    assert len(public) >= 10
