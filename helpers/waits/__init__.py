@@ -11,9 +11,13 @@ import threading
 from types import FrameType
 
 from .findings import Finding, find
+from .sentences import sentences
 from .snapshot import Snapshot
 
-__all__ = ['Finding', 'explain', 'find_waits', 'what_waits']
+__all__ = ['NOTHING', 'Finding', 'explain', 'explain_interrupt', 'find_waits', 'what_waits']
+
+MOST = 3
+NOTHING = 'Nothing waits for anything that is known.'
 
 
 def find_waits(main_frame: FrameType | None = None) -> list[Finding]:
@@ -26,21 +30,37 @@ def find_waits(main_frame: FrameType | None = None) -> list[Finding]:
     return find(Snapshot(main_frame, () if main_frame is not None else (own,)))
 
 
-def explain(main_frame: FrameType | None = None, most: int = 3) -> str:
-    """Return what waits as text, '' if nothing does. `main_frame` as in `find_waits`."""
-    from .sentences import sentences
-
-    found = find_waits(main_frame)
-    shown = [finding for finding in found if finding.stuck]
+def explain(most: int = MOST) -> str:
+    """Return what waits as text, '' if nothing does: what is stuck first, `most` waits at most."""
+    found = find_waits()
+    stuck = [one for one in found if one.stuck]
     main = [one for one in found if one.activity.thread is threading.main_thread()]
-    shown += [one for one in main if one not in shown]
-    shown += [one for one in found if one.activity.task is not None and one not in shown]
-    lines = [line for finding in shown[:most] for line in sentences(finding)]
-    if len(shown) > most:
-        lines.append(f'{len(shown) - most} more wait.')
+    callbacks = [one for one in found if one.activity.task is not None]
+    return _text([*dict.fromkeys([*stuck, *main, *callbacks])], most)
+
+
+def explain_interrupt(frame: FrameType | None) -> str:
+    """Return what kept the main thread waiting when a signal came, in this frame; or ''.
+
+    A cell that computes is not told about threads that wait for their next work.
+    """
+    found = find_waits(frame)
+    main = [one for one in found if one.activity.thread is threading.main_thread()]
+    stuck = [one for one in found if one.stuck and (main or one.activity.task is not None)]
+    return _text([*dict.fromkeys([*stuck, *main])], MOST)
+
+
+def _text(findings: list[Finding], most: int) -> str:
+    lines = [line for finding in findings[:most] for line in sentences(finding)]
+    if len(findings) > most:
+        lines.append(f'{len(findings) - most} more wait.')
     return '\n'.join(lines)
 
 
 def what_waits() -> None:
-    """Print what waits in this process, for what, and what would help."""
-    print(explain() or 'Nothing waits for anything that is known.')
+    """Print what waits in this process, for what, why it does not come, and what would help.
+
+    While a cell hangs, ask from a console of a subshell: a right click on the notebook, *New
+    Subshell Console for Notebook*.
+    """
+    print(explain() or NOTHING)

@@ -46,10 +46,10 @@ def say() -> None:
     # Not before it is asked: to import rclpy is the program's affair. A folder that runs as a
     # program has no package around it.
     try:
-        from helpers.waits import explain
+        from helpers.waits import NOTHING, explain
     except ImportError:
-        from waits import explain
-    print(explain() or 'Nothing waits for anything that is known.', file=sys.stderr, flush=True)
+        from waits import NOTHING, explain
+    print(explain() or NOTHING, file=sys.stderr, flush=True)
 
 
 def main(arguments: list[str]) -> None:

@@ -122,11 +122,12 @@ def _enders_of(
     for node, entity in snapshot.entities():
         if _is(change, code_of(callback_of(entity))):
             stops = _stops(snapshot, node, entity)
-            running = [one for one in snapshot.activities if one.entity is entity]
-            now = f'it is at {place_of(running[0])}' if running and place_of(running[0]) else ''
-            if any(one is waiter for one in running):
-                stops, now = (_itself(waiter),), ''
-            result.append(Ender(f'{name_of(snapshot, entity)}, {does}', stops, now))
+            runs = [one for one in snapshot.activities if one.entity is entity]
+            if any(one is waiter for one in runs):
+                stops, runs = (_itself(waiter),), []
+            text = f'{name_of(snapshot, entity)}, {does}'
+            # What runs is the work itself: its own wait is all that can keep it.
+            result.append(_at_work(text, runs[0]) if runs else Ender(text, stops))
     result += _done_callbacks(snapshot, change, does)
     for activity in snapshot.activities:
         if activity.entity is not None and result:
@@ -144,7 +145,7 @@ def _enders_of(
                 continue
             name = activity.thread.name if activity.thread else 'a coroutine'
             text = f'{change.name} in the thread {name}, {does}'
-            result.append(Ender(text, (), f'it is at {place_of(activity)}'))
+            result.append(_at_work(text, activity))
     if result or depth == 0 or not getattr(change.function, 'name', ''):
         return result
     for filename in _files(snapshot):
@@ -156,6 +157,11 @@ def _enders_of(
                 caller = Change(filename, function, thing.lineno)
                 result += _enders_of(snapshot, waiter, caller, f'call {change.name}', depth - 1)
     return result
+
+
+def _at_work(text: str, activity: Activity) -> Ender:
+    place = place_of(activity)
+    return Ender(text, (), f'it is at {place}' if place else '', activity)
 
 
 def _in_loop(frame, line: int) -> bool:

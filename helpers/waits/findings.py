@@ -120,6 +120,14 @@ class Look:
                 self.open.remove(activity)
         return self.known[activity]
 
+    def _changers(self, waiter: Activity, *what: object) -> list[Ender]:
+        return list(map(self._at_work, enders(self.snapshot, waiter, *what)))
+
+    def _at_work(self, ender: Ender) -> Ender:
+        """Add why the code that works on the end of a wait does not come to it."""
+        stops = self._stops(ender.activity) if ender.activity is not None else ()
+        return replace(ender, blockers=stops) if stops else ender
+
     def _stops(self, activity: Activity) -> tuple[Blocker, ...]:
         """Return why something that runs does not come to its end: it waits itself."""
         for one in self.snapshot.activities:
@@ -168,10 +176,7 @@ class Look:
 
     def _answer(self, activity: Activity, client: object, limited: bool = False) -> Finding:
         what = f'the answer of {_server_of(client)}'
-        found = [
-            replace(ender, blockers=self._stops(ender.activity)) if ender.activity else ender
-            for ender in server_enders(self.snapshot, client)
-        ]
+        found = list(map(self._at_work, server_enders(self.snapshot, client)))
         return Finding(activity, _kind(client), what, found, True, limited)
 
     def result(self, activity: Activity, frame: FrameType) -> Finding:
@@ -312,9 +317,7 @@ class Look:
             what = f'{what} ({reading.text_of(owner)})'
         found = changes(self.snapshot, name, methods) if name else []
         verb = f'call {name}.{min(methods, key=len)}()'
-        return Finding(
-            activity, kind, what, enders(self.snapshot, activity, found, verb), limited=limited
-        )
+        return Finding(activity, kind, what, self._changers(activity, found, verb), limited=limited)
 
     def join(self, activity: Activity, frame: FrameType) -> Finding:
         thread = frame.f_locals['self']
@@ -392,7 +395,7 @@ class Look:
         methods = {'set_result', 'set_exception', 'cancel'}
         found = changes(self.snapshot, name, methods) if name else []
         what = f'a future to be done ({name})' if name else 'a future to be done'
-        ends = enders(self.snapshot, activity, found, 'finish it')
+        ends = self._changers(activity, found, 'finish it')
         return Finding(activity, 'future', what, ends)
 
     def _task(self, activity: Activity, task: Task) -> Finding:
@@ -460,7 +463,7 @@ class Look:
             ends.append(self._leaves(activity, other, where))
         if not ends:
             found = changes(self.snapshot, reading.last_name(expression), {'release'})
-            ends = enders(self.snapshot, activity, found, 'release it')
+            ends = self._changers(activity, found, 'release it')
             name += '; no `with` that runs now holds it, so somebody has called acquire()'
         return Finding(activity, 'lock', f'a lock ({name})', ends)
 
@@ -514,7 +517,7 @@ class Look:
                 return self._future(activity, thing, name)
             if isinstance(thing, threading.Event) and not thing.is_set():
                 sets = changes(self.snapshot, name, {'set'})
-                found = enders(self.snapshot, activity, sets, f'call {name}.set()')
+                found = self._changers(activity, sets, f'call {name}.set()')
                 return Finding(activity, 'event', f'an Event to be set ({name})', found)
             if isinstance(thing, Client | ActionClient) and method in PEER_METHODS:
                 return self._server(activity, thing)
@@ -537,7 +540,7 @@ class Look:
                 continue
             ends = [
                 *methods_of(self.snapshot, value),
-                *enders(self.snapshot, activity, found),
+                *self._changers(activity, found),
             ]
             if ends:
                 what = f'`{reading.text_of(atom)}` to change'

@@ -131,10 +131,10 @@ def sentences(finding: Finding) -> list[str]:
         lines.append('  This wait has a time-out.')
     if not finding.enders:
         lines.append('  Who could end this wait cannot be seen.')
-    for ender in finding.enders:
-        lines += _of_ender(ender, finding.limited)
+    for enders in _alike(finding.enders):
+        lines += _of_enders(enders, finding.limited)
     if finding.stuck:
-        lines += cures(finding)[:2]
+        lines += cures(finding)
     elif finding.enders and not finding.limited and finding.kind != 'spin':
         lines.append('  Nothing was found that keeps this from coming.')
     return lines
@@ -145,30 +145,45 @@ def _capital(name: str) -> str:
     return name if name.endswith('()') else f'{name[0].upper()}{name[1:]}'
 
 
-def _of_ender(ender: Ender, limited: bool) -> list[str]:
-    if ender.blockers:
-        why = '; '.join(dict.fromkeys(blocker.text for blocker in ender.blockers))
-        return [f'  - {ender.text}.', f'    {"Not now" if limited else "It cannot"}: {why}.']
-    if ender.now:
-        return [f'  - {ender.text}: {ender.now}.']
-    return [f'  - {ender.text}.']
+def _alike(enders: list[Ender]) -> list[list[Ender]]:
+    """Return the enders in groups: those that the same keeps from running are told together."""
+    groups: list[list[Ender]] = []
+    for ender in enders:
+        alike = [group for group in groups if group[0].blockers and _same(group[0], ender)]
+        if alike:
+            alike[0].append(ender)
+        else:
+            groups.append([ender])
+    return groups
+
+
+def _same(one: Ender, other: Ender) -> bool:
+    return {blocker.text for blocker in one.blockers} == {b.text for b in other.blockers}
+
+
+def _of_enders(enders: list[Ender], limited: bool) -> list[str]:
+    lines = [f'  - {ender.text}{f": {ender.now}" if ender.now else ""}.' for ender in enders]
+    if enders[0].blockers:
+        lines = [f'  - {ender.text}.' for ender in enders]
+        why = '; '.join(dict.fromkeys(blocker.text for blocker in enders[0].blockers))
+        cannot = 'It cannot' if len(enders) == 1 else 'They cannot'
+        lines.append(f'    {"Not now" if limited else cannot}: {why}.')
+    return lines
 
 
 def cures(finding: Finding) -> list[str]:
-    """Return what helps, one line for each cause that is known."""
-    return [
-        f'  What helps: {text} (lesson "{lesson}")'
-        for cause, kinds, text, lesson in _applying(finding)
-    ]
+    """Return what helps, one line for each cause that is known, two at most."""
+    return [f'  What helps: {text} (lesson "{lesson}")' for text, lesson in _applying(finding)[:2]]
 
 
-def _applying(finding: Finding) -> list[tuple]:
-    found, causes = [], set()
-    for cure in CURES:
-        cause, kinds, *_ = cure
-        if cause in finding.causes and cause not in causes and (not kinds or finding.kind in kinds):
-            causes.add(cause)
-            found.append(cure)
+def _applying(finding: Finding) -> list[tuple[str, str]]:
+    causes = finding.causes
     if 'spin in callback' in causes:
-        found = [cure for cure in found if cure[0] == 'spin in callback']
-    return found
+        causes = {'spin in callback'}
+    if {'thread', 'group'} <= causes:
+        causes = causes - {'group'}  # what frees the thread frees the group
+    found = {}
+    for cause, kinds, text, lesson in CURES:
+        if cause in causes and (not kinds or finding.kind in kinds):
+            found.setdefault(cause, (text, lesson))
+    return list(found.values())

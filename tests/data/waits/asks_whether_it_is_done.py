@@ -1,7 +1,7 @@
 # A callback asks in a loop whether the future is done.
 # From: https://github.com/cyberbotics/webots_ros2/issues/785
 # Says: step() asks again and again for the answer of the service send.
-# Says: It cannot: step() holds the only thread of its executor; step() holds its callback group.
+# Says: cannot: step() holds the only thread of its executor; step() holds its callback group.
 import time
 
 import rclpy

@@ -1,6 +1,6 @@
 # `await` gives the thread back, and not the group.
 # Says: tick() awaits the answer of the service look.
-# Says: It cannot: tick() holds its callback group (an `await` does not give it back).
+# Says: cannot: tick() holds its callback group (an `await` does not give it back).
 # Says: Give the client a group of its own
 import rclpy
 from rclpy.node import Node

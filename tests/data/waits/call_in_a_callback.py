@@ -2,7 +2,7 @@
 # From: https://github.com/ros2/rclpy/issues/567
 # Says: measure() waits for the answer of the service device.
 # Says: line 23: answer = self.client.call(Trigger.Request())
-# Says: It cannot: measure() holds the only thread of its executor
+# Says: cannot: measure() holds the only thread of its executor
 # Says: call_async()
 import rclpy
 from rclpy.node import Node

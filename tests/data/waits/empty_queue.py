@@ -1,7 +1,7 @@
 # A callback takes out of a queue that a callback of its own group fills.
 # Says: show() waits for something in a queue that is empty (self.lines).
 # Says: hear(), for messages on /line of the node printer, would call lines.put()
-# Says: It cannot: show() holds its callback group
+# Says: cannot: show() holds its callback group
 import queue
 
 import rclpy

@@ -1,7 +1,7 @@
 # A callback waits for an Event that another callback of the same thread sets.
 # Says: plan() waits for an Event to be set (self.has_scan).
 # Says: scan(), for messages on /scan of the node planner, would call has_scan.set()
-# Says: It cannot: plan() holds the only thread of its executor
+# Says: cannot: plan() holds the only thread of its executor
 # Says: Let the callback return
 import threading
 

@@ -1,7 +1,7 @@
 # A callback puts into a queue that is full, and the one that takes out has the same thread.
 # Says: image() waits for room in a queue that is full (1) (self.images).
 # Says: draw(), of a timer of the node viewer, would call images.get()
-# Says: It cannot: image() holds the only thread of its executor
+# Says: cannot: image() holds the only thread of its executor
 import queue
 
 import rclpy

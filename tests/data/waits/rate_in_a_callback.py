@@ -1,7 +1,7 @@
 # A Rate in a callback: its timer needs the thread that the callback holds.
 # From: https://github.com/ros2/geometry2/issues/327
 # Says: drive() waits for the next time of a Rate.
-# Says: It cannot: drive() holds the only thread of its executor.
+# Says: cannot: drive() holds the only thread of its executor.
 # Says: use a timer in place of a Rate
 import rclpy
 from rclpy.node import Node

@@ -1,7 +1,7 @@
 # Several threads, and the client in the group of the callback that calls.
 # From: https://github.com/ros2/rclpy/issues/1028
 # Says: the answer of the service test_service
-# Says: It cannot: tick() holds its callback group.
+# Says: cannot: tick() holds its callback group.
 # Says: Give the client a group of its own
 import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup

@@ -1,7 +1,7 @@
 # spin_until_future_complete() in a callback: the client's group is held.
 # From: https://github.com/ros2/rclpy/issues/1313
 # Says: execute() waits for the answer of the service look.
-# Says: It cannot: execute() holds its callback group
+# Says: cannot: execute() holds its callback group
 # Says: Do not spin in a callback
 import rclpy
 from rclpy.node import Node
