@@ -152,7 +152,7 @@ def test_an_interrupted_cell_says_what_waited():
     with Interrupting() as kernel:
         kernel.run(CELL)
         said = error_of(kernel)
-        assert said.startswith('Interrupted. Line 25: session.wait_until(lambda: answers)')
+        assert said.startswith('Interrupted. Line 22: session.wait_until(lambda: answers)')
         assert 'ask() waits for the answer of the service look.' in said
         assert 'They cannot: ask() holds the only thread of its executor' in said
         assert 'It cannot: it waits for the answer of the service look' in said
