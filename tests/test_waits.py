@@ -131,12 +131,14 @@ with ros_session() as session:
 
 
 class Interrupting(Kernel):
-    """A kernel that is interrupted when its cell has printed something."""
+    """A kernel that is interrupted a moment after its cell has said that it hangs."""
+
+    wait_s = 1.0
 
     def process_message(self, msg, cell, cell_index):
         if 'now it hangs' in str(msg['content'].get('text', '')):
             send = self.km.provisioner.process.send_signal
-            threading.Timer(1.0, send, [signal.SIGINT]).start()  # until it waits
+            threading.Timer(self.wait_s, send, [signal.SIGINT]).start()
         return super().process_message(msg, cell, cell_index)
 
 
@@ -156,6 +158,30 @@ def test_an_interrupted_cell_says_what_waited():
         assert 'ask() waits for the answer of the service look.' in said
         assert 'They cannot: ask() holds the only thread of its executor' in said
         assert 'It cannot: it waits for the answer of the service look' in said
+
+
+def test_a_kernel_is_asked_while_its_cell_hangs():
+    class Asking(Interrupting):
+        said, wait_s = '', 15.0
+
+        def process_message(self, msg, cell, cell_index):
+            if 'now it hangs' in str(msg['content'].get('text', '')):
+                threading.Thread(target=self._ask).start()
+            return super().process_message(msg, cell, cell_index)
+
+        def _ask(self):
+            file = self.km.connection_file
+            command = [sys.executable, '-m', 'helpers.waits', '--kernel', file]
+            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+            self.said = done.stdout + done.stderr
+
+    with Asking() as kernel:
+        kernel.run(CELL.replace('it hangs', 'it hangs, and is asked'))
+        end = time.monotonic() + TIMEOUT_S
+        while not kernel.said and time.monotonic() < end:
+            time.sleep(0.1)
+        assert 'ask() waits for the answer of the service look.' in kernel.said
+        assert 'They cannot: ask() holds the only thread of its executor' in kernel.said
 
 
 def test_an_interrupted_cell_that_computes_says_nothing_more():

@@ -11,13 +11,12 @@ import threading
 from types import FrameType
 
 from .findings import Finding, find
-from .sentences import sentences
+from .sentences import NOTHING, sentences
 from .snapshot import Snapshot
 
 __all__ = ['NOTHING', 'Finding', 'explain', 'explain_interrupt', 'find_waits', 'what_waits']
 
 MOST = 3
-NOTHING = 'Nothing waits for anything that is known.'
 
 
 def find_waits(main_frame: FrameType | None = None) -> list[Finding]:
@@ -60,7 +59,8 @@ def _text(findings: list[Finding], most: int) -> str:
 def what_waits() -> None:
     """Print what waits in this process, for what, why it does not come, and what would help.
 
-    While a cell hangs, ask from a console of a subshell: a right click on the notebook, *New
-    Subshell Console for Notebook*.
+    While a cell hangs, ask from a console of a subshell (in JupyterLab a right click on the
+    notebook, *New Subshell Console for Notebook*), or in a terminal with
+    `python -m helpers.waits --kernel`.
     """
     print(explain() or NOTHING)

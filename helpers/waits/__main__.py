@@ -2,7 +2,8 @@ r"""Say what waits in a program: `python3 -m waits node.py`, then Ctrl+\ in its 
 
 Ctrl+\ is the signal QUIT; `kill -QUIT PID` sends it from another terminal. The program goes on, and
 what waits is printed on its stderr. `ros2 run --prefix 'python3 -m waits' PACKAGE PROGRAM` does the
-same for a program of a package.
+same for a program of a package. `python3 -m helpers.waits --kernel` asks the kernel of a notebook
+whose cell hangs.
 
 Why a signal, and not py-spy? Tried on a call in a callback: `py-spy dump --locals` shows each line,
 and `entity: <Timer at 0x7ff7>`, but no name of a service, no group, no executor's nodes, and it
@@ -54,8 +55,13 @@ def say() -> None:
 
 def main(arguments: list[str]) -> None:
     """Run a program as Python does, and answer signals meanwhile."""
+    if arguments[:1] == ['--kernel'] and len(arguments) <= 2:
+        from helpers.waits.kernels import ask_kernel
+
+        print(ask_kernel(*arguments[1:]))
+        return
     if not arguments or arguments[0].startswith('-'):
-        sys.exit('Use: python3 -m waits PROGRAM [ARGUMENTS ...]')
+        sys.exit('Use: python3 -m waits PROGRAM [ARGUMENTS ...], or --kernel [CONNECTION_FILE]')
     sys.path.append(str(HERE.parent))
     answer_signals()
     print(f'Ctrl+\\\\ or `kill -QUIT {os.getpid()}` says what waits.', file=sys.stderr, flush=True)
