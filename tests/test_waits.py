@@ -6,6 +6,7 @@ public thread with a program of this form. Those whose name begins with `slow` m
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,6 +16,9 @@ from pathlib import Path
 
 import pytest
 from support.kernel import Kernel
+
+from helpers.lesson import outlines
+from helpers.waits.sentences import CURES
 
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAMS = sorted((ROOT / 'tests/data/waits').glob('*.py'))
@@ -27,16 +31,16 @@ ACCUSES = re.compile('(It|They) cannot:')
 class Asked:
     """A program that runs below `python -m helpers.waits`, and is asked what waits."""
 
-    def __init__(self, file, command=('-m', 'helpers.waits')):
+    def __init__(self, file, command=('-m', 'helpers.waits'), path=str(ROOT)):
         self.said, self.news = '', threading.Condition()
-        variables = dict(os.environ, PYTHONUNBUFFERED='1', PYTHONPATH=str(ROOT))
+        variables = dict(os.environ, PYTHONUNBUFFERED='1', PYTHONPATH=path)
         self.process = subprocess.Popen(
             [sys.executable, *command, str(file)],
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
             env=variables,
-            cwd=ROOT,
+            cwd=path or '/',
         )
         self.reader = threading.Thread(target=self._read, daemon=True)
         self.reader.start()
@@ -189,6 +193,22 @@ def test_an_interrupted_cell_that_computes_says_nothing_more():
         kernel.run('import rclpy\nprint("now it " + "hangs", flush=True)\nwhile True:\n    pass')
         assert error_of(kernel).startswith('Interrupted. Line ')
         assert '\n' not in error_of(kernel)
+
+
+def test_what_helps_names_lessons_of_today():
+    assert {lesson for *_, lesson in CURES} <= {lesson.title for lesson in outlines()}
+
+
+def test_a_folder_that_was_copied_works_beside_any_program(tmp_path, own_domain):
+    """On a robot there are no helpers: only rclpy, and this folder."""
+    folder = shutil.copytree(ROOT / 'helpers/waits', tmp_path / 'waits')
+    program = ROOT / 'tests/data/waits/call_in_a_callback.py'
+    with Asked(program, (str(folder),), path='') as asked:
+        asked.wait(lambda said: 'kill -QUIT' in said)
+        end = time.monotonic() + TIMEOUT_S
+        while ACCUSES.search(asked.said) is None and time.monotonic() < end:
+            asked.ask()
+        assert wanted(program)[0] in asked.said
 
 
 def test_there_are_thirty_and_ten_and_ten_are_of_public_threads():

@@ -6,6 +6,7 @@ Only what was read is said. Code that computes, or sleeps for a while, waits for
 from __future__ import annotations
 
 import ast
+import contextlib
 import queue
 import re
 import subprocess
@@ -20,7 +21,9 @@ from rclpy.action import ActionClient
 from rclpy.action.client import ClientGoalHandle
 from rclpy.client import Client
 from rclpy.clock import Clock
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.publisher import Publisher
 from rclpy.task import Future, Task
 from rclpy.timer import Rate
@@ -56,6 +59,7 @@ from .snapshot import (
 )
 
 LOCKS = (type(threading.Lock()), type(threading.RLock()))
+RCLError = rclpy_implementation.RCLError
 ENDLESS_S = 1e6
 NOT_OF_A_LEARNER = ('/parameter_events', '/rosout', '/clock')
 
@@ -114,10 +118,11 @@ class Look:
     def at(self, activity: Activity) -> Finding | None:
         if activity not in self.known:
             self.open.append(activity)
-            try:
+            self.known[activity] = None
+            # What the program destroys meanwhile is not said: nothing stands still while we look.
+            with contextlib.suppress(InvalidHandle, RCLError):
                 self.known[activity] = self._look(activity)
-            finally:
-                self.open.remove(activity)
+            self.open.remove(activity)
         return self.known[activity]
 
     def _changers(self, waiter: Activity, *what: object) -> list[Ender]:

@@ -1,4 +1,4 @@
-"""Ask a kernel whose cell hangs, in a subshell of it: a thread that ipykernel 7 begins on demand."""
+"""Ask a kernel whose cell hangs, in a subshell: a thread that ipykernel 7 begins on demand."""
 
 from __future__ import annotations
 
