@@ -50,6 +50,9 @@ def explain_interrupt(frame: FrameType | None) -> str:
 
 
 def _text(findings: list[Finding], most: int) -> str:
+    # While a callback is stuck, it is no news that its executor spins, or that others do not run.
+    if any(one.stuck and one.activity.task for one in findings):
+        findings = [one for one in findings if one.kind != 'spin' or one.activity.task]
     lines = [line for finding in findings[:most] for line in sentences(finding)]
     if len(findings) > most:
         lines.append(f'{len(findings) - most} more wait.')

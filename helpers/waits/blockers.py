@@ -111,7 +111,7 @@ def place_of(activity: Activity) -> str:
     inner = '' if len(own) == 1 else f' of {frame.f_code.co_name}()'
     if frame.f_code.co_name in ('<lambda>', '<module>'):
         inner = ''
-    return f'line {frame.f_lineno}{inner}: {reading.line_of(frame)}'
+    return f'line {frame.f_lineno}{inner}: {reading.line_of(frame).rstrip(":")}'
 
 
 # --- What keeps a callback from running
@@ -148,14 +148,15 @@ def _of_executor(snapshot: Snapshot, node: Node, entity: object) -> list[Blocker
     held = snapshot.held_by(executor)
     # A callback that runs for this very entity is the work, and not in its way.
     if held and all(one.entity is not entity for one in held):
-        return [_of_threads(threads_of(executor), held)]
+        return [of_threads(threads_of(executor), held)]
     return []
 
 
-def _of_threads(count: int, held: list[Activity]) -> Blocker:
+def of_threads(count: int, held: list[Activity]) -> Blocker:
     names = sorted({name_of_activity(one) for one in held})
     only = 'the only thread' if count == 1 else f'each of the {count} threads'
-    return Blocker('thread', f'{", ".join(names)} holds {only} of its executor')
+    hold = 'holds' if len(names) == 1 else 'hold'
+    return Blocker('thread', f'{", ".join(names)} {hold} {only} of its executor')
 
 
 def _of_group(snapshot: Snapshot, entity: object) -> list[Blocker]:

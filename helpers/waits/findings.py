@@ -39,6 +39,7 @@ from .blockers import (
     name_of_activity,
     nearly,
     of_clock,
+    of_threads,
     of_topic,
     place_of,
     server_enders,
@@ -409,10 +410,7 @@ class Look:
         if executor is None or not self.snapshot.spinners(executor):
             stops = [Blocker('not spun', 'nobody spins its executor')]
         elif held := [one for one in self.snapshot.held_by(executor) if one.task is not task]:
-            names = ', '.join(sorted({name_of_activity(one) for one in held}))
-            count = threads_of(executor)
-            only = 'the only thread' if count == 1 else f'each of the {count} threads'
-            stops = [Blocker('thread', f'{names} holds {only} of the executor')]
+            stops = [of_threads(threads_of(executor), held)]
         else:
             inner = [one for one in self.snapshot.activities if one.task is task and one.innermost]
             for one in inner:

@@ -29,14 +29,14 @@ CURES = (
     ),
     (
         'thread',
-        ('service', 'action', 'future'),
+        ('service', 'action'),
         'Hold no thread: call_async() and a done callback, or `await`. Or give the executor one '
         'thread more, MultiThreadedExecutor(num_threads=...), and the client a group of its own.',
         ASK,
     ),
     (
         'group',
-        ('service', 'action', 'future'),
+        ('service', 'action'),
         'Give the client a group of its own: create_client(..., callback_group='
         'MutuallyExclusiveCallbackGroup()). Or use call_async() and a done callback.',
         ASK,
@@ -79,7 +79,12 @@ CURES = (
     ('type', (), 'Use one type on both sides: ros2 topic info shows it.', PUBLISH),
     ('clock', (), 'Publish /clock, or set use_sim_time to false.', TIME),
     ('canceled', (), 'Start the timer again: timer.reset().', TIME),
-    ('circle', (), 'Take two locks in the same order everywhere, or use only one.', PARALLEL),
+    (
+        'circle',
+        ('lock',),
+        'Take two locks in the same order everywhere, or use one.',
+        PARALLEL,
+    ),
     (
         'itself',
         ('lock',),

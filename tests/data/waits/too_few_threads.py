@@ -1,6 +1,6 @@
 # Two callers hold both threads, so nobody is left for the server.
 # Says: the answer of the service look
-# Says: holds each of the 2 threads of its executor
+# Says: hold each of the 2 threads of its executor
 # Says: MultiThreadedExecutor(num_threads=...)
 import rclpy
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
