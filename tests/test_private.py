@@ -65,6 +65,8 @@ def owners():
         'a Condition': threading.Condition(),
         'a ThreadPoolExecutor': ThreadPoolExecutor(),
         'sys': sys,
+        'threading': threading,
+        'concurrent.futures.thread': thread,
         'a kernel': Kernel,
         'an error that IPython shows': SimpleNamespace(
             **dict.fromkeys(re.findall(r'value\.(_\w+_)\(', inspect.getsource(interactiveshell)))
@@ -138,7 +140,9 @@ def used(things):
                 continue
             case ast.Attribute(attr=name) | ast.Constant(value=str(name)):
                 names.add((thing.end_lineno, name))
-            case ast.ImportFrom(module=module, names=imported) if not module.startswith('helpers.'):
+            case ast.ImportFrom(module=str(module), names=imported, level=0) if (
+                not module.startswith('helpers.')
+            ):
                 parts = [*module.split('.'), *(alias.name for alias in imported)]
                 names.update((thing.lineno, part) for part in parts)
             case ast.Import(names=imported):

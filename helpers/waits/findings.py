@@ -46,6 +46,7 @@ from .blockers import (
 )
 from .changers import changes, enders, methods_of
 from .snapshot import (
+    ENDS,
     SPINS,
     Activity,
     Snapshot,
@@ -368,8 +369,7 @@ class Look:
         """Look at a main thread that has come to its end, and waits for other threads."""
         if activity.thread is not threading.main_thread():
             return None
-        names = {frame.f_code.co_name for frame in activity.stack}
-        if not names & {'_shutdown', '_python_exit'}:
+        if not any(frame.f_code in ENDS for frame in activity.stack):
             return None
         left = [
             thread

@@ -8,6 +8,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import thread as thread_pool
 from dataclasses import dataclass, field
 from types import CodeType, FrameType
 
@@ -33,6 +34,10 @@ SPINS = {
 }
 # private: an action server, rclpy 7.1.6
 EXECUTES_GOAL = {ActionServer._execute_goal.__code__}
+# private: threading, Python 3.11.7
+ENDS = {threading._shutdown.__code__}
+# private: concurrent.futures.thread, Python 3.11.7
+ENDS.add(thread_pool._python_exit.__code__)
 RUNS_TASK = Task.__call__.__code__
 
 
