@@ -23,9 +23,12 @@ import rclpy
 from ipykernel.comm.comm import BaseComm
 from ipykernel.kernelbase import Kernel
 from IPython.core import interactiveshell
-from rclpy.action import ActionClient
+from rclpy.action import ActionClient, ActionServer
+from rclpy.action.client import ClientGoalHandle
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.executors import MultiThreadedExecutor
 from rclpy.lifecycle import LifecycleNode
+from rclpy.task import Future, Task
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
@@ -53,8 +56,17 @@ def owners():
         'a client': node.create_client(Trigger, 'look'),
         'a lifecycle node': LifecycleNode('lifecycle', context=context),
         'an action client': ActionClient(node, Fibonacci, 'patrol'),
+        'an action server': ActionServer(node, Fibonacci, 'patrol', print),
+        'a goal handle': ClientGoalHandle,
+        'a MutuallyExclusiveCallbackGroup': MutuallyExclusiveCallbackGroup(),
+        'a future': Future(),
+        'a task': Task(print),
+        'a rate': node.create_rate(1),
+        'a Condition': threading.Condition(),
         'a ThreadPoolExecutor': ThreadPoolExecutor(),
         'sys': sys,
+        'threading': threading,
+        'concurrent.futures.thread': thread,
         'a kernel': Kernel,
         'an error that IPython shows': SimpleNamespace(
             **dict.fromkeys(re.findall(r'value\.(_\w+_)\(', inspect.getsource(interactiveshell)))
@@ -128,7 +140,9 @@ def used(things):
                 continue
             case ast.Attribute(attr=name) | ast.Constant(value=str(name)):
                 names.add((thing.end_lineno, name))
-            case ast.ImportFrom(module=module, names=imported) if not module.startswith('helpers.'):
+            case ast.ImportFrom(module=str(module), names=imported, level=0) if (
+                not module.startswith('helpers.')
+            ):
                 parts = [*module.split('.'), *(alias.name for alias in imported)]
                 names.update((thing.lineno, part) for part in parts)
             case ast.Import(names=imported):

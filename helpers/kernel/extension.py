@@ -1,10 +1,13 @@
-"""The extension: `!ros2` is found, an Interrupt ends a `!command`, a missing name is explained."""
+"""The extension: `!ros2` is found, an Interrupt says what waited, a missing name is explained."""
 
 from __future__ import annotations
 
+import contextlib
 import linecache
 import os
+import signal
 import sys
+import threading
 from subprocess import CalledProcessError
 from traceback import walk_tb
 from types import FrameType, TracebackType
@@ -22,11 +25,14 @@ OF_FIRST_CELLS = 'helpers.ros.session', 'helpers.workspace'
 def load_ipython_extension(shell) -> None:
     """Let `!ros2` be found, and a name or a magic that is missing say what to run.
 
-    An Interrupt of a `!command` ends its cell. That of any cell is one line.
+    An Interrupt of a `!command` ends its cell. That of any cell is one line; if the cell or a
+    callback waited for something, lines below it say for what, and why it has not come.
     """
     commands, path = os.path.join(sys.prefix, 'bin'), os.environ.get('PATH', os.defpath)
     if commands not in path.split(os.pathsep):
         os.environ['PATH'] = f'{commands}{os.pathsep}{path}'
+
+    waits = _watch_interrupts(shell)
 
     def explain(shell, kind, error, traceback, tb_offset=None) -> None:
         if kind is KeyboardInterrupt and not _breaks_kernel(traceback):
@@ -34,7 +40,7 @@ def load_ipython_extension(shell) -> None:
                 (frame.f_code.co_filename, number) for frame, number in _frames(traceback)
             )
             # private: an error that IPython shows, IPython 9.18
-            error._render_traceback_ = lambda: [f'Interrupted. {line}'.strip()]
+            error._render_traceback_ = lambda: [f'Interrupted. {line}'.strip(), *waits]
         shell.showtraceback((kind, error, traceback), tb_offset=tb_offset)
         if kind is KeyboardInterrupt:
             return
@@ -60,8 +66,39 @@ def load_ipython_extension(shell) -> None:
     shell.system = run
 
 
+def _watch_interrupts(shell) -> list[str]:
+    """Return a list that has, after an Interrupt of a cell, lines on what waited at that moment.
+
+    Afterwards it is too late to look: the `with` blocks of the cell have ended all that ran.
+    """
+    lines: list[str] = []
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        # Nothing must keep an Interrupt from ending the cell. Where no ROS is, nothing is known.
+        if 'rclpy' in sys.modules:
+            with contextlib.suppress(Exception):
+                from helpers.waits import explain_interrupt
+
+                lines[:] = explain_interrupt(frame).splitlines()
+        signal.default_int_handler(number, frame)
+
+    def begin(*_) -> None:
+        lines.clear()
+        main = threading.current_thread() is threading.main_thread()
+        if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, interrupt)  # ipykernel sets its own after the cell
+
+    shell.events.register('pre_run_cell', begin)
+    _begins[shell] = begin
+    return lines
+
+
+_begins: dict[object, object] = {}
+
+
 def unload_ipython_extension(shell) -> None:
     """Let the shell be as IPython has it."""
+    shell.events.unregister('pre_run_cell', _begins.pop(shell))
     shell.set_custom_exc((), None)
     del shell.system
 

@@ -27,6 +27,7 @@ The grammar of a lesson:
     lesson     `Lesson`, `Task`, `Guess`
     files      the notebooks of a folder, and those that somebody names
     mentions   how texts mention lessons and tasks
+    messages   the messages of errors that a lesson makes or names
     earlier    the names of tasks that version 0.3 knew by their numbers
 """
 
@@ -91,6 +92,7 @@ from helpers.lesson.mentions import (
     write_next,
     write_numbers,
 )
+from helpers.lesson.messages import Message, messages
 
 __all__ = [
     'CHECK_BEGINS',
@@ -107,6 +109,7 @@ __all__ = [
     'WRITTEN',
     'Guess',
     'Lesson',
+    'Message',
     'Node',
     'Task',
     'bare_mentions',
@@ -131,6 +134,7 @@ __all__ = [
     'kept_solution',
     'lessons',
     'links_to_tasks',
+    'messages',
     'minutes_of_note',
     'names_of_memory',
     'outline',

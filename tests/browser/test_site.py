@@ -44,7 +44,7 @@ def test_a_lesson_is_downloaded_as_it_is():
         assert (SITE / 'notebooks' / path.name).read_bytes() == path.read_bytes()
 
 
-@pytest.mark.parametrize('name', ['index.html', *LESSONS, 'teaching.html'])
+@pytest.mark.parametrize('name', ['index.html', *LESSONS, 'messages.html', 'teaching.html'])
 def test_a_page_fits_its_screens(file_page, artefacts, axe, name):
     with file_page(1280, 740) as tab:
         tab.goto((SITE / name).as_uri())
@@ -172,3 +172,16 @@ def test_paper_has_the_text_and_nothing_else(file_page, artefacts):
         assert tab.locator('h1').first.is_visible()
         assert tab.evaluate(CUT_OFF) == []
         tab.screenshot(path=artefacts / 'site_print.png')
+
+
+def test_a_message_with_names_of_mine_is_found(file_page):
+    mine = (
+        'RCLError: Failed to create publisher: topic rt/scan with incompatible type'
+    )
+    with file_page(1280, 740) as tab:
+        tab.goto((SITE / 'messages.html').as_uri())
+        tab.get_by_label('Your message').fill(mine)
+        assert '01 Publish and subscribe' in tab.locator('tbody tr').first.inner_text()
+        tab.get_by_label('Your message').fill('all is well')
+        assert tab.locator('tbody tr').count() == 0
+        assert 'No lesson has this message' in tab.locator('.find-message output').inner_text()

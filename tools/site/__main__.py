@@ -28,7 +28,7 @@ from helpers.lesson import (
 )
 from helpers.notebook import LOOK_CSS
 from helpers.replay import level
-from tools.site import free_drive
+from tools.site import free_drive, messages
 from tools.site.page import PLAY_AGAIN, page_of
 
 HERE = Path(__file__).parent
@@ -77,6 +77,7 @@ def prepare(pages: Path) -> None:
         (pages / name).parent.mkdir(parents=True, exist_ok=True)
         text = (ROOT / f'{name}.md').read_text(encoding='utf-8')
         (pages / f'{name}.md').write_text(_as_page(text, Path(name).parent), encoding='utf-8')
+    (pages / f'{messages.NAME}.md').write_text(messages.page(known), encoding='utf-8')
     for file in _linked(pages):
         (pages / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / file, pages / file)
@@ -117,6 +118,7 @@ def _parts(known: list[Lesson]) -> dict[str, list[str]]:
     for lesson in known:
         part = names.get(lesson.number) or lesson.part.capitalize()
         parts.setdefault(part, []).append(f'notebooks/{Path(lesson.file).stem}')
+    parts['Terms'].append(messages.NAME)
     return parts | {'Documents': list(DOCUMENTS)}
 
 

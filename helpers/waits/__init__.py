@@ -1,0 +1,69 @@
+"""What waits, for what, who could end that, and why that one cannot: of any rclpy program.
+
+It reads what is there (frames of threads, coroutines, executors, callback groups, the graph), when
+it is asked. Nothing is prepared, and no code of the learner runs. It needs only rclpy: a copy of
+this folder works beside any program, `python3 -m waits node.py`.
+"""
+
+from __future__ import annotations
+
+import threading
+from types import FrameType
+
+from .findings import Finding, find
+from .sentences import NOTHING, sentences
+from .snapshot import Snapshot
+
+__all__ = ['NOTHING', 'Finding', 'explain', 'explain_interrupt', 'find_waits', 'what_waits']
+
+MOST = 3
+
+
+def find_waits(main_frame: FrameType | None = None) -> list[Finding]:
+    """Return what waits in this process, what is stuck first, but for the thread that asks.
+
+    With `main_frame` it is the main thread that asks, in a signal handler, and this is the frame in
+    which the signal found it.
+    """
+    own = threading.get_ident()
+    return find(Snapshot(main_frame, () if main_frame is not None else (own,)))
+
+
+def explain(most: int = MOST) -> str:
+    """Return what waits as text, '' if nothing does: what is stuck first, `most` waits at most."""
+    found = find_waits()
+    stuck = [one for one in found if one.stuck]
+    main = [one for one in found if one.activity.thread is threading.main_thread()]
+    callbacks = [one for one in found if one.activity.task is not None]
+    return _text([*dict.fromkeys([*stuck, *main, *callbacks])], most)
+
+
+def explain_interrupt(frame: FrameType | None) -> str:
+    """Return what kept the main thread waiting when a signal came, in this frame; or ''.
+
+    A cell that computes is not told about threads that wait for their next work.
+    """
+    found = find_waits(frame)
+    main = [one for one in found if one.activity.thread is threading.main_thread()]
+    stuck = [one for one in found if one.stuck and (main or one.activity.task is not None)]
+    return _text([*dict.fromkeys([*stuck, *main])], MOST)
+
+
+def _text(findings: list[Finding], most: int) -> str:
+    # While a callback is stuck, it is no news that its executor spins, or that others do not run.
+    if any(one.stuck and one.activity.task for one in findings):
+        findings = [one for one in findings if one.kind != 'spin' or one.activity.task]
+    lines = [line for finding in findings[:most] for line in sentences(finding)]
+    if len(findings) > most:
+        lines.append(f'{len(findings) - most} more wait.')
+    return '\n'.join(lines)
+
+
+def what_waits() -> None:
+    """Print what waits in this process, for what, why it does not come, and what would help.
+
+    While a cell hangs, ask from a console of a subshell (in JupyterLab a right click on the
+    notebook, *New Subshell Console for Notebook*), or in a terminal with
+    `python -m helpers.waits --kernel`.
+    """
+    print(explain() or NOTHING)
