@@ -255,10 +255,14 @@ def application(room: Room) -> web.Application:
     )
 
 
-def serve(application: web.Application, sockets: list) -> HTTPServer:
-    """Answer on these sockets. A message must be small, and come in a few seconds."""
+def serve(application: web.Application, sockets: list, *, behind_proxy: bool = False) -> HTTPServer:
+    """Answer on these sockets. A message must be small, and come in a few seconds.
+
+    Behind a proxy on this machine, a student's address is the one that the proxy tells.
+    """
     server = HTTPServer(
         application,
+        xheaders=behind_proxy,
         max_buffer_size=2 * events.LARGEST_BODY,
         max_body_size=events.LARGEST_BODY,
         max_header_size=16 * 1024,

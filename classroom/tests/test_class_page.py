@@ -421,6 +421,19 @@ def test_one_address_fills_no_class(opened):
     assert answers == [200] * NEW_A_MINUTE + [429] * (200 - NEW_A_MINUTE)
 
 
+def test_behind_a_proxy_each_student_has_an_address(tmp_path):
+    with running_class(tmp_path, '--url', 'https://class.example.org/') as opened:
+        assert opened.address == 'https://class.example.org'
+        body = json.dumps({'code': opened.code, 'name': ''})
+
+        def join(address):
+            headers = {'X-Forwarded-For': address}
+            return WEB.post(f'{opened.url}/join', body, headers=headers).status_code
+
+        assert [join('192.0.2.1') for _ in range(NEW_A_MINUTE + 1)][-2:] == [200, 429]
+        assert join('192.0.2.2') == 200
+
+
 @pytest.mark.parametrize(
     ('name', 'shown'),
     [
