@@ -27,6 +27,9 @@ present: set_up ## show lessons as slides whose cells run: LESSON=02, PLAN=90 (h
 	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" --class "$(CLASS)" $(if $(filter yes,$(NEW)),--new) \
 		$(server) -- $(LAB_ARGS)
 
+slides: set_up ## print the slides of a lesson as PDF, into handout/slides: LESSON=02
+	@$(PYTHON) -m classroom.deck.pdf "$(LESSON)"
+
 class: set_up ## see the guesses of a class as they come: LAN=yes lets students join; URL=https://..., PORT=8765, BROWSER=no
 	@exec $(PYTHON) -m classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(if $(URL),--url "$(URL)") $(server)
 
@@ -132,7 +135,7 @@ test test-ros2 test-tools test-packages test-answers mutants test-browser test-c
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present class test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub image lab-container hub handout grade collect syllabus exam update notebooks \
+.PHONY: help lab present slides class test test-ros2 test-tools test-packages test-answers mutants test-browser test-classroom test-hub image lab-container hub handout grade collect syllabus exam update notebooks \
 	lesson task site soak left-out bench release lint lock licences clean set_up
 
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None

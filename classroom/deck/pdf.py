@@ -28,10 +28,11 @@ from helpers.lesson import ROOT, chosen, tags
 PAGE = """
 <style>
   @page { size: 33.87cm 19.05cm; margin: 0.8cm 1.2cm; }
-  body { font-size: 15pt; }
+  :root { --jp-content-font-size1: 19px; --jp-code-font-size: 16px; }
   .jp-InputPrompt, .jp-OutputPrompt { display: none !important; }
-  .jp-Cell { break-inside: avoid; padding: 0 !important; }
-  .jp-Cell img, .jp-Cell svg { max-height: 15cm; max-width: 100%; object-fit: contain; }
+  .jp-Cell { padding: 0 !important; }
+  .jp-OutputArea-child, .jp-InputArea, .jp-MarkdownOutput > * { break-inside: avoid; }
+  .jp-Cell img, .jp-Cell svg { max-height: 13cm; max-width: 100%; object-fit: contain; }
   pre { white-space: pre-wrap !important; overflow: visible !important; }
   BREAKS { break-before: page; }
   FOLDED { display: none; }
@@ -68,7 +69,8 @@ def pages(notebook: NotebookNode) -> str:
         text = text.replace(f'id="cell-id=page-{number}"', f'id="page-{number}"')
     style = PAGE.replace('BREAKS', ', '.join(breaks) or 'none')
     style = style.replace('FOLDED', ', '.join(hidden) or 'none')
-    return text.replace('</head>', f'{style}</head>', 1)
+    base = f'<base href="{(ROOT / "notebooks").as_uri()}/">'  # of pictures
+    return text.replace('<head>', f'<head>{base}', 1).replace('</head>', f'{style}</head>', 1)
 
 
 def print_pdf(page: Path, to: Path) -> bool:
