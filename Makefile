@@ -27,8 +27,11 @@ present: set_up ## show lessons as slides whose cells run: LESSON=02, PLAN=90 (h
 	@exec $(PYTHON) -m classroom.present --lessons "$(LESSON)" --plan "$(PLAN)" --class "$(CLASS)" $(if $(filter yes,$(NEW)),--new) \
 		$(server) -- $(LAB_ARGS)
 
-class: set_up ## see the guesses of a class as they come: LAN=yes lets students join; PORT=8765, BROWSER=no
-	@exec $(PYTHON) -m classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(server)
+slides: set_up ## print the slides of a lesson as PDF, into handout/slides: LESSON=02
+	@$(PYTHON) -m classroom.deck.pdf "$(LESSON)"
+
+class: set_up ## see the guesses of a class as they come: LAN=yes lets students join; URL=https://..., PORT=8765, BROWSER=no
+	@exec $(PYTHON) -m classroom.class_page $(if $(filter yes,$(LAN)),--lan) $(if $(URL),--url "$(URL)") $(server)
 
 handout: set_up ## write a student's edition: SOLUTIONS=no (or "00 01"), BORROW=no, OFFLINE=yes (with packages, PYTHONS="3.11 3.12")
 	@$(PYTHON) -m classroom.handout $(if $(SOLUTIONS),--solutions "$(SOLUTIONS)") $(if $(BORROW),--borrow "$(BORROW)") \
@@ -36,7 +39,17 @@ handout: set_up ## write a student's edition: SOLUTIONS=no (or "00 01"), BORROW=
 
 grade: set_up ## judge what students hand in: FOLDER=submissions, LESSON=02, JOBS=2, STARS=no; see teaching.md
 	@$(PYTHON) -m classroom.grade "$(or $(FOLDER),submissions)" --lesson "$(LESSON)" --seed "$(SEED)" --assignment "$(ASSIGNMENT)" \
-		$(if $(filter no,$(STARS)),--no-stars) $(if $(TASKS),--tasks "$(TASKS)") $(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust)
+		$(if $(filter no,$(STARS)),--no-stars) $(if $(TASKS),--tasks "$(TASKS)") $(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust) \
+		$(if $(filter yes,$(PARTIAL)),--partial) $(if $(WEIGHTS),--weights "$(WEIGHTS)") $(if $(RETRY),--retry "$(RETRY)")
+
+collect: set_up ## copy a lesson from the homes of a hub, for make grade: FROM=/home LESSON=02 TO=submissions_02
+	@$(PYTHON) -m classroom.collect "$(FROM)" --lesson "$(LESSON)" $(if $(TO),--to "$(TO)")
+
+syllabus: set_up ## write handout/syllabus.md from the lessons: goals, prerequisites, hours, weeks
+	@$(PYTHON) -m classroom.kit.syllabus
+
+exam: set_up ## draw robots with faults of a private folder, or judge: FAULTS= STUDENTS= SEED= FOLDER=; see classroom/UNIVERSITY.md
+	@$(PYTHON) -m classroom.kit.exam --faults "$(FAULTS)" --students "$(STUDENTS)" --seed "$(SEED)" $(if $(FOLDER),--folder "$(FOLDER)")
 
 hub: ## run a JupyterHub for a class: CONTAINERS=yes, SOLUTIONS=no, BORROW=no, HUB_ARGS=...; see classroom/HOSTING.md
 	@classroom/hub/set_up.sh
@@ -126,7 +139,7 @@ test test-ros2 test-tools test-packages test-answers mutants ordeal test-browser
 test-browser test-classroom: set_up
 licences: groups := test browser site hub licences
 
-.PHONY: help lab present class test test-ros2 test-tools test-packages test-answers mutants ordeal test-browser test-classroom test-hub image lab-container hub handout grade update notebooks \
+.PHONY: help lab present slides class test test-ros2 test-tools test-packages test-answers mutants ordeal test-browser test-classroom test-hub image lab-container hub handout grade collect syllabus exam update notebooks \
 	lesson task site soak left-out bench release lint lock licences clean set_up
 
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None

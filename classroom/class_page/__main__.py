@@ -44,20 +44,23 @@ async def hold(store: ClassStore, options: argparse.Namespace) -> None:
     asyncio.get_running_loop().add_signal_handler(signal.SIGINT, end)
     address = '0.0.0.0' if options.lan else '127.0.0.1'
     sockets = bind_sockets(options.port, address, socket.AF_INET)
-    server = serve(application(room), sockets)
+    server = serve(application(room), sockets, behind_proxy=bool(options.url))
     port = sockets[0].getsockname()[1]
     page = f'http://localhost:{port}/{store.secret}/'
-    one, *others = (options.lan and in_networks()) or ['127.0.0.1']
+    if options.url:
+        one, others = options.url.rstrip('/'), []
+    else:
+        one, *others = [f'{at}:{port}' for at in (options.lan and in_networks()) or ['127.0.0.1']]
     room.joins = [
         '# Type this into a new cell of a lesson, then press Shift+Enter:',
         'from helpers.checks import *',
-        f"join_class('{one}:{port}', '{store.code}')",
+        f"join_class('{one}', '{store.code}')",
     ]
     print('For the wall:', *room.joins, sep='\n    ')
     if others:
         print(f'In the place of {one}, for students in other networks:', *others)
     print('Your page:', page, sep='\n    ')
-    if not options.lan:
+    if not options.lan and not options.url:
         print('Only this machine can join. LAN=yes lets the networks of this machine in.')
     if store.went_on:
         print('The class that was broken off goes on, with what it was told.')
@@ -79,6 +82,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the tool; return its exit status."""
     parser = argparse.ArgumentParser(prog='make class', description='Open a class.')
     parser.add_argument('--lan', action='store_true', help='let the networks of this machine in')
+    parser.add_argument('--url', default='', help='of a proxy before it, such as https://class.org')
     parser.add_argument('--port', type=int, default=8765)
     parser.add_argument('--root', type=Path, default=ROOT, help='of the lessons')
     parser.add_argument('--no-browser', dest='browser', action='store_false')

@@ -58,6 +58,14 @@ function guess({ question, answered, shown: open, bars = [], measured = [], by }
   return box;
 }
 
+// A name may be written from right to left: it turns nothing beside it.
+function seatOf(seat, name) {
+  const row = element('li');
+  if (name) row.append(element('bdi', name), ` (seat ${seat}) `);
+  else row.append(`Seat ${seat} `);
+  return row;
+}
+
 function end() {
   live.close();
   document.body.replaceChildren(element('p', 'The class is over. What it was told is deleted.'));
@@ -87,8 +95,17 @@ function show(state) {
   });
   const guesses = state.guesses.filter(one => !cell || one.cells.includes(cell));
   put('guesses', guesses.map(one => ({ ...one, seats: state.seats })), one => guess(one, state.seats));
+  put('people', state.people, ({ seat, name }) => {
+    const person = seatOf(seat, name);
+    const out = button('×', 'send_away', { seat });
+    out.title = `Take ${name || `seat ${seat}`} out of the class`;
+    person.append(out);
+    return person;
+  });
+  find('door').textContent = state.closed ? 'Let new students join' : 'Let nobody new join';
+  find('door').onclick = () => ask(state.closed ? 'open_door' : 'close_door');
   put('hands', state.hands, ({ seat, name }) => {
-    const hand = element('li', name ? `${name} (seat ${seat}) ` : `Seat ${seat} `);
+    const hand = seatOf(seat, name);
     hand.append(button('Done', 'lower', { seat }));
     return hand;
   });

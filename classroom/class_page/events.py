@@ -1,6 +1,7 @@
 """What a class may be told. Everything else is refused with one sentence."""
 
 import json
+import unicodedata
 
 from jsonschema import Draft202012Validator
 
@@ -47,7 +48,30 @@ SLIDE = _form(
     all=MINUTES,
 )
 EVENTS = _form(events={'type': 'array', 'maxItems': BATCH})
-JOIN = _form(code=TEXT, name=TEXT | {'maxLength': 40})
+JOIN = _form(code=TEXT, name={'type': 'string', 'maxLength': 1000})
+LONGEST_NAME = 40  # letters, without what stands above and below them
+JOINERS = '\u200c\u200d'  # letters of Persian, Hindi and others hang together, or do not, by these
+
+
+def plain_name(name: str) -> str:
+    """Return a name as the page shows it: in any letters, without signs that nobody sees.
+
+    Raises ValueError with one sentence if it is too long.
+    """
+    unseen = ('Cc', 'Cf', 'Cs', 'Co', 'Cn', 'Zl', 'Zp')
+    seen = [
+        one if one in JOINERS or unicodedata.category(one) not in unseen else ' ' * one.isspace()
+        for one in unicodedata.normalize('NFC', name)
+    ]
+    name = ' '.join(''.join(seen).split()).strip(JOINERS)
+    letters = sum(unicodedata.category(one)[0] != 'M' for one in name if one not in JOINERS)
+    if letters > LONGEST_NAME or len(name) > 4 * LONGEST_NAME:
+        count = max(letters, len(name) // 4)
+        raise ValueError(
+            f'A name has {LONGEST_NAME} letters at most, and this one has {count}: take a shorter '
+            'one.'
+        )
+    return name
 
 
 def parse(body: bytes, form: Draft202012Validator) -> dict:

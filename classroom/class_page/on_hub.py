@@ -39,7 +39,11 @@ class HubStudent(HubOAuthenticated, Student):
             return
         self._token = f'{self.room.store.secret} {user["name"]}'
         if self.room.store.seat(self._token) is None:
-            self.room.store.join(self._token, '')
+            try:
+                self.room.store.join(self._token, '')
+            except ValueError as why:
+                self.refuse(403, str(why))
+                return
         super().post(what)
 
     def token(self) -> str:
@@ -52,7 +56,7 @@ class HubStudent(HubOAuthenticated, Student):
     def join(self) -> None:
         """Say which seat the student has; the hub's login takes the place of the code."""
         wanted = events.parse(self.request.body, events.JOIN)
-        seat = self.room.store.join(self.token(), wanted['name'])
+        seat = self.room.store.join(self.token(), events.plain_name(wanted['name']))
         self.finish({'seat': seat, 'token': ''})
 
 

@@ -32,6 +32,11 @@ CREATE TABLE IF NOT EXISTS events (
     n INTEGER PRIMARY KEY, seat INTEGER, id TEXT, lesson TEXT, kind TEXT, what TEXT, value TEXT,
     UNIQUE (seat, id)
 );
+CREATE TABLE IF NOT EXISTS away (token TEXT UNIQUE);
+CREATE TABLE IF NOT EXISTS removed (
+    lesson TEXT, question TEXT, answer TEXT, UNIQUE (lesson, question, answer)
+);
+CREATE TABLE IF NOT EXISTS closed (is_closed INTEGER);
 CREATE INDEX IF NOT EXISTS by_kind ON events (kind, lesson, what);
 """
 INSERT = """
@@ -73,6 +78,8 @@ class ClassStore:
         self.went_on = self._db.execute('SELECT 1 FROM events').fetchone() is not None
         self.shown: set[tuple[str, str]] = set()  # lesson and question
         self.removed: dict[tuple[str, str], set[str]] = {}  # of a question: answers out of sight
+        for lesson, question, answer in self._db.execute('SELECT * FROM removed'):
+            self.removed.setdefault((lesson, question), set()).add(answer)
 
     def _name_tasks(self) -> None:
         """Give the tasks of a class that version 0.3 has broken off their names."""
@@ -88,8 +95,15 @@ class ClassStore:
     # Seats
 
     def join(self, token: str, name: str) -> int:
-        """Return the seat of a token, a new one for a new token. Raises ValueError if full."""
+        """Return the seat of a token, a new one for a new token.
+
+        Raises ValueError if the class is full or takes nobody new, or if the seat was taken away.
+        """
+        if self.is_away(token):
+            raise ValueError('Your seat was taken out of this class: speak with your teacher.')
         if self.seat(token) is None:
+            if self.is_closed:
+                raise ValueError('The class takes nobody new now: speak with your teacher.')
             [[taken]] = self._db.execute('SELECT count(*) FROM seats')
             if taken >= SEATS:
                 raise ValueError('The class is full.')
@@ -112,6 +126,31 @@ class ClassStore:
             self._db.execute('DELETE FROM seats WHERE seat = ?', [seat])
             self._db.execute('DELETE FROM events WHERE seat = ?', [seat])
 
+    def send_away(self, seat: int) -> None:
+        """Delete a seat with what it has told, and let its token never come back."""
+        with self._db:
+            self._db.execute(
+                'INSERT OR IGNORE INTO away SELECT token FROM seats WHERE seat = ?', [seat]
+            )
+        self.leave(seat)
+
+    def is_away(self, token: str) -> bool:
+        """Return whether the seat of this token was taken away."""
+        found = self._db.execute('SELECT 1 FROM away WHERE token = ?', [_hash(token)])
+        return found.fetchone() is not None
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether nobody new may join. Who has a seat keeps it."""
+        return self._db.execute('SELECT 1 FROM closed').fetchone() is not None
+
+    def close_door(self, closed: bool) -> None:
+        """Let nobody new join, or let them join again."""
+        with self._db:
+            self._db.execute('DELETE FROM closed')
+            if closed:
+                self._db.execute('INSERT INTO closed VALUES (1)')
+
     # Events
 
     def take(self, seat: int, messages: list) -> str:
@@ -129,7 +168,12 @@ class ClassStore:
 
     def remove(self, lesson: str, question: str, answer: str) -> None:
         """Take an answer that the page shows out of sight, of all students who gave it."""
-        self.removed.setdefault((lesson, question), set()).add(_key(_plain(answer)))
+        key = _key(_plain(answer))
+        self.removed.setdefault((lesson, question), set()).add(key)
+        with self._db:  # after a crash it is still out of sight
+            self._db.execute(
+                'INSERT OR IGNORE INTO removed VALUES (?, ?, ?)', (lesson, question, key)
+            )
 
     def lower(self, seat: int) -> None:
         """Take the hand of a seat down. Raises ValueError if it has raised none."""
@@ -179,6 +223,8 @@ class ClassStore:
         hands = [seat for seat, _, up in self._latest('hand') if up]
         return {
             'seats': len(names),
+            'closed': self.is_closed,
+            'people': [{'seat': seat, 'name': name} for seat, name in sorted(names.items())],
             'lessons': [
                 {'name': name, 'title': one.title, 'here': here[name], 'now': name == lesson}
                 for name, one in self.lessons.items()
@@ -254,6 +300,7 @@ class ClassStore:
         """Delete all events and names. The seats stay, so that nobody must join again."""
         with self._db:
             self._db.execute('DELETE FROM events')
+            self._db.execute('DELETE FROM removed')
             self._db.execute("UPDATE seats SET name = ''")
         self._db.execute('VACUUM')  # what is deleted is in no page of the file,
         self._db.execute('PRAGMA wal_checkpoint(TRUNCATE)')  # nor in its log

@@ -3,7 +3,8 @@
     POST join, events, leave   of students: helpers/checks/classroom.py documents them
     GET  SECRET/               the instructor's page, its files, and `live`, its changes
     POST SECRET/slide          of the deck, when it goes on: events.SLIDE is what it tells
-    POST SECRET/show, hide, remove, go, lower, end
+    POST SECRET/show, hide, remove, go, lower,
+         send_away, close_door, open_door, end
                                the buttons of the page
 
 The instructor's page is below a secret. It asks for nothing again and again: the server sends it
@@ -42,6 +43,7 @@ PAGE_EVERY_S = 0.25
 TOO_FAST = 'Too much at once: wait a minute.'
 # Codes from an address. A whole class may have one address, behind a router, and mistype a few.
 WRONG_A_MINUTE = 120
+NEW_A_MINUTE = 120  # seats of an address: nobody fills the class, and a lecture has joined in three
 EVENTS_A_MINUTE = 1200  # of a seat
 
 
@@ -141,14 +143,21 @@ class Student(Handler):
             wrong[address] += 1
             self.refuse(401, 'This is not the code of the class. Compare it with the wall.')
         else:
-            token = self.token()
-            if store.seat(token) is None:
+            token, name = self.token(), events.plain_name(wanted['name'])
+            if store.seat(token) is None and not store.is_away(token):
                 token = secrets.token_hex(16)
-            self.finish({'seat': store.join(token, wanted['name']), 'token': token})
+                if wrong[f'new {address}'] >= NEW_A_MINUTE:
+                    self.refuse(429, TOO_FAST)
+                    return
+                wrong[f'new {address}'] += 1
+            self.finish({'seat': store.join(token, name), 'token': token})
 
     def events(self) -> None:
         """Take the events of a seat."""
         seat = self.room.store.seat(self.token())
+        if self.room.store.is_away(self.token()):
+            self.refuse(403, 'Your seat was taken out of this class: speak with your teacher.')
+            return
         if seat is None:
             self.refuse(403, 'The class that you joined is over. To tell a new one, join it.')
             return
@@ -216,6 +225,10 @@ class Instructor(Handler):
                     self.room.show_slide(parse(self.request.body, events.SLIDE))
                 case 'lower':
                     store.lower(int(wanted['seat']))
+                case 'send_away':
+                    store.send_away(int(wanted['seat']))
+                case 'close_door' | 'open_door':
+                    store.close_door(name == 'close_door')
                 case 'end':
                     self.room.stop()
                 case _:
@@ -242,10 +255,14 @@ def application(room: Room) -> web.Application:
     )
 
 
-def serve(application: web.Application, sockets: list) -> HTTPServer:
-    """Answer on these sockets. A message must be small, and come in a few seconds."""
+def serve(application: web.Application, sockets: list, *, behind_proxy: bool = False) -> HTTPServer:
+    """Answer on these sockets. A message must be small, and come in a few seconds.
+
+    Behind a proxy on this machine, a student's address is the one that the proxy tells.
+    """
     server = HTTPServer(
         application,
+        xheaders=behind_proxy,
         max_buffer_size=2 * events.LARGEST_BODY,
         max_body_size=events.LARGEST_BODY,
         max_header_size=16 * 1024,

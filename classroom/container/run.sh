@@ -65,11 +65,21 @@ run_lab() {
 }
 
 # The code of a student, for classroom/grade: the job comes on stdin, and what it says goes to stdout.
-# No network, no file of this machine, and nothing that can be written but /tmp, in memory.
+# No network, no file of this machine, and nothing that can be written but /tmp, in memory. Of the
+# lessons, whose solutions are in the image, it sees nothing: the job brings the one that is judged.
 judge() {
-    exec $container run --rm --interactive --name "$1" --network none --read-only \
+    set -- "$1" --cpus "${CPUS:-2}"
+    # Podman without root limits the CPUs only if systemd lets it.
+    case $($container info --format '{{.Host.Security.Rootless}} {{.Host.CgroupControllers}}' 2> /dev/null) in
+        true*cpu\ * | true*cpu] | false*) ;;
+        true*) set -- "$1" ;;
+    esac
+    name=$1
+    shift
+    exec $container run --rm --interactive --name "$name" "$@" --network none --read-only \
+        --tmpfs /opt/ros2_notebooks/notebooks:ro,size=1m --tmpfs /home/student:ro,size=1m \
         --tmpfs /tmp:rw,exec,nosuid,nodev,size=1g,mode=1777 --shm-size=256m \
-        --memory 2g --memory-swap 2g --pids-limit 400 \
+        --memory 3g --memory-swap 3g --pids-limit 400 \
         --cap-drop ALL --security-opt no-new-privileges \
         --env HOME=/tmp --env TMPDIR=/tmp --workdir /tmp --no-healthcheck \
         ${RUN_ARGS-} "$image" python -m classroom.grade.judge

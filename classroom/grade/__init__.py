@@ -10,7 +10,11 @@
     results       what is judged, kept so that a second run goes on
     tables        grades.csv, and the files that Moodle and Canvas import
     feedback      the lesson of a student with the verdicts
-    alike         which students have the same answer
+    alike         whose answers are alike
+    reach         does an answer name what judges it? As text
+    witness       does it change what judges it? In the kernel, from before the answer on
+    marking       what a task is worth
+    uses, source  what a verdict depends on: so it is kept as long as it can be
 
 A student's notebook is read as JSON, and never run: the text of its exercise cells goes into the
 lesson of this checkout. What `judge` says back is data from hostile code, and is read as such.

@@ -14,12 +14,14 @@ from pathlib import Path
 from classroom.grade import alike, tables
 from classroom.grade.answers import Answers, Handed, answers_of, handed_out, lesson_of
 from classroom.grade.feedback import feedback
-from classroom.grade.results import TAKES_STARTER, Kept, Result, digest_of, job_of, result_of
+from classroom.grade.marking import Marking
+from classroom.grade.results import Kept, Result, digest_of, job_of, result_of
 from classroom.grade.runner import Container, Said, Trusted, Where, run
 from classroom.grade.submissions import ARCHIVES, Submission, submissions_of, workspace_files
 from helpers.lesson import FOLDER, Node, cells_of, chosen
 
 LIMIT_MIN = 20.0
+DID = 'its code did what no answer needs:'
 DIFFERED = 'it failed beside the other answers, and passed when it was judged alone: it counts'
 # A browser, or a system that hides endings, adds one.
 NOTEBOOKS = ('.ipynb', '.ipynb.txt', '.ipynb.json', '.json')
@@ -135,7 +137,8 @@ def judge_all(
                 answers.seed = options.seed
             key = f'{student.key}-{lesson.lesson.name}'
             digest = digest_of(lesson, answers, work.files)
-            result, again = kept.get(key, digest, options.limit), ''
+            anew = is_named(student, options.retry)
+            result, again = None if anew else kept.get(key, digest, options.limit), ''
             if result is None:
                 job = job_of(lesson, answers, work.files)
                 said = run(job, where, options.limit * 60) if job else Said()
@@ -156,12 +159,15 @@ def judge_all(
             if result.trouble:
                 work.row.said.append(result.trouble)
             for task, outcome in result.tasks.items():
-                told = not outcome.of or outcome.why in (TAKES_STARTER, DIFFERED)
+                told = not outcome.of or outcome.forged or outcome.why == DIFFERED
                 if outcome.why not in ('', 'not answered', result.trouble) and told:
                     work.row.said.append(f'task {lesson.tasks[task].number}: {outcome.why}')
-            points = sum(result.tasks[task].solved for task in lesson.counted)
-            work.row.points += points
-            lines.append(f'lesson {number}: {points} of {len(lesson.counted)}{again}')
+                if outcome.did:
+                    number, did = lesson.tasks[task].number, ', '.join(outcome.did)
+                    work.row.said.append(f'task {number}: {DID} {did}. Read the answers')
+            marking = options.marking
+            work.row.points = round(work.row.points + marking.points(lesson, result), 2)
+            lines.append(f'lesson {number}: {marking.said(lesson, result)}{again}')
         with writing:
             print(f'{student.name}: {"; ".join([*lines, *work.row.said])}', flush=True)
 
@@ -174,6 +180,12 @@ def judge_all(
             where.stop()
             raise
     return failed
+
+
+def is_named(student: Submission, names: str) -> bool:
+    """Whether RETRY= names a student: by the name, a part of it, or the number."""
+    wanted = [name.strip().casefold() for name in names.split(',') if name.strip()]
+    return any(one in student.name.casefold() or one == student.number for one in wanted)
 
 
 def judge_again(
@@ -192,7 +204,7 @@ def judge_again(
     """
     for name, task in lesson.tasks.items():
         outcome = result.tasks[name]
-        if outcome.solved or outcome.why in ('not answered', TAKES_STARTER):
+        if outcome.solved or outcome.forged or outcome.why == 'not answered':
             continue
         ids = {cell.id for cell in task.exercises}
         alone = replace(answers, sources={k: v for k, v in answers.sources.items() if k in ids})
@@ -212,11 +224,16 @@ def judge_again(
 
 
 def write(
-    output: Path, works: list[Work], wanted: list[Handed], sheets: list[tables.Sheet], title: str
+    output: Path,
+    works: list[Work],
+    wanted: list[Handed],
+    sheets: list[tables.Sheet],
+    title: str,
+    marking: Marking,
 ) -> list[str]:
     """Write all tables and the feedback; return the files, and what could not be written."""
     rows = [work.row for work in works]
-    most = sum(len(lesson.counted) for lesson in wanted)
+    most = sum(map(marking.most, wanted))
     systems = {row.student.system for row in rows}
     said = []
 
@@ -224,7 +241,7 @@ def write(
         (output / name).write_text(text, encoding='utf-8')
         said.append(name)
 
-    put('grades.csv', tables.grades(rows, wanted))
+    put('grades.csv', tables.grades(rows, wanted, marking))
     if 'moodle' in systems:
         sheet = next(filter(tables.is_moodle, sheets), None)
         text, absent = tables.moodle(rows, most, sheet)
@@ -243,18 +260,18 @@ def write(
             for lesson in wanted:
                 name = lesson.lesson.name
                 if result := work.row.results.get(name):
-                    text = feedback(lesson, work.answers[name], result)
+                    text = feedback(lesson, work.answers[name], result, marking)
                     archive.writestr(work.paths[name], text)
     said.append('feedback.zip')
-    equal = []
+    table = [('lesson', 'task', 'students', 'what is alike', 'statements of their own')]
     for lesson in wanted:
         number, key = lesson.lesson.number, lesson.lesson.name
         students = [(w.row.student.name, w.answers[key]) for w in works if key in w.answers]
-        for task, names in alike.groups(lesson, students):
-            equal.append(f'lesson {number}, task {lesson.tasks[task].number}: {", ".join(names)}')
-    put('equal_answers.txt', ''.join(f'{line}\n' for line in equal) or 'none\n')
-    for line in equal:
-        print(f'The same answer: {line}')
+        for one in alike.alike(lesson, students):
+            task, names = lesson.tasks[one.task].number, ', '.join(one.students)
+            table.append((number, task, tables.harmless(names), one.how, one.statements))
+            print(f'Alike: lesson {number}, task {task}: {names}: {one.how}')
+    put('alike.csv', tables.text_of(table))
     return said
 
 
@@ -270,6 +287,9 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
     parser.add_argument('--seed', default='', help='of a lesson that has one, for all students')
     parser.add_argument('--tasks', default='', help='only these give points: "a_driver 4"')
     parser.add_argument('--no-stars', action='store_true', help='tasks with ★ give no points')
+    parser.add_argument('--partial', action='store_true', help='points for what a check has met')
+    parser.add_argument('--weights', default='', help='of tasks: "a_driver=2 4=0.5"')
+    parser.add_argument('--retry', default='', help='judge these students anew: names, by commas')
     parser.add_argument('--assignment', default='', help='its name or id in Canvas')
     parser.add_argument('--notebooks', type=Path, default=FOLDER, help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
@@ -300,6 +320,11 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
         if not any(one.counted for one in wanted):
             number = wanted[0].lesson.number
             raise ValueError(f'No task of lesson {number} would count: look at TASKS= and STARS=.')
+        options.marking = Marking.of(options.weights, options.partial, wanted)
+        if not sum(map(options.marking.most, wanted)) > 0:
+            raise ValueError('All tasks that count have the weight 0: look at WEIGHTS=.')
+        if options.retry and not any(is_named(one, options.retry) for one in students):
+            raise ValueError(f'No student is called {options.retry}: look at RETRY=.')
         where = where or (Trusted() if options.trust else Container())
         if why := where.ready():
             raise ValueError(
@@ -329,7 +354,7 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
         for work in works:
             if work.answers and not work.row.results and not work.row.said:
                 work.row.said.append('not judged yet')
-    said = write(output, works, wanted, sheets, title)
+    said = write(output, works, wanted, sheets, title, options.marking)
     print(f'{output}: {", ".join(said)}')
     return status
 

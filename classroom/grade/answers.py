@@ -5,17 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 from nbformat import NotebookNode
 
+from classroom.grade.reach import reaches_for
+from classroom.grade.source import code_only
+from classroom.update import YOURS
 from helpers.lesson import (
     FOLDER,
     Lesson,
     Node,
     Task,
     chosen_tasks,
+    code_of_solution,
     is_check,
     is_solution,
     lessons,
@@ -28,12 +32,6 @@ SEED = re.compile(r'^SEED *= *(\d{1,9})\b.*$', re.MULTILINE)
 LOOKS_FIRST = 'find_the_fault'
 LOOK = '%%terminal'
 LARGEST_SOURCE = 200_000  # letters of a cell
-# What an answer of a lesson has no need for, and what forges a verdict would use.
-MACHINERY = re.compile(
-    r'helpers\.checks|ros2_notebooks|sys\.modules|get_ipython|gc\.get_|_getframe|ctypes|/proc/'
-    r'|\.ipynb|__globals__|__closure__|__code__|inspect\.|importlib|ipykernel|multiprocessing'
-    r'|builtins|settrace|setprofile|mock|%borrow'
-)
 
 
 class Handed:
@@ -106,15 +104,27 @@ class Answers:
         )
 
 
+@lru_cache(10_000)
 def _plain(source: str) -> str:
-    """Return a source without the white space that an editor adds or takes."""
-    return '\n'.join(line.rstrip() for line in source.strip().splitlines())
+    """Return a source without what a mended starter changes, or an editor: see code_only."""
+    return code_only(source)
+
+
+def _below_marker(cells: list[Node]) -> dict[str, str]:
+    """Return what `make update` has put below a cell, because the lesson has a newer one there."""
+    found = {}
+    for cell, marker, own in zip(cells, cells[1:], cells[2:], strict=False):
+        if marker.source.strip() == YOURS and own.cell_type == 'code':
+            found[cell.id] = own.source
+    return found
 
 
 def answers_of(cells: list[Node], handed: Handed) -> Answers:
     """Return what a student has written in the exercise cells of a lesson."""
     answers = Answers()
-    doubled, missing, looked_at, beside = [], [], [], []
+    doubled, missing, beside, updated = [], [], [], []
+    below = _below_marker(cells)
+    reached: dict[int, list[str]] = {}
     by_id: dict[str, list[Node]] = {}
     for cell in cells:
         if cell.cell_type == 'code':
@@ -127,7 +137,10 @@ def answers_of(cells: list[Node], handed: Handed) -> Answers:
             if len(same) > 1:
                 doubled.append(str(task.number))
             written = [cell for cell in same if _plain(cell.source) != _plain(exercise.source)]
-            if same:
+            if same and not written and exercise.id in below:
+                source = below[exercise.id]
+                updated.append(str(task.number))
+            elif same:
                 source = (written or same)[-1].source
             elif place < len(in_order):
                 source = in_order[place].source
@@ -138,9 +151,9 @@ def answers_of(cells: list[Node], handed: Handed) -> Answers:
                 answers.said.append(f'task {task.number} has a cell of {len(source)} letters')
                 continue
             answers.sources[exercise.id] = source
-            taught = '\n'.join(cell.source for cell in (*task.exercises, *task.solutions))
-            if set(MACHINERY.findall(source)) - set(MACHINERY.findall(taught)):
-                looked_at.append(str(task.number))
+            taught = [cell.source for cell in (*task.exercises, *task.solutions)]
+            if words := reaches_for(source, map(code_of_solution, taught)):
+                reached.setdefault(task.number, []).extend(words)
         known = {cell.id for cell in handed.cells}
         added = [cell for cell in inside if cell.id not in known]
         has_ids = any(cell.id in known for cell in cells)
@@ -149,11 +162,14 @@ def answers_of(cells: list[Node], handed: Handed) -> Answers:
     for numbers, what in (
         (missing, 'has no cell'),
         (doubled, 'has its cell twice: the last one that was changed counts'),
+        (updated, 'has its answer below the newer cell, from before an update: that one counts'),
         (beside, 'is as it was handed out, but a cell was added to it: read that yourself'),
-        (looked_at, 'reaches for what judges it: read it yourself'),
     ):
         if numbers:
             answers.said.append(f'task {", ".join(dict.fromkeys(numbers))} {what}')
+    for number, words in reached.items():
+        named = ', '.join(dict.fromkeys(words))[:120]
+        answers.said.append(f'task {number} reaches for what judges it ({named}): read it yourself')
     # A number decides which robots the lesson has.
     if any(SEED.search(cell.source) for cell in handed.cells):
         found = [SEED.search(cell.source) for cell in cells if cell.cell_type == 'code']

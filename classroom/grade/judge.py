@@ -6,33 +6,42 @@ lost if this is ended:
     {"begin": true}                                  before any code of the student
     {"cell": "check-02-1", "outputs": [...]}         for each cell of a task
     {"canary": "a_driver"}                           its check takes the starter, too: forged
+    {"forged": "a_driver", "why": "..."}             its verdict is not what its check found
+    {"did": "a_driver", "what": "gc.get_objects"}    its code did what no answer needs
     {"given_up": "a_driver", "why": "its code ended ..."}     a task hung, or ended the kernel
     {"end": true}
 
 After a task was given up, the lesson runs again, with the starter of that task.
 
-The code of a student runs in the kernel that judges it, and may have changed what judges. So when
-all is judged, each check that has taken an answer gets the starter in the same kernel. Starters are
-wrong: if one passes, nobody judges here any more. The answers of tasks that begin with a terminal
-are left out: what a terminal has made is still there.
+The code of a student runs in the kernel that judges it, and may have changed what judges, or what
+shows the verdict. So a verdict counts if witness.py, which was in the kernel before, has seen the
+same points, and nothing that judges has changed. And when all is judged, each check that has taken
+an answer gets the starter in the same kernel. Starters are wrong: if one passes, nobody judges here
+any more. The answers of tasks that begin with a terminal are left out of this: what a terminal has
+made is still there.
 
 Job: `cells`, each with `id`, `source`, `kind` ('', 'exercise', 'check', 'solution'), `task`, and
-for an exercise its `starter`; `module`, the checks; `files`, of a workspace, in Base64, and
-`overlay`, the tasks for which they count; `cell_s`, the seconds that a cell may take.
+for an exercise its `starter`; `lesson`, the file that the helpers read, without solutions;
+`module`, the checks; `files`, of a workspace, in Base64, and `overlay`, the tasks for which they
+count; `answered`, those with an answer; `cell_s`, the seconds that a cell may take.
 """
 
 from __future__ import annotations
 
+import ast
 import base64
 import ctypes
+import hmac
 import json
 import os
 import queue
+import secrets
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Iterator
+from hashlib import blake2b
 from pathlib import Path
 
 import psutil
@@ -47,8 +56,15 @@ INTERRUPT_S = 5  # for a cell to end after an interrupt
 START_S = 120
 CHECK_TIMES = 3  # as long as another cell
 POLL_S = 0.5
+MEMORY_GB = 2  # that the kernel may take more than it has when it begins
+MOST_PRINTED = 2_000_000  # letters of a cell
+ENDLESS = 'Interrupted: it printed without end.'
 MOST_OUTPUTS = 50  # of a cell
 LONGEST = 100_000  # letters of an output
+WITNESS = Path(__file__).with_name('witness.py')
+# What no answer has to open. The helpers themselves read the lesson that lies beside the kernel.
+SECRET_FILES = ('.ipynb', '/tests/answers', '/tests/mutants', '/proc/self/mem', '/proc/self/fd')
+FROM_WITNESS_S = 10  # for what the witness has written to arrive
 KEPT = ('text/plain', 'text/html', 'image/png', 'image/svg+xml')
 
 
@@ -70,12 +86,15 @@ class Kernel:
             # As the saved outputs were made: ipykernel leaves alone what C writes.
             'PYTEST_CURRENT_TEST': 'classroom/grade/judge.py',
         }
+        self._killed = _killed_for_memory()
         self._manager = KernelManager(kernel_name='python3')
         quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
         self._manager.start_kernel(cwd=str(folder), env=environment, **quiet)
         self._client = self._manager.client()
         self._client.start_channels()
         self._client.wait_for_ready(timeout=START_S)
+        # A program of the student could read it, and tell the kernel what to run.
+        Path(self._manager.connection_file).unlink(missing_ok=True)
 
     def close(self) -> None:
         children = psutil.Process().children(recursive=True)
@@ -87,24 +106,30 @@ class Kernel:
             except psutil.NoSuchProcess:
                 continue
 
-    def run(self, source: str, limit_s: float) -> list[dict]:
+    def run(self, source: str, limit_s: float, silent: bool = False) -> list[dict]:
         """Run a cell, and return its outputs. Raises HungError."""
-        asked = self._client.execute(source, allow_stdin=False, stop_on_error=False)
+        asked = self._client.execute(source, silent, allow_stdin=False, stop_on_error=False)
         outputs: list[dict] = []
         end = time.monotonic() + limit_s
-        interrupted = False
+        interrupted, printed = '', 0
         while True:
-            if time.monotonic() > end:
-                if interrupted:
-                    raise HungError(f'its code did not end in {limit_s:.0f} s, nor by an interrupt')
-                interrupted, end = True, time.monotonic() + INTERRUPT_S
-                outputs.append(_stream(f'Interrupted after {limit_s:.0f} s.\n'))
+            if not interrupted and (time.monotonic() > end or printed > MOST_PRINTED):
+                interrupted = f'Interrupted after {limit_s:.0f} s.'
+                if printed > MOST_PRINTED:
+                    interrupted = ENDLESS
+                end = time.monotonic() + INTERRUPT_S
+                outputs.insert(0, _stream(f'{interrupted}\n'))
                 self._manager.interrupt_kernel()
+            if time.monotonic() > end:
+                what = 'printed without end'
+                if interrupted != ENDLESS:
+                    what = f'did not end in {limit_s:.0f} s'
+                raise HungError(f'its code {what}, nor by an interrupt')
             try:
                 message = self._client.get_iopub_msg(timeout=POLL_S)
             except queue.Empty:
                 if not self._manager.is_alive():
-                    raise HungError('its code ended the kernel') from None
+                    raise HungError(self._why_it_ended()) from None
                 continue
             if message['parent_header'].get('msg_id') != asked:
                 continue
@@ -112,7 +137,22 @@ class Kernel:
             if kind == 'status' and content['execution_state'] == 'idle':
                 return outputs
             if kind in ('stream', 'display_data', 'execute_result', 'error'):
+                printed += len(str(content.get('text', content.get('data', ''))))
                 _add(outputs, dict(output_from_msg(message)))
+
+    def _why_it_ended(self) -> str:
+        if _killed_for_memory() > self._killed:
+            return 'it used more memory than the container has'
+        return 'its code ended the kernel'
+
+
+def _killed_for_memory() -> int:
+    """Return how many programs of this container were ended, because they took too much."""
+    try:
+        text = Path('/sys/fs/cgroup/memory.events').read_text()
+        return int(dict(line.split() for line in text.splitlines()).get('oom_kill', 0))
+    except (OSError, ValueError):
+        return 0
 
 
 def _stream(text: str) -> dict:
@@ -135,6 +175,96 @@ def _add(outputs: list[dict], output: dict) -> None:
         outputs.append(output)
 
 
+class Witness:
+    """What witness.py tells of a kernel: see there."""
+
+    def __init__(self, kernel: Kernel, folder: Path, module: str) -> None:
+        self._kernel, self._key, self._orders = kernel, secrets.token_bytes(32), 0
+        self._left, self.lines = b'', []
+        path = folder / '.witness'
+        os.mkfifo(path, 0o600)
+        self._pipe = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        names = {
+            'KEY': self._key,
+            'PIPE': str(path),
+            'SECRET_FILES': SECRET_FILES,
+            'CHECKS': 'helpers.checks.',
+            'LESSON': module,
+        }
+        source = (
+            f'import helpers.checks.lessons.{module}, ctypes, resource\n'
+            # No program of the same user may look into its memory: linux/prctl.h.
+            f'ctypes.CDLL(None).prctl({PR_SET_DUMPABLE}, 0, 0, 0, 0)\n'
+            'data = open("/proc/self/status").read().partition("VmData:")[2].split()[0]\n'
+            f'limit = (int(data) << 10) + ({MEMORY_GB} << 30)\n'
+            'resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))\n'
+            'del data, limit, ctypes, resource, helpers\n'
+            f'exec(compile(open({str(WITNESS)!r}).read(), "<witness>", "exec"), '
+            f'{{"__builtins__": dict(vars(__import__("builtins"))), **{names!r}}})'
+        )
+        self._said = kernel.run(source, START_S, silent=True)
+        path.unlink()
+
+    def close(self) -> None:
+        os.close(self._pipe)
+
+    def order(self, mode: str) -> str:
+        """Say what follows. Return what has changed of what judges, '' if nothing has."""
+        self._orders += 1
+        code = self._code(f'{self._orders} {mode}')
+        self._kernel.run(f'__import__("sys").audit("ros2_notebooks.order", {code!r}, {mode!r})', 60)
+        end = time.monotonic() + FROM_WITNESS_S
+        while True:
+            for line in self.read():
+                if line[1:4] == ('heard', self._orders, mode):
+                    return str(line[4])
+            if time.monotonic() > end:
+                return 'what hears the orders of the grader'
+            time.sleep(0.01)
+
+    def take(self) -> list[tuple]:
+        """Return all that was told since the last time, and forget it."""
+        self.read()
+        taken, self.lines = self.lines, []
+        return taken
+
+    def read(self) -> list[tuple]:
+        """Return what has come now. A line with another code is told as one that was forged."""
+        try:
+            while part := os.read(self._pipe, 1 << 16):
+                self._left += part
+        except BlockingIOError:
+            pass
+        *lines, self._left = self._left.split(b'\n')
+        found = []
+        for line in lines:
+            code, _, text = line.decode(errors='replace').partition(' ')
+            if hmac.compare_digest(code.encode(), self._code(text).encode()):
+                found.append(ast.literal_eval(text))
+            else:
+                found.append((0, 'did', 'a line in the place of what judges'))
+        self.lines += found
+        return found
+
+    def _code(self, text: str) -> str:
+        data = text.encode(errors='replace')
+        return blake2b(data, key=self._key, digest_size=16).hexdigest()
+
+
+def _what_is_forged(task: str, outputs: list[dict], changed: str, told: list[tuple]) -> str:
+    """Return why a verdict that says solved does not count, or nothing."""
+    shown = [output.get('metadata', {}).get(KEY) for output in outputs]
+    points = [one.get('points') for one in shown if isinstance(one, dict)]
+    seen = [line[2:] for line in told if line[1] == 'point']
+    changed = changed or next((line[-1] for line in seen if line[-1]), '')
+    if changed:
+        return f'its code has changed what judges it: {changed[:80]}'
+    right = [(task, True)] * len(seen)
+    if [(name, ok) for name, _, ok, _ in seen] != right or [len(seen)] != [*map(len, points)]:
+        return 'its verdict is not what its check found'
+    return ''
+
+
 def judge(job: dict, folder: Path) -> Iterator[dict]:
     """Yield what happens in a lesson with answers."""
     files = folder / 'files'
@@ -145,29 +275,50 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
     yield {'begin': True}
     given_up: set[str] = set()
     tasks = [*dict.fromkeys(cell['task'] for cell in job['cells'] if cell['task'])]  # in order
-    exercises = [cell for cell in job['cells'] if cell['kind'] == 'exercise']
-    answered = {cell['task'] for cell in exercises if cell['source'] != cell['starter']}
-    answered |= {*job['overlay']}
+    answered = {*job['answered']}
     for attempt in range(len(answered) + 1):
         here = folder / f'run_{attempt}'
         here.mkdir()
+        for name, text in job.get('lesson', {}).items():
+            (here / name).write_text(text, encoding='utf-8')
         task = ''  # the last one that was reached
         passed: set[str] = set()  # tasks with an answer
         kernel = Kernel(here)
+        witness = Witness(kernel, here, job['module'])
         try:
+            known = False
             for cell in job['cells']:
                 task = cell['task'] or task
+                is_answer = cell['kind'] == 'exercise' and task in answered - given_up
+                if is_answer and not known:
+                    known = True
+                    witness.order('know')
+                changed = ''
                 if cell['kind'] == 'check':
                     # Whatever the answer calls `check` now.
                     kernel.run(f'from helpers.checks.lessons.{job["module"]} import check', 60)
                     if task in job['overlay']:
                         kernel.run(f'{OVERLAY}({str(files)!r})', 60)
+                    if known:
+                        yield from _deeds(witness, task)
+                        changed = witness.order('check')
+                elif is_answer:
+                    witness.order('student')
                 starter = task in given_up and cell['kind'] == 'exercise'
                 # A check has limits of its own, for each of its points.
                 limit_s = job['cell_s'] * (CHECK_TIMES if cell['kind'] == 'check' else 1)
                 outputs = kernel.run(cell['starter' if starter else 'source'], limit_s)
-                if cell['kind'] == 'check' and task in answered - given_up and _is_solved(outputs):
-                    passed.add(task)
+                if is_answer:
+                    witness.order('lesson')
+                    yield from _deeds(witness, task)
+                if cell['kind'] == 'check' and known:
+                    changed = changed or witness.order('lesson')
+                    told = witness.take()
+                    yield from _deeds_of(told, task)
+                    if task in answered - given_up and _is_solved(outputs):
+                        passed.add(task)
+                        if why := _what_is_forged(task, outputs, changed, told):
+                            yield {'forged': task, 'why': why}
                 if cell['kind'] in ('exercise', 'check'):
                     yield {'cell': cell['id'], 'outputs': outputs}
         except HungError as why:
@@ -189,6 +340,18 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
             return
         finally:
             kernel.close()
+            witness.close()
+
+
+def _deeds(witness: Witness, task: str) -> Iterator[dict]:
+    """Yield what code of a student has done that no answer needs."""
+    yield from _deeds_of(witness.take(), task)
+
+
+def _deeds_of(told: list[tuple], task: str) -> Iterator[dict]:
+    for line in told:
+        if line[1] == 'did':
+            yield {'did': task, 'what': str(line[2])}
 
 
 def _canaries(kernel: Kernel, job: dict, passed: set[str]) -> Iterator[dict]:

@@ -6,21 +6,34 @@ import base64
 import hashlib
 import json
 import re
+from copy import deepcopy
 from dataclasses import asdict, dataclass, field
-from functools import cache
 from pathlib import Path
 
 from classroom.grade.answers import SEED, Answers, Handed
+from classroom.grade.judge import ENDLESS, MEMORY_GB
 from classroom.grade.runner import LATE, Said
+from classroom.grade.source import code_only
+from classroom.grade.uses import digest_of_uses
+from classroom.handout import lesson_for_students
 from helpers.checks.verdict import KEY
 from helpers.lesson import ROOT, Task, tags
+from tools.lessons.clean import text_of
 
 TAKES_STARTER = 'its check also takes the starter: what judges was changed. Read the answers'
-FORM = 4  # of the files
-LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # copies, by Python and JupyterLab
+FORM = 5  # of the files
+# What the system says of a limit, in words: judge.py and container/run.sh have the numbers.
+LIMITS = {
+    f'used more than {MEMORY_GB} GB of memory': re.compile(r'^MemoryError|Cannot allocate memory'),
+    'started more than 400 programs and threads': re.compile(
+        r"can't start new thread|Resource temporarily unavailable"
+    ),
+    'wrote more than 1 GB of files': re.compile(r'No space left on device'),
+}
 INTERRUPTED = re.compile(r'Interrupted after (\d+) s\.')  # as judge.py says it
 UNKNOWN = re.compile(r"NameError: name '(\w+)' is not defined")
 FILE = re.compile(r'\((\d+\.py|<tokenize>), line')  # a cell of a kernel is no file for a reader
+EMPTY = '{"cells": [], "metadata": {}, "nbformat": 4, "nbformat_minor": 5}'
 CELL_S = 100.0  # as `make notebooks` gives a cell
 
 
@@ -32,6 +45,8 @@ class Outcome:
     met: int = 0
     of: int = 0
     why: str = ''
+    forged: bool = False  # what judges was changed
+    did: list[str] = field(default_factory=list)  # by the student's code, and no answer needs it
 
 
 @dataclass
@@ -45,38 +60,20 @@ class Result:
     trouble: str = ''
     form: int = FORM
 
-    @property
-    def points(self) -> int:
-        return sum(task.solved for task in self.tasks.values())
-
 
 def digest_of(handed: Handed, answers: Answers, files: dict[str, bytes]) -> str:
     """Return what changes if an answer, the lesson or what judges it does."""
     digest = hashlib.sha256()
+    code = [cell for cell in handed.cells if cell.cell_type == 'code']
     for part in (
-        _digest_of_files(ROOT / 'helpers'),
-        _digest_of_files(ROOT / 'ros2'),  # whose command many answers call
-        [[cell.id, cell.cell_type, cell.source] for cell in handed.cells],
+        digest_of_uses(ROOT, handed.module, [cell.source for cell in code]),
+        [[cell.id, code_only(cell.source)] for cell in code],
         sorted(answers.sources.items()),
         sorted(answers.looks.items()),
         answers.seed,
         [[name, hashlib.sha256(data).hexdigest()] for name, data in sorted(files.items())],
     ):
         digest.update(json.dumps(part).encode())
-    return digest.hexdigest()
-
-
-@cache  # for a run: a hundred students need it
-def _digest_of_files(folder: Path) -> str:
-    """Return what changes if a file below the folder does.
-
-    A check stands on most of the helpers: on benches, on robots with faults, on CMake files.
-    """
-    digest = hashlib.sha256()
-    for path in sorted(folder.rglob('*')):
-        if path.is_file() and LEFT_OUT.isdisjoint(path.parts):
-            name, content = path.relative_to(folder), path.read_bytes()
-            digest.update(f'{name} {hashlib.sha256(content).hexdigest()}\n'.encode())
     return digest.hexdigest()
 
 
@@ -112,13 +109,23 @@ def job_of(
     encoded = {name: base64.b64encode(data).decode() for name, data in files.items()}
     return {
         'cells': cells[:last],
+        'lesson': edition_of(handed),
         'module': handed.module,
         'files': encoded,
         'overlay': [
             name for name, task in handed.tasks.items() if files and not answers.changed(task)
         ],
+        'answered': [task.name for task in wanted],
         'cell_s': cell_s,
     }
+
+
+def edition_of(handed: Handed) -> dict[str, str]:
+    """Return the lesson as the helpers need it beside the kernel: without notes and solutions."""
+    notebook = lesson_for_students(deepcopy(handed.lesson.notebook), {'notes', 'solution'})
+    # By a lesson 00 the helpers know that the lessons are here.
+    first = {'00_no_lesson.ipynb': EMPTY} if not handed.lesson.file.startswith('00_') else {}
+    return {handed.lesson.file: text_of(notebook), **first}
 
 
 def result_of(
@@ -144,7 +151,11 @@ def result_of(
             else:
                 outcome.why = _error(task, outputs) or said.trouble or 'no verdict'
         if name in said.canaries:
-            outcome.solved, outcome.why = False, TAKES_STARTER
+            outcome.solved, outcome.why, outcome.forged = False, TAKES_STARTER, True
+        elif name in said.forged:
+            outcome.solved, outcome.forged = False, True
+            outcome.why = f'{said.forged[name]}. Read the answers'
+        outcome.did = sorted(said.did.get(name, ()))
         result.tasks[name] = outcome
     return result
 
@@ -172,13 +183,18 @@ def _error(task: Task, outputs: dict[str, list[dict]]) -> str:
     for cell in (*task.exercises, *task.checks):
         whose = 'its check' if cell in task.checks else 'its cell'
         for output in outputs.get(cell.id, []):
-            if late := INTERRUPTED.match(str(output.get('text', ''))):
+            if ENDLESS in str(output.get('text', '')):
+                return f'{whose} printed without end'
+            if late := INTERRUPTED.search(str(output.get('text', ''))):
                 return f'{whose} did not end in {late[1]} s'
             if output.get('output_type') == 'error':
                 said = f'{output.get("ename")}: {output.get("evalue")}'.strip(': ').splitlines()[0]
                 unknown = UNKNOWN.match(said)
                 if unknown and cell in task.checks:
                     return f'its cell defines no {unknown[1]}'
+                for limit, pattern in LIMITS.items():
+                    if pattern.search(said):
+                        return f'{whose} {limit}'
                 return f'{whose} ended with {FILE.sub("(line", said)[:200]}'
     return ''
 

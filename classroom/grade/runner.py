@@ -32,6 +32,8 @@ class Said:
     outputs: dict[str, list[dict]] = field(default_factory=dict)
     given_up: dict[str, str] = field(default_factory=dict)
     canaries: list[str] = field(default_factory=list)  # tasks whose checks take the starter, too
+    forged: dict[str, str] = field(default_factory=dict)  # tasks whose verdict is not their check's
+    did: dict[str, set[str]] = field(default_factory=dict)  # tasks, and what no answer needs
     begun: bool = False  # before any code of a student
     ended: bool = False
     trouble: str = ''  # why it did not end by itself
@@ -165,6 +167,10 @@ def _read(line: bytes, said: Said) -> None:
         said.outputs[event['cell']] = [one for one in outputs if isinstance(one, dict)]
     elif isinstance(event.get('canary'), str):
         said.canaries.append(event['canary'][:200])
+    elif isinstance(event.get('forged'), str):
+        said.forged[event['forged']] = str(event.get('why', ''))[:200]
+    elif isinstance(event.get('did'), str):
+        said.did.setdefault(event['did'], set()).add(str(event.get('what', ''))[:100])
     elif isinstance(given_up, str):
         said.given_up[given_up] = str(event.get('why', ''))[:200]
     said.begun |= event.get('begin') is True

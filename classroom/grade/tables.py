@@ -15,6 +15,7 @@ import re
 from dataclasses import dataclass, field
 
 from classroom.grade.answers import Handed
+from classroom.grade.marking import Marking
 from classroom.grade.results import Result
 from classroom.grade.submissions import Submission
 
@@ -32,12 +33,12 @@ POINTS_POSSIBLE = '    Points Possible'  # as Canvas writes it
 class Row:
     """A student, and the results of the lessons, by their names. `said` are the sentences.
 
-    `points` is how many tasks that count are solved.
+    `points` are those of the tasks that count.
     """
 
     student: Submission
     results: dict[str, Result] = field(default_factory=dict)
-    points: int = 0
+    points: float = 0
     said: list[str] = field(default_factory=list)
 
 
@@ -50,7 +51,7 @@ class Sheet:
     delimiter: str = ','
 
     def text(self) -> str:
-        return _text(self.rows, self.delimiter)
+        return text_of(self.rows, self.delimiter)
 
 
 def read_sheet(name: str, data: bytes) -> Sheet:
@@ -74,34 +75,34 @@ def is_canvas(sheet: Sheet) -> bool:
     return len(header) > 3 and header[:2] == ['Student', 'ID'] and 'Section' in header
 
 
-def grades(rows: list[Row], lessons: list[Handed]) -> str:
+def grades(rows: list[Row], lessons: list[Handed], marking: Marking) -> str:
     """Return grades.csv: a row for each student, a column for each task."""
     columns = [(one.lesson.name, task) for one in lessons for task in one.tasks]
     header = ['name', 'id', 'late', *(f'{lesson} {task}' for lesson, task in columns)]
-    most = sum(len(one.counted) for one in lessons)
+    most = f'{sum(map(marking.most, lessons)):.10g}'
     table = [[*header, 'points', 'of', 'minutes to judge', 'said']]
     for row in rows:
         values = []
         for lesson, task in columns:
             result = row.results.get(lesson)
             outcome = result.tasks.get(task) if result else None
-            values.append(int(outcome.solved) if outcome else '')
+            values.append(f'{marking.share(result, task):.3g}' if outcome else '')
         minutes = sum(result.minutes for result in row.results.values())
         student = row.student
         said = '; '.join(row.said)
-        points = row.points if row.results else ''
-        end = [points, most, f'{minutes:.1f}', _harmless(said)]
+        points = f'{row.points:.10g}' if row.results else ''
+        end = [points, most, f'{minutes:.1f}', harmless(said)]
         late = 'late' if student.late else ''
-        table.append([_harmless(student.name), student.number, late, *values, *end])
-    return _text(table)
+        table.append([harmless(student.name), student.number, late, *values, *end])
+    return text_of(table)
 
 
-def _harmless(text: str) -> str:
+def harmless(text: str) -> str:
     """Return a text that no spreadsheet takes for a formula."""
     return f"'{text}" if text[:1] in tuple('=+-@\t\r') else text
 
 
-def moodle(rows: list[Row], most: int, sheet: Sheet | None) -> tuple[str, list[str]]:
+def moodle(rows: list[Row], most: float, sheet: Sheet | None) -> tuple[str, list[str]]:
     """Return a grading worksheet, and the names of students who are not in it.
 
     Students of whom nothing was judged are left as they are. If a group has handed in, its number
@@ -134,12 +135,12 @@ def moodle(rows: list[Row], most: int, sheet: Sheet | None) -> tuple[str, list[s
             maximum = _number(line[at['Maximum Grade']]) if 'Maximum Grade' in at else None
             line[at['Grade']] = f'{row.points * (maximum or most) / most:.2f}'
             if 'Feedback comments' in at:
-                line[at['Feedback comments']] = f'{row.points} of {most} tasks are solved.'
+                line[at['Feedback comments']] = f'{row.points:.10g} of {most:.10g} points.'
         elif row and row.said and 'Feedback comments' in at:
             line[at['Feedback comments']] = f'Not judged: {"; ".join(row.said)}.'
         filled.append(line)
     names = [by_number[number].student.name for number in sorted(absent)]
-    return _text(filled, sheet.delimiter), names
+    return text_of(filled, sheet.delimiter), names
 
 
 def _is_same(name: str, in_download: str) -> bool:
@@ -148,16 +149,16 @@ def _is_same(name: str, in_download: str) -> bool:
     return one == other
 
 
-def canvas(rows: list[Row], most: int, sheet: Sheet | None, title: str) -> str:
+def canvas(rows: list[Row], most: float, sheet: Sheet | None, title: str) -> str:
     """Return a gradebook with one assignment. Raises ValueError if the sheet has more that fit."""
     by_number = {row.student.number: row for row in rows if row.student.system == 'canvas'}
     by_number.pop('', None)  # the anonymous
     if sheet is None:
-        lines = [[*CANVAS, title], [POINTS_POSSIBLE, *[''] * (len(CANVAS) - 1), str(most)]]
+        lines = [[*CANVAS, title], [POINTS_POSSIBLE, *[''] * (len(CANVAS) - 1), f'{most:.10g}']]
         for number, row in by_number.items():
-            points = str(row.points) if row.results else ''
+            points = f'{row.points:.10g}' if row.results else ''
             lines.append([row.student.name, number, '', '', '', points])
-        return _text(lines)
+        return text_of(lines)
     header, *lines = sheet.rows
     info = header.index('Section') + 1
     assignments = [n for n, name in enumerate(header) if n >= info and re.search(r'\(\d+\)$', name)]
@@ -179,7 +180,7 @@ def canvas(rows: list[Row], most: int, sheet: Sheet | None, title: str) -> str:
         elif (row := by_number.get(line[1].strip())) and row.results:
             score = f'{row.points * (maximum or most) / most:.2f}'
         filled.append([*line[:info], score])
-    return _text(filled, sheet.delimiter)
+    return text_of(filled, sheet.delimiter)
 
 
 def _number(text: str) -> float | None:
@@ -189,7 +190,7 @@ def _number(text: str) -> float | None:
         return None
 
 
-def _text(rows: list[list], delimiter: str = ',') -> str:
+def text_of(rows: list, delimiter: str = ',') -> str:
     lines = io.StringIO()
     csv.writer(lines, delimiter=delimiter, lineterminator='\n').writerows(rows)
     return lines.getvalue()

@@ -13,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from classroom.class_page.addresses import in_networks
+from classroom.class_page.events import plain_name
 from classroom.class_page.lessons import Known
 from classroom.class_page.store import BARS, WORDS, ClassStore, bars
-from classroom.class_page.web import WRONG_A_MINUTE
+from classroom.class_page.web import NEW_A_MINUTE, WRONG_A_MINUTE
 from classroom.tests.support.classes import (
     LATER,
     NAME,
@@ -371,3 +372,90 @@ def test_forgetting_leaves_nothing_in_the_file(store):
         assert b'Lovelace' not in path.read_bytes(), path
         assert b'what was said' not in path.read_bytes(), path
     assert store.take(seat, [event(number=1)]) == ''
+
+
+# --- Who is in the class --------------------------------------------------------------------------
+
+
+def test_a_seat_that_is_taken_out_stays_away_also_after_a_crash(tmp_path):
+    with running_class(tmp_path) as opened:
+        ada, bob = opened.join(name='Ada'), opened.join(name='Bob')
+        opened.tell(ada, event(value='something rude'))
+        [seat] = [one['seat'] for one in opened.view()['people'] if one['name'] == 'Ada']
+        assert opened.do('send_away', seat=seat) == 200
+        assert opened.events() == []
+        for _ in range(2):
+            status, answer = opened.post('join', {'code': opened.code, 'name': 'Ada'}, ada)
+            assert (status, 'speak with your teacher' in answer['error']) == (400, True)
+            assert opened.post('events', {'events': [event()]}, ada)[0] == 403
+            assert opened.tell(bob, event(value=7)) == ''
+            assert [one['name'] for one in opened.view()['people']] == ['Bob']
+            opened.kill()
+            opened.start()
+
+
+def test_what_was_taken_out_of_sight_stays_so_after_a_crash(tmp_path):
+    with running_class(tmp_path) as opened:
+        opened.tell(opened.join(), event(value='Something rude'))
+        opened.go(1)
+        assert opened.do('remove', question=QUESTION, answer='Something rude') == 200
+        opened.kill()
+        opened.start()
+        opened.go(1)
+        assert opened.bars() == {}
+
+
+def test_nobody_new_joins_a_closed_class(opened):
+    ada = opened.join()
+    assert opened.do('close_door') == 200
+    status, answer = opened.post('join', {'code': opened.code, 'name': ''})
+    assert (status, 'nobody new' in answer['error']) == (400, True)
+    assert opened.view()['closed']
+    assert opened.tell(ada, event()) == ''
+    assert opened.do('open_door') == 200
+    assert opened.join()
+
+
+def test_one_address_fills_no_class(opened):
+    answers = [opened.post('join', {'code': opened.code, 'name': ''})[0] for _ in range(200)]
+    assert answers == [200] * NEW_A_MINUTE + [429] * (200 - NEW_A_MINUTE)
+
+
+def test_behind_a_proxy_each_student_has_an_address(tmp_path):
+    with running_class(tmp_path, '--url', 'https://class.example.org/') as opened:
+        assert opened.address == 'https://class.example.org'
+        body = json.dumps({'code': opened.code, 'name': ''})
+
+        def join(address):
+            headers = {'X-Forwarded-For': address}
+            return WEB.post(f'{opened.url}/join', body, headers=headers).status_code
+
+        assert [join('192.0.2.1') for _ in range(NEW_A_MINUTE + 1)][-2:] == [200, 429]
+        assert join('192.0.2.2') == 200
+
+
+@pytest.mark.parametrize(
+    ('name', 'shown'),
+    [
+        ('Zoë', 'Zoë'),
+        ('Nguyễn Thị Ánh', 'Nguyễn Thị Ánh'),
+        ('محمد علی', 'محمد علی'),
+        ('علی‌رضا', 'علی‌رضا'),  # hangs together by a letter that nobody sees
+        ('क्षत्रिय', 'क्षत्रिय'),
+        ('李明', '李明'),
+        ('👩‍🚀 Mae', '👩‍🚀 Mae'),
+        (' Ada\u200b\u202e \n Lovelace ', 'Ada Lovelace'),
+        ('क्षत्रि' * 10, 'क्षत्रि' * 10),  # 30 letters, with more signs above and below
+    ],
+)
+def test_a_name_has_any_letters(name, shown):
+    assert plain_name(name) == shown
+
+
+def test_a_name_that_is_too_long_is_refused_in_one_sentence(opened):
+    status, answer = opened.post('join', {'code': opened.code, 'name': 'x' * 41})
+    assert (status, answer['error']) == (
+        400,
+        'A name has 40 letters at most, and this one has 41: take a shorter one.',
+    )
+    assert opened.view()['people'] == []

@@ -11,13 +11,17 @@ import zipfile
 import nbformat
 import pytest
 
-from classroom.grade import alike, results, runner, tables
+from classroom.grade import alike, runner, tables
 from classroom.grade.__main__ import main
 from classroom.grade.answers import answers_of, handed_out, lesson_of
-from classroom.grade.results import Kept, digest_of, job_of, result_of
+from classroom.grade.marking import Marking
+from classroom.grade.results import Kept, Outcome, Result, digest_of, job_of, result_of
+from classroom.grade.source import code_only
 from classroom.grade.submissions import submissions_of, workspace_files
+from classroom.grade.uses import digest_of_uses, files_used
+from classroom.update import YOURS
 from helpers.checks.verdict import KEY
-from helpers.lesson import cells_of, path_of, tags
+from helpers.lesson import ROOT, cells_of, path_of, tags
 from helpers.lesson import lessons as lessons_of_course
 
 RIGHT, WRONG = 'speed = 1.75 / 3.5\nshow(speed)', 'speed = 1.75\nshow(speed)'
@@ -286,7 +290,9 @@ def test_only_exercise_cells_are_taken(lessons):
 
 def test_what_reaches_for_the_checks_is_named(lessons):
     _, answers = read(notebook(**{STARTER: 'import sys\nsys.modules.clear()'}), lessons)
-    assert answers.said == ['task 1 reaches for what judges it: read it yourself']
+    [said] = answers.said
+    assert said.startswith('task 1 reaches for what judges it (')
+    assert 'sys.modules' in said
 
 
 @pytest.mark.parametrize(
@@ -345,7 +351,6 @@ def test_a_verdict_counts_if_it_is_one(lessons, verdicts, solved):
     _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
     result = result_of(lessons['start_here'], answers, {}, said_of(*verdicts), 'digest')
     assert result.tasks['through_the_door'].solved == solved
-    assert result.points == solved
 
 
 def test_without_a_verdict_the_error_is_said(lessons):
@@ -465,7 +470,7 @@ def test_a_line_for_each_strange_submission(submit, capsys):
         f'Di: lesson 00: 0 of {OF}; nothing is written in lesson 00',
         f'Eve: lesson 00: 0 of {OF}; lesson 00 is there twice: a.ipynb counts',
         'Fay: own.ipynb is no lesson of this course',
-        f'{folder}_graded: grades.csv, feedback.zip, equal_answers.txt',
+        f'{folder}_graded: grades.csv, feedback.zip, alike.csv',
     ]
     assert rows_of(folder)[0]['name'] == "'=cmd()"  # no formula
 
@@ -610,27 +615,52 @@ def test_feedback_has_verdicts_and_no_solution(submit):
     assert not {'solution', 'notes'} & {tag for cell in found.cells for tag in tags(cell)}
 
 
-def test_equal_answers_are_named(lessons):
+OWN = """for my_own_number in range(100, 10_000, 7):
+    print("What I think", my_own_number)
+my_second_thought = [my_own_number for _ in range(12)]
+if my_second_thought[3] > 700:
+    print("more", sum(my_second_thought) / 7)
+while my_own_number > 3:
+    my_own_number = my_own_number // 2 - 1
+"""
+
+
+def test_answers_that_are_alike_are_named(lessons):
     task = next(iter(lessons['lose_messages'].tasks.values()))
     [cell] = task.exercises
-    own = 'for my_own_number in range(100, 10_000, 7):\n    print("What I think", my_own_number)\n'
-    own += 'my_second_thought = [my_own_number for _ in range(12)]\n'
-    renamed = own.replace('"', "'").replace('\n', '   # a comment\n\n')
+    renamed = OWN.replace('my_own_number', 'n').replace('my_second_thought', 'thoughts')
+    renamed = renamed.replace('What I think', 'Mine').replace('\n', '   # a comment\n\n')
     solution = task.solutions[0].source.split('\n', 1)[1]
+    other = 'total = 0\nfor k in range(20):\n    total += k ** 2\nassert total > 7, [total] * 9\n'
     written = {
-        'Ada': own,
+        'Ada': OWN,
         'Bob': renamed + cell.source,
-        'Cy': own.replace('7', '8'),
+        'Cy': OWN.replace('"', "'"),
         'Di': solution,
         'Eve': solution,
         'Fay': cell.source,
         'Gus': 'x = 1',
         'Hal': 'x = 1',
+        'Ida': OWN.replace('700', '800'),
+        'Jo': other * 2,
     }
     students = []
     for name, source in written.items():
         students.append((name, read(notebook('lose_messages', **{cell.id: source}), lessons)[1]))
-    assert alike.groups(lessons['lose_messages'], students) == [(task.name, ['Ada', 'Bob'])]
+    found = [(one.students, one.how) for one in alike.alike(lessons['lose_messages'], students)]
+    assert found == [
+        (('Ada', 'Bob', 'Cy'), alike.RENAMED),
+        (('Ada', 'Bob', 'Cy', 'Ida'), '6 of 7 statements'),
+    ]
+
+
+def test_what_is_alike_is_a_table(submit, capsys):
+    folder = submit(**{f'{who}/a.ipynb': with_answer(OWN) for who in ('Ada', '=Bob')})
+    assert main([str(folder)], Stand()) == 0
+    assert 'Alike: lesson 00, task 1: =Bob, Ada: the same' in capsys.readouterr().out
+    [row] = rows_of(folder, 'alike.csv')
+    assert row['students'] == "'=Bob, Ada"  # no formula
+    assert (row['what is alike'], row['statements of their own']) == ('the same', '7')
 
 
 def test_what_is_kept_is_that_of_the_same_answers_and_lesson(lessons, tmp_path):
@@ -649,26 +679,174 @@ def test_what_is_kept_is_that_of_the_same_answers_and_lesson(lessons, tmp_path):
     assert kept.get('ada', digest, 20) is None
 
 
+START = 'helpers/checks/lessons/start_here.py'
+
+
 @pytest.mark.parametrize(
-    ('file', 'is_new'),
+    ('file', 'old', 'new', 'is_new'),
     [
-        ('checks/bench.py', True),
-        ('checks/questions.yaml', True),
-        ('workspace/cmake/FindPython3.cmake', True),
-        ('checks/__pycache__/bench.pyc', False),
-        ('checks/.ipynb_checkpoints/bench.py', False),
+        ('helpers/checks/bench.py', '', '\nMORE = 1\n', True),
+        ('helpers/checks/bench.py', '', '\n# a comment\n', False),
+        ('helpers/ros/session.py', '', '\nMORE = 1\n', True),
+        ('helpers/checks/lessons/lose_messages.py', '', '\nMORE = 1\n', False),
+        ('helpers/replay/replays.py', '', '\nMORE = 1\n', False),
+        ('helpers/workspace/cmake/FindPython3.cmake', '', '# new', True),
+        ('helpers/checks/__pycache__/bench.pyc', '', 'new', False),
+        (START, 'BEHIND_THE_WALL_M = 2.61', 'BEHIND_THE_WALL_M = 2.7', True),
+        (START, "'the robot goes through the door", "'it goes through the door", True),
+        (START, "hint = 'Speed is distance", "hint = 'A speed is a distance", False),
+        ('ros2/ros2_command/main.py', '', '\nMORE = 1\n', True),
     ],
 )
-def test_what_is_kept_is_that_of_the_same_helpers(lessons, tmp_path, monkeypatch, file, is_new):
-    _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
+def test_what_is_kept_is_that_of_the_files_it_depends_on(tmp_path, file, old, new, is_new):
+    """Not of a hint, a comment, or the checks of another lesson."""
     digests = []
-    for text in ('old', 'new'):
-        path = tmp_path / text / 'helpers' / file
-        path.parent.mkdir(parents=True)
-        path.write_text(text)
-        monkeypatch.setattr(results, 'ROOT', tmp_path / text)
-        digests.append(digest_of(lessons['start_here'], answers, {}))
+    for folder in (tmp_path / 'before', tmp_path / 'after'):
+        for path in files_used(ROOT, 'start_here', ''):
+            copy = folder / path.relative_to(ROOT)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_bytes(path.read_bytes())
+    changed = tmp_path / 'after' / file
+    changed.parent.mkdir(parents=True, exist_ok=True)
+    text = changed.read_text(encoding='utf-8') if changed.exists() else ''
+    assert old in text
+    changed.write_text(text.replace(old, new, 1) if old else text + new)
+    for folder in (tmp_path / 'before', tmp_path / 'after'):
+        digests.append(digest_of_uses(folder, 'start_here', []))
     assert (digests[0] != digests[1]) == is_new
+
+
+def test_a_comment_that_changes_in_a_starter_changes_nothing(lessons):
+    """A student has the starter of last week: it is no answer, and a verdict is kept."""
+    lesson = lessons['start_here']
+    old = notebook(
+        **{STARTER: f'# as it was last week\n{task_of(lesson).exercises[0].source}  # x'}
+    )
+    assert not read(old, lessons)[1].changed(task_of(lesson))
+    _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
+    before = digest_of(lesson, answers, {})
+    cell = next(one for one in lesson.cells if one.id == STARTER)
+    cell.source += '\n# another comment'
+    try:
+        assert digest_of(lesson, answers, {}) == before
+    finally:
+        cell.source = cell.source.removesuffix('\n# another comment')
+
+
+def task_of(lesson):
+    return lesson.tasks['through_the_door']
+
+
+@pytest.mark.parametrize(
+    ('one', 'other', 'is_same'),
+    [
+        ('x = 1  # old', 'x = 1', True),
+        ('# old\nx  =  1', 'x = 1\n', True),
+        ('if x:\n    y()\nz()', 'if x:\n    y()\n    z()', False),
+        ("s = '# no comment'", "s = '# another'", False),
+        ('%%write a.xml\n<a>\n', '%%write a.xml\n<a>', True),
+        ('%%write a.cpp\n// old\n#include <a>', '%%write a.cpp\n#include <a>', True),
+        ('%%write a.cpp\n#include <b>', '%%write a.cpp\n#include <a>', False),
+        ('%%terminal\n# old\nros2 topic list', '%%terminal\nros2 topic list', True),
+    ],
+)
+def test_two_sources_that_differ_in_comments_only(one, other, is_same):
+    assert (code_only(one) == code_only(other)) == is_same
+
+
+def test_an_answer_below_the_newer_cell_counts(lessons):
+    """`make update` has put it there, because the lesson has another starter now."""
+    content = notebook()
+    at = next(n for n, cell in enumerate(content['cells']) if cell['id'] == STARTER)
+    marker = {'cell_type': 'markdown', 'id': 'm', 'metadata': {}, 'source': YOURS}
+    own = {'cell_type': 'code', 'id': 'o', 'metadata': {}, 'source': RIGHT, 'outputs': []}
+    content['cells'][at + 1 : at + 1] = [marker, own | {'execution_count': None}]
+    lesson, answers = read(content, lessons)
+    assert answers.sources[STARTER] == RIGHT
+    assert answers.changed(task_of(lesson))
+    assert answers.said == [
+        'task 1 has its answer below the newer cell, from before an update: that one counts'
+    ]
+
+
+# --- Points ---------------------------------------------------------------------------------------
+
+
+def marked(lesson, **words):
+    """Return what a lesson gives: its first task has met 1 of 4 points, its second all."""
+    tasks = [*lesson.tasks]
+    outcomes = {name: Outcome() for name in tasks}
+    outcomes[tasks[0]], outcomes[tasks[1]] = Outcome(met=1, of=4), Outcome(True, 3, 3)
+    marking = Marking.of(words.get('weights', ''), words.get('partial', False), [lesson])
+    return marking.said(lesson, Result('', outcomes)), marking
+
+
+def test_points_of_a_part_and_of_weights(lessons):
+    lesson = lessons['lose_messages']
+    first, second = [*lesson.tasks][:2]
+    count = len(lesson.counted)
+    assert marked(lesson)[0] == f'1 of {count}'
+    assert marked(lesson, partial=True)[0] == f'1.25 of {count}'
+    weights = f'{first}=4 {lesson.tasks[second].number}=0.5'
+    assert marked(lesson, partial=True, weights=weights)[0] == f'1.5 of {count + 2.5:.10g}'
+    for wrong in ('a_driver', f'{first}=-1', f'{first}=much', 'none=2'):
+        with pytest.raises(ValueError, match=r'WEIGHTS=|has no task'):
+            Marking.of(wrong, False, [lesson])
+
+
+def test_what_is_forged_gives_no_part_of_a_point(lessons):
+    lesson = lessons['start_here']
+    outcomes = {name: Outcome(met=1, of=1, forged=True) for name in lesson.tasks}
+    assert Marking(partial=True).points(lesson, Result('', outcomes)) == 0
+
+
+def test_a_student_is_judged_anew_by_name(submit, capsys):
+    folder, where = submit(**moodle_class(3)), Stand()
+    assert main([str(folder)], where) == 0
+    before = where.count
+    assert main([str(folder), '--retry', '001, 502'], where) == 0
+    assert where.count == before + 1 + 2  # the second of the two is wrong, and judged twice
+    said = capsys.readouterr().out
+    assert said.count('judged before') == 1
+    assert main([str(folder), '--retry', 'Nobody'], where) == 1
+    assert 'RETRY=' in capsys.readouterr().err
+
+
+def test_all_counts_agree_if_some_tasks_give_no_point(submit):
+    folder = submit(**moodle_class(2))
+    assert main([str(folder), '--tasks', 'a_first_node'], Stand()) == 0
+    assert [(row['points'], row['of']) for row in rows_of(folder)] == [('0', '1')] * 2
+    with zipfile.ZipFile(folder.with_name('submissions_graded') / 'feedback.zip') as archive:
+        text = archive.read(archive.namelist()[1]).decode()
+    found = nbformat.reads(text, as_version=4)
+    assert found.cells[0].source.startswith('# 0 of 1 tasks are solved')
+    assert '| 1 | ✔ | 1 of 1 | no points for it |' in found.cells[0].source
+
+
+@pytest.mark.parametrize(
+    ('output', 'why'),
+    [
+        ({'output_type': 'error', 'ename': 'MemoryError', 'evalue': ''}, 'used more than 2 GB'),
+        ({'text': 'Interrupted: it printed without end.\n'}, 'printed without end'),
+        (
+            {'output_type': 'error', 'ename': 'RuntimeError', 'evalue': "can't start new thread"},
+            'started more than 400 programs and threads',
+        ),
+        (
+            {'output_type': 'error', 'ename': 'OSError', 'evalue': '[Errno 28] No space left on'},
+            'ended with OSError',
+        ),
+        (
+            {'output_type': 'error', 'ename': 'OSError', 'evalue': 'No space left on device'},
+            'wrote more than 1 GB',
+        ),
+    ],
+)
+def test_each_limit_has_its_own_sentence(lessons, output, why):
+    _, answers = read(notebook(**{STARTER: 'x = 1'}), lessons)
+    said = runner.Said({STARTER: [output]}, begun=True, ended=True)
+    result = result_of(lessons['start_here'], answers, {}, said, '')
+    assert f'its cell {why}' in result.tasks['through_the_door'].why
 
 
 def test_the_number_of_a_lesson_that_draws_its_task(lessons):
@@ -713,18 +891,34 @@ import sys
 
 judge = sys.modules['helpers.checks.points']
 judge._result = lambda test: True
-sys.modules['helpers.checks.honest'].Untouched.look = lambda self: ''
 """
 
 
-def test_a_forged_pass_is_shown_by_the_starter(submit, capsys):
-    """It changes what judges, and what would notice that: then the starter passes as well."""
+def test_a_forged_pass_is_in_the_table(submit, capsys):
+    """What else is forged, and how it is noticed: test_forgeries.py."""
     folder = submit(**{'Ada/a.ipynb': with_answer(FORGERY + WRONG)})
     assert main([str(folder), '--trust']) == 0
     [line] = capsys.readouterr().out.splitlines()[:1]
     assert line.startswith(f'Ada: lesson 00: 0 of {OF}')
-    assert 'task 1 reaches for what judges it: read it yourself' in line
-    assert f'task 1: {results.TAKES_STARTER}' in line
+    assert 'task 1 reaches for what judges it (modules, sys.modules): read it yourself' in line
+
+
+LIMITED = {
+    'Ada': (
+        'hoard = []\nwhile True:\n    hoard.append(bytes(200_000_000) + b"x")',
+        'used more than 2 GB',
+    ),
+    'Bob': ('while True:\n    print("x" * 1000)', 'printed without end'),
+}
+
+
+def test_a_cell_meets_its_limits_in_a_real_kernel(submit, capsys):
+    folder = submit(**{f'{n}/a.ipynb': with_answer(one) for n, (one, _) in LIMITED.items()})
+    assert main([str(folder), '--trust']) == 0
+    lines = capsys.readouterr().out.splitlines()
+    for line, (name, (_, why)) in zip(lines, LIMITED.items(), strict=False):
+        assert line.startswith(f'{name}: lesson 00: 0 of {OF}')
+        assert f'task 1: its cell {why}' in line
 
 
 ONCE = """

@@ -1,9 +1,15 @@
 """Which cell starts a slide, on notebooks made for it."""
 
+import re
+import shutil
+
+import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
 
+from classroom.deck.pdf import NAMES, main, pages
 from classroom.deck.slides import LINES, folded, slide_types
+from helpers.lesson import path_of, tags
 
 TITLE = new_markdown_cell('# 02 Lose messages\n\n**You need** lesson 01.')
 STEP = new_markdown_cell('## 1. Build\n\nA node.')
@@ -75,3 +81,26 @@ def test_the_rule(cells, types):
 )
 def test_what_is_folded(cell, is_folded):
     assert folded(cell) == is_folded
+
+
+def test_the_slides_on_paper_are_those_of_the_deck():
+    """Each slide begins a page; solutions and notes are on none."""
+    notebook = nbformat.read(path_of('lose_messages'), as_version=4)
+    text = pages(notebook)
+    starts = [kind for kind in slide_types(notebook) if kind in ('slide', 'subslide')]
+    [rule] = re.findall(r'((?:#page-\d+,? ?)+) \{ break-before: page; \}', text)
+    assert len(re.findall(r'#page-\d+', rule)) == len(starts) - 1  # the first has its page
+    for cell in notebook.cells:
+        if cell.cell_type == 'raw':
+            assert cell.source.splitlines()[0] not in text
+        if 'solution' in tags(cell):
+            assert cell.source.splitlines()[0] not in text
+    ids = re.findall(r'id="page-(\d+)"', text)
+    assert ids == [str(n) for n in range(len(ids))]
+
+
+@pytest.mark.skipif(not any(map(shutil.which, NAMES)), reason='LEFT OUT, no Chromium')
+def test_chromium_prints_them(tmp_path):
+    assert main(['00', '--output', str(tmp_path)]) == 0
+    [pdf] = tmp_path.iterdir()
+    assert pdf.read_bytes().startswith(b'%PDF-')

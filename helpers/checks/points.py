@@ -32,6 +32,7 @@ from __future__ import annotations
 import inspect
 import math
 import os
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Sequence
@@ -213,6 +214,7 @@ def judge_points(points: Callable[[], Sequence[Test]], send: Callable) -> None:
                 ok, found = False, _still_runs(left[0])
         if ok and (changed := untouched.look()):
             ok, found, hint = False, CHANGED.format(changed), ''
+        sys.audit('ros2_notebooks.point', what, ok)  # a grader hears it: see classroom/grade
         send(('point', (ok, found, hint)))
         if never_ends:
             break

@@ -92,11 +92,12 @@ class Fault:
     trouble: str = 'blind'
     asks_route: bool = False
     keeps: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    parent: Path = HERE  # of its folder
 
     @property
     def folder(self) -> Path:
         """Where its files are."""
-        return HERE / self.name
+        return self.parent / self.name
 
     @cached_property
     def files(self) -> dict[str, str]:
@@ -147,7 +148,7 @@ def read(folder: Path) -> Fault:
         mends = {key: tuple(map(_mend, told.pop(key))) for key in ('right', 'wrong')}
         evidence = tuple(Evidence(**pair) for pair in told.pop('evidence'))
         told |= {key: tuple(told.get(key, ())) for key in ('fails', 'also')}
-        fault = Fault(name=folder.name, evidence=evidence, **mends, **told)
+        fault = Fault(name=folder.name, parent=folder.parent, evidence=evidence, **mends, **told)
     except (OSError, yaml.YAMLError, TypeError, KeyError, AttributeError) as error:
         raise ValueError(f'{folder.name}/{FILE}: {error}') from None
     if fault.kind not in KINDS:

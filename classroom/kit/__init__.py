@@ -1,0 +1,1 @@
+"""What a lecturer hands in or hands out around the lessons: syllabus, rubric, exam."""
