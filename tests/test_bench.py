@@ -15,7 +15,7 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
-from helpers.checks.bench import Bench, must_define, must_have, override, scan
+from helpers.checks.bench import Bench, must_be_called, must_define, must_have, override, scan
 from helpers.checks.errors import Failed
 from helpers.checks.tasks import Tasks
 
@@ -154,6 +154,14 @@ def test_what_is_not_written_yet_is_named():
     must_define(Doubler, '__init__', 'number_callback')
     with pytest.raises(Failed, match='^the class has no timer_callback yet$'):
         must_define(Doubler, 'timer_callback')
+
+
+def test_a_node_with_another_name_is_named():
+    with Bench():
+        must_be_called(Doubler(), 'doubler')
+        with pytest.raises(Failed, match='^the name of the node is doubler, not halver$') as failed:
+            must_be_called(Doubler(), 'halver')
+    assert failed.value.hint == "super().__init__('halver') in its __init__."
 
 
 PERIOD_S = 0.5

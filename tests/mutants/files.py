@@ -163,7 +163,8 @@ def out_of_a_block(lines: Lines, written: set[int], kind: str) -> Iterator[Lines
     """A key of YAML one level further out; the last statement of a block of C++ below it."""
     for at in sorted(written):
         line = lines[at] if at < len(lines) else ''
-        if kind == 'yaml' and line.startswith('  ') and _is_code(line):
+        is_key = re.match(r'\s+(- )?[^\s\[\]{},]+:( |$)', line)
+        if kind == 'yaml' and line.startswith('  ') and is_key:
             yield _with(lines, at, line[2:])
         below = lines[at + 1] if at + 1 < len(lines) else ''
         if kind == 'c++' and line.rstrip().endswith(';') and below.strip() == '}':

@@ -59,7 +59,11 @@ def one_executor_for_all(spin_together):
             executors = {node.executor for node in nodes}
         if len(ticked) < count:
             return f'{count - len(ticked)} of {count} nodes: their timers never fired'
-        return expect(len(executors), 1, f'the number of executors for {count} nodes is')
+        kinds = sorted({type(executor).__name__ for executor in executors})
+        return all_of(
+            expect(len(executors), 1, f'the number of executors for {count} nodes is'),
+            expect(kinds, ['SingleThreadedExecutor'], 'the kind of its executor is'),
+        )
 
     hint = 'One executor before the loop, add_node(node) in the loop, session.spin after it.'
     return rows(
@@ -277,6 +281,15 @@ def a_program_of_its_own(workspace, file):
             return f'{name} ends it with a traceback: {talker.error}'
         return ended or f'{name} does not end it'
 
+    def ends_well_or_fails():
+        ended = is_program('blue')
+        if ended is not True:
+            return ended
+        error = ERROR.format(name=file.removesuffix('.py'))
+        with run_python(workspace, '-c', error, 'blue') as program:
+            hides = program.has_ended() and program.exit_code() == 0
+        return not hides or 'it hides an error in spin, as if that were a normal end'
+
     def can_be_imported():
         with run_python(workspace, '-c', f'import {file.removesuffix(".py")}') as program:
             ended = program.has_ended()
@@ -289,7 +302,7 @@ def a_program_of_its_own(workspace, file):
     guarded = "Below the class only main(), and if __name__ == '__main__': main()."
     return [
         ('red talks, until Ctrl+C ends it', lambda: is_program('red'), hint),
-        ('blue talks, until Ctrl+C ends it', lambda: is_program('blue'), caught),
+        ('blue talks, until Ctrl+C ends it', ends_well_or_fails, caught),
         (
             'red talks, until a shutdown by something else ends it',
             lambda: is_program('red', signal.SIGTERM, 'SIGTERM, which shuts rclpy down,'),
@@ -298,6 +311,18 @@ def a_program_of_its_own(workspace, file):
         ('a program that imports it gets the class, and nothing starts', can_be_imported, guarded),
     ]
 
+
+# What spins a node has an error.
+ERROR = """
+import rclpy
+
+def fail(*_, **__):
+    raise RuntimeError('planted')
+
+rclpy.spin = fail
+import {name} as own
+own.main()
+"""
 
 # The third tick that somebody hears fails.
 FAILS = """

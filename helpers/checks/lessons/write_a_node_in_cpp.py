@@ -27,6 +27,7 @@ FIRST_SCANS = 10  # at most, until a program is known to answer
 ANSWER_S = 0.5  # after each of these
 LATE_S = 1.0  # for an answer to another of these
 STOP_S = 5  # until the last command of a program is here
+TRY_S = 10  # for a program of ours to end
 START_S = 8  # for a program to start and be known to the others
 CALLS_MY_SPIN = 'brake.cpp calls spin, not my_spin: run the cell above this task again'
 READS_EMPTY = 'it reads the value of a std::optional that is empty'
@@ -77,7 +78,7 @@ def run_ours(workspace, name, code):
     try:
         install_anew(workspace, name)
         with workspace.run(name, name) as process:
-            process.wait()
+            process.wait(TRY_S)
     finally:
         shutil.rmtree(workspace.file(f'src/{name}'))
     return process.lines
@@ -330,7 +331,8 @@ def a_node_of_your_own(workspace):
     @cached
     def tried():
         """Return what our program prints that has the student's brake in it."""
-        heard().first(1)
+        if heard().problem:  # a callback without an end would hold ours, too
+            raise Failed(heard().problem, hint='')
         return run_ours(workspace, 'try_brake', TRY_BRAKE)
 
     def stops_without_a_distance():
