@@ -87,8 +87,9 @@ class Guess:
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         svg = self.kind.picture()
         figure = picture_of(svg, f'{self.question} {self.kind.words()}') if svg else ''
+        look = style(CSS, rows=False)
         html = (
-            f'<div class="replay guess" data-guess={attribute(self.record())}>{style(CSS)}'
+            f'<div class="replay guess" data-guess={attribute(self.record())}>{look}'
             f'<p class="guess-question">{escape(self.question)}</p>{figure}'
             f'<p class="replay-static">Run the cell, to answer here. {escape(self.kind.forms)}</p>'
             f'<script>{script(*self.kind.scripts, *SHELL)}</script></div>'
@@ -118,8 +119,9 @@ class Gap:
         record = attribute({**guess.record(), 'outcome': dict(self.outcome)})
         svg = guess.kind.picture()
         figure = picture_of(svg, f'{guess.question} {guess.kind.words()}') if svg else ''
+        look = style(CSS, rows=False)
         html = (
-            f'<div class="replay guess" data-guess={record}>{style(CSS)}'
+            f'<div class="replay guess" data-guess={record}>{look}'
             f'<p class="guess-question">{escape(guess.question)}</p>{figure}'
             f'<p class="replay-static">{escape(str(self))}</p>'
             f'<script>{script(*guess.kind.scripts, *SHELL)}</script></div>'

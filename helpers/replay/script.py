@@ -40,9 +40,13 @@ def script(*files: str | Path) -> str:
 
 
 @cache
-def style(*files: str | Path) -> str:
-    """Return the look that all share, and files, as an element of HTML."""
-    return f'<style>{short(LOOK_CSS)}{"".join(map(source, ("style.css", *files)))}</style>'
+def style(*files: str | Path, rows: bool = True) -> str:
+    """Return the look that all share, and files, as an element of HTML.
+
+    `rows` are those of a replay: what has none, such as a guess, is lighter without.
+    """
+    shared = ('frame.css', 'style.css') if rows else ('frame.css',)
+    return f'<style>{short(LOOK_CSS)}{"".join(map(source, (*shared, *files)))}</style>'
 
 
 def played(kind: str, record: dict, says: str, *names: str) -> str:
