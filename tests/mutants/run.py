@@ -122,6 +122,8 @@ def _verdict_of(lesson: Lesson, cells: Cells, mutant: Mutant) -> tuple[str, str]
         return NOTICED, 'Its cell does not end.'
     said += run_all(lesson.kernel, cells['check'])
     solved = [verdict['solved'] for verdict in lesson.kernel.verdicts]
+    if not solved and 'This task needs' in said:
+        raise RuntimeError(f'The check has judged nothing: {said}')
     return SURVIVED if solved == [True] else NOTICED, said
 
 

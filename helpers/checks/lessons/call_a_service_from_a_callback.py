@@ -227,38 +227,53 @@ def the_rule(rule, stops):
 
 @tasks.add
 def if_you_do_not_know_stop(SafeBrake):
-    def stops_without_an_answer(camera_is_there):
+    def says_go(what, sees, distance, questions, times, age_s=0.0):
+        """Show a scan to a brake that is with the camera, in one thread: which `go` follow?"""
         with Bench() as bench:
-            stops, brake = bench.hear('stop', Empty), SafeBrake()
-            bench.spin(brake)
-            if camera_is_there:
-                bench.spin(Camera(hold=bench.gate().hold))
-            bench.say('scan', scan(0.5), at_once=True)
-            bench.wait(lambda: stops, 1.0)
+            goes, stops = bench.hear('go', Empty), bench.hear('stop', Empty)
+            brake, camera = SafeBrake(), Camera(sees)
+            bench.spin(brake, camera)
+            bench.wait(brake.client.service_is_ready)
+            bench.say('scan', scan(distance, age_s=age_s))
             waits = bench.line_of_callback()
-            if not waits:  # what its callback still waits for has no time-out, or a long one
-                bench.wait(lambda: stops, 1.0)
-            if not stops:
-                why = 'the camera never answers' if camera_is_there else 'there is no camera'
-                limit_s = 1 if waits else 2
-                raise Failed(f'{why}, and it does not stop within {limit_s} s. {waits}'.strip())
-            is_over = bench.wait(lambda: all(timer.is_canceled() for timer in brake.timers), 1.0)
-        return is_over or 'it has given up, and its timer still runs: it gives up again and again'
+            is_over = waits or bench.wait(lambda: no_timer_runs(brake), 1.0)
+        if waits:
+            raise Failed(f'{what}: its callback still waits. {waits}')
+        return all_of(
+            expect(camera.looks, questions, f'{what}: it asked the camera', unit='times'),
+            expect(len(goes), times, f'{what}: it said go', unit='times'),
+            not stops or f'{what}: it said stop, which PermittedRemote does not hear',
+            is_over or f'{what}: its timer runs on',
+        )
+
+    def gives_up(camera_is_there):
+        """Show a near scan, twice. No answer comes, and it asks again."""
+        why = 'the camera never answers' if camera_is_there else 'there is no camera'
+        with Bench() as bench:
+            goes, gate, brake = bench.hear('go', Empty), bench.gate(), bench.spin(SafeBrake())
+            asked = Asked(brake.client)
+            if camera_is_there:
+                bench.spin(Camera(hold=gate.hold))
+                bench.wait(brake.client.service_is_ready)
+            for number in (1, 2):
+                bench.say('scan', scan(0.5), at_once=True)
+                bench.wait(lambda number=number: len(asked.futures) == number, 1.0)
+                bench.quiet(executor=brake.executor)
+                if waits := bench.line_of_callback():
+                    raise Failed(f'{why}, and its callback waits. {waits}')
+                if len(asked.futures) != number:
+                    found = f'after {number} near scans, it has asked'
+                    raise Failed(f'{why}: {found} {len(asked.futures)} times')
+                if not bench.wait(lambda: brake.future is None, 2.0):
+                    raise Failed(f'{why}, and 2 s later self.future is not None')
+                if not bench.wait(lambda: no_timer_runs(brake), 1.0):
+                    raise Failed('it has given up, and its timer still runs: it gives up for ever')
+            gate.open()
+        return not goes or f'{why}, and it says go'
 
     @cached
-    def gives_up():
-        return stops_without_an_answer(camera_is_there=True)
-
-    def stops(sees, distance):
-        return stops_for(SafeBrake, SingleThreadedExecutor, sees, distance)
-
-    def an_answer_ends_the_wait():
-        with Bench() as bench:
-            stops = bench.hear('stop', Empty)
-            bench.spin(SafeBrake(), Camera('dust on a wall', takes_s=0.0))
-            bench.say('scan', scan(0.5))
-            bench.wait(lambda: stops, 1.0)
-        return not stops or 'the camera says dust, and 0.5 s later it stops all the same'
+    def gives_up_on_a_camera():
+        return gives_up(camera_is_there=True)
 
     def asks(right, answers):
         """Show three near scans, and count the questions. With `answers`, each gets its answer."""
@@ -284,57 +299,51 @@ def if_you_do_not_know_stop(SafeBrake):
         )
 
     def forgets():
-        """Let the answer come after it has given up."""
-        needs(gives_up)
+        """Let the camera answer "dust" after the brake has given up."""
+        needs(gives_up_on_a_camera)
         # rclpy only warns of an exception in a done callback.
         with warnings.catch_warnings(record=True) as warned, Bench() as bench:
             warnings.simplefilter('always')
-            gate, stops = bench.gate(), bench.hear('stop', Empty)
+            gate, goes = bench.gate(), bench.hear('go', Empty)
             brake = bench.spin(SafeBrake())
-            bench.spin(Camera(hold=gate.hold))
+            bench.spin(Camera('dust', hold=gate.hold))
+            bench.wait(brake.client.service_is_ready)
             bench.say('scan', scan(0.5), at_once=True)
-            if not bench.wait(lambda: stops):
-                return 'it never gives up'
-            is_forgotten = bench.wait(lambda: brake.future is None, 1.0)
+            gate.wait_until_entered()
+            bench.wait(lambda: brake.future is None)
             gate.open()
             bench.quiet()
-            late = len(stops) - 1
         if warned:
             return f'after it has given up, answered fails: {warned[0].message}'
-        if not is_forgotten:
-            return 'it has given up, and self.future is not None'
-        return expect(
-            late, 0, 'it gives up, the answer comes late, and it stops', unit='more times'
-        )
+        return not goes or 'it has given up, the answer comes late, and it says go'
 
-    def does_not_know(what, distance, age_s):
-        with Bench() as bench:
-            stops = bench.hear('stop', Empty)
-            camera = Camera('dust', takes_s=0.0)
-            bench.spin(SafeBrake(), camera)
-            bench.say('scan', scan(distance, age_s=age_s))
-        if camera.asked:
-            return f'{what}: it asks the camera'
-        return expect(len(stops), 1, f'{what}: it stops', unit='times')
-
-    timer = 'scan_callback: self.timer.reset() when it asks. give_up cancels the timer, and stops.'
-    cancel = 'answered: self.timer.cancel().'
+    free = 'if distance >= LIMIT_M: self.go.publish(Empty()).'
+    answer = 'answered: self.timer.cancel(), self.future = None; not future.result().success: go.'
+    timer = 'self.timer.reset() when it asks. give_up: cancel it, and self.future = None.'
     one_question = 'Ask only while self.future is None; answered and give_up set it to None.'
     forget = 'give_up: self.client.remove_pending_request(self.future), then self.future = None.'
-    unknown = 'if distance is None or not is_fresh(self, scan): publish Empty().'
+    unknown = 'if distance is None or not is_fresh(self, scan): return.'
     return [
-        ('no camera: it stops', lambda: stops_without_an_answer(False), timer),
-        ('a camera that never answers: it stops', gives_up, timer),
-        ('a wall: it stops', lambda: stops(SOLID, 0.5), timer),
-        ('dust: it does not', an_answer_ends_the_wait, cancel),
-        ('nothing near: it does not', lambda: stops('a wall', 2.0), 'Compare with LIMIT_M.'),
         *rows(
-            does_not_know,
-            unknown,
-            ('a blind laser: it stops', 'blind', math.nan, 0),
-            ('an old scan: it stops', '3 s old', 2.0, 3),
-            ('from the future: it stops', '3 s ahead', 2.0, -3),
+            says_go,
+            free,
+            ('the way is free: go', 'the way is free', 'a wall', 2.0, 0, 1),
         ),
+        *rows(
+            says_go,
+            answer,
+            ('only dust: it asks, then go', 'dust', 'dust on a wall', 0.9, 1, 1),
+            ('a wall: it asks, no go', 'a wall', SOLID, 0.5, 1, 0),
+        ),
+        *rows(
+            says_go,
+            unknown,
+            ('a blind laser: no go, no question', 'blind', 'dust', math.nan, 0, 0),
+            ('an old scan: the same', '3 s old', 'dust', 2.0, 0, 0, 3),
+            ('from the future: the same', '3 s ahead', 'dust', 2.0, 0, 0, -3),
+        ),
+        ('no camera: no go', lambda: gives_up(camera_is_there=False), timer),
+        ('a camera that never answers: no go', gives_up_on_a_camera, timer),
         ('one question at a time, in a free thread', lambda: asks(1, False), one_question),
         ('after an answer it asks again', lambda: asks(3, True), one_question),
         ('a late answer is thrown away', forgets, forget),
@@ -395,6 +404,23 @@ def three_callbacks_four_threads(Explorer):
 
 
 # --- What the tasks share -------------------------------------------------------------------------
+
+
+def no_timer_runs(brake):
+    return all(timer.is_canceled() for timer in brake.timers)
+
+
+class Asked:
+    """The futures of a client, from now on, of questions that do not wait."""
+
+    def __init__(self, client):
+        self.futures, call_async = [], client.call_async
+
+        def noted(request):
+            self.futures.append(call_async(request))
+            return self.futures[-1]
+
+        client.call_async = noted
 
 
 def two_groups():

@@ -6,12 +6,11 @@ from functools import partial
 
 from geometry_msgs.msg import Twist
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
-from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci as Patrol
 
-from helpers.checks.bench import Bench, must_have
+from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
 from helpers.checks.points import all_of, cached, expect, rows
 from helpers.checks.tasks import Tasks
@@ -179,7 +178,7 @@ def obey(ObedientPatroller):
         )
 
     hint = 'if goal_handle.is_cancel_requested: canceled(), return the result. In the loop.'
-    stop = 'try: all that you have. finally: self.publisher.publish(Twist())'
+    stop = 'try: all that you have. finally: self.command(0.0)'
     before = f'The job of task 1, with an if in it. {stop}'
     return [
         ('without a cancel: three places, and a stop', still_succeeds, before),
@@ -194,71 +193,12 @@ def obey(ObedientPatroller):
 
 
 @tasks.add
-def answer_at_the_end(ChargingPatroller):
-    def charge(patrols, how):
-        """Ask to charge in each patrol. Return what is found of the answers, for each patrol."""
-        with Bench() as bench:
-            node = ChargingPatroller(MutuallyExclusiveCallbackGroup())
-            node.job_ended = ImpatientEvent()
-            bench.spin(node, threads=4)
-            found = [charge_once(bench, node, how) for _ in range(patrols)]
-            must_have(node, 'service')
-            if node.service.callback_group is not node.default_callback_group:
-                raise Failed('self.service is in a group of its own. Let it be in that of the node')
-        return found
-
-    def charge_once(bench, node, how):
-        gate = bench.gate()
-
-        def drive():
-            gate.hold()
-            if how == 'fails':
-                raise WheelStuckError
-
-        job, event = Job(node, drive), node.job_ended
-        goal = send(bench, 1 if how == 'succeeds' else 3)
-        try:
-            if not bench.wait(lambda: gate.entered or goal.done) or goal.done:
-                job.raise_first_error()
-                raise Failed('the job ended without a drive to place 0')
-            event.waits = 0
-            answer = bench.ask('charge', Trigger, limit_s=1)
-            bench.wait(lambda: answer.done() or event.is_waited_for)
-            early = answer.done()
-            busy = not early and bench.wait(lambda: event.waits > BUSY, BUSY_S)
-            if how == 'is cancelled':
-                goal.cancel()
-            gate.open()
-            goal.ended()
-            answered = bench.wait(answer.done)
-        finally:
-            gate.open()
-            event.set()  # nobody shall wait for ever
-        job.raise_first_error()
-        if early:
-            return 'an answer while the robot was on patrol'
-        if busy:
-            return 'the service asks again and again, and keeps a CPU busy: let it wait'
-        return answered or 'no answer'
-
-    twice = cached(lambda: charge(2, 'succeeds'))
-    hint = 'self.job_ended.wait() without a time-out; clear() first, set() in a finally.'
-    always = 'try: return ... finally: ...'
-    return [
-        ('it answers when a patrol has ended', lambda: twice()[0], hint),
-        ('also in a second patrol', lambda: twice()[1], 'When is the Event cleared?'),
-        ('also when a patrol is cancelled', lambda: charge(1, 'is cancelled')[0], hint),
-        ('also when a patrol fails', lambda: charge(1, 'fails')[0], always),
-    ]
-
-
-@tasks.add
 def a_group_of_its_own(options, ChargingPatroller):
     def is_heard(threads):
         with Bench() as bench:
             gate, node = bench.gate(), ChargingPatroller(**options())
             job = Job(node, gate.hold)
-            node.job_ended = ImpatientEvent()
+            node.job_ended = WatchedEvent()
             bench.spin(node, threads=threads)
             goal = send(bench, 3)
             gate.wait_until_entered()
@@ -394,29 +334,14 @@ class WheelStuckError(RuntimeError):
     """What a check lets a job fail of."""
 
 
-BUSY, BUSY_S = 1000, 0.3  # who asks so often in this time does not wait in between
+class WatchedEvent(threading.Event):
+    """An event that knows whether somebody has begun to wait for it."""
 
-
-class ImpatientEvent(threading.Event):
-    """For it, every time-out is over at once: a wait with a time-out cannot hide behind it.
-
-    It `is_waited_for` if somebody waits for ever, or again and again.
-    """
-
-    waits = 0
+    is_waited_for = False
 
     def wait(self, timeout=None):
-        if not super().is_set():
-            self.waits += 3 if timeout is None else 1
-        return super().wait(None if timeout is None else min(timeout, 0.01))
-
-    def is_set(self):
-        self.waits += 1
-        return super().is_set()
-
-    @property
-    def is_waited_for(self):
-        return self.waits >= 3
+        self.is_waited_for = True
+        return super().wait(timeout)
 
 
 class Counted(Node):

@@ -13,12 +13,19 @@ from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
 from helpers.checks.points import all_of, cached, expect, needs, rows
 from helpers.checks.tasks import Tasks
-from helpers.robot import EMPTY, Robot
+from helpers.robot import EMPTY, Floor, Robot
 from helpers.ros import ros_session
 from helpers.trials import ways
 
 tasks = Tasks()
 check = tasks.check
+
+KEEP_THE_BRAKE = (
+    'CarefulDriver brakes in its scan_callback. Write speed(), and leave the rest to it.'
+)
+BLIND_ALLEY = Floor.from_text(
+    '########\n#      #\n#>     #\n#      #\n########', name='blind alley'
+)
 
 
 @tasks.add
@@ -32,13 +39,14 @@ def obey_at_once(Driver):
         (
             'it drives at 0.2, then at 0.4 m/s',
             lambda: drives_at(Driver, 0.2, 0.4),
-            'self.get_parameter(name).value, in the callback.',
+            'speed() returns self.get_parameter(name).value.',
         ),
         (
             'it stops when max_speed is 0.0',
             lambda: drives_at(Driver, 0.5, 0.0),
-            'When is the parameter read: once, or at each scan?',
+            'When is the parameter read: once, or at each call of speed()?',
         ),
+        ('it stops before a wall', lambda: brakes(Driver), KEEP_THE_BRAKE),
     ]
 
 
@@ -66,7 +74,8 @@ def limit_the_parameter(LimitedDriver):
 
     in_range = 'Where is the range? It must be a list, in floating_point_range=[...].'
     return [
-        ('it drives', lambda: drives_at(LimitedDriver, 0.2, 0.4), 'Step 1 has a node that drives.'),
+        ('it drives', lambda: drives_at(LimitedDriver, 0.2, 0.4), 'speed() is as in Driver.'),
+        ('it stops before a wall', lambda: brakes(LimitedDriver), KEEP_THE_BRAKE),
         ('max_speed: 0.0 and 1.0 are accepted, -0.1 and 50.0 refused', has_limits, in_range),
         ('max_speed has its description', has_description, 'ParameterDescriptor(description=...)'),
         (
@@ -367,6 +376,7 @@ def once_a_second(LoggingDriver):
 
     return [
         ('it drives', lambda: drives_at(LoggingDriver, 0.2, 0.4), 'super().scan_callback(scan)'),
+        ('it stops before a wall', lambda: brakes(LoggingDriver), KEEP_THE_BRAKE),
         (
             'in 3 s at the level INFO: 3 lines of INFO, none of DEBUG',
             lambda: counts(LoggingSeverity.INFO, 3.0, 0, 3),
@@ -394,6 +404,19 @@ def drives_at(node_class, *speeds):
             robot.run(1.5, executor)
             found.append(round(robot.record.poses[-1].v, 2))
     return expect(found, [*speeds], f'with max_speed {[*speeds]} it drove (m/s) at')
+
+
+def brakes(node_class):
+    """Tell whether a robot stops before a wall, to which it drives at the default speed."""
+    with ros_session():
+        robot, executor = Robot(BLIND_ALLEY, sim_time=True), SingleThreadedExecutor()
+        executor.add_node(node_class())
+        robot.run(10, executor)
+    way = robot.pose.x - robot.floor.start.x
+    return all_of(
+        robot.bumps == 0 or f'it hit the wall after {way:.1f} m',
+        way > 0.1 or f'it drove {way:.1f} m only: the wall is farther away',
+    )
 
 
 def default_of(node_class, name, right):
