@@ -44,8 +44,6 @@ MAX_CODE_LINES = 24  # what a screen has room for
 PICTURE = re.compile('src="data:image/png;base64,([^"]*)"')
 MIN_WORDS = 6  # of an alternative text
 REASON = '# Not compared: '
-# Their guesses are still typed.
-TYPED_YET = {'call_a_service_from_a_callback', 'run_a_long_job', 'set_parameters'}
 THIS_MACHINE = {str(Path(__file__).resolve().parents[2]), str(Path.home()), sys.prefix} - {'/'}
 PATH = re.compile(
     r'(?<![\w.])/(?:home|root|tmp|work|usr|opt|var|mnt|srv|Users|private)\b(?:/\S*)?'
@@ -318,7 +316,7 @@ def guesses_are_compared(lesson: Lesson) -> Iterator[str]:
     for guess in lesson.guesses:
         if guess.value is not ...:
             yield f'The cell {called(guess.cell)} answers its question: write `...` for a student.'
-        if not guess.shows_answers and lesson.name not in TYPED_YET:
+        if not guess.shows_answers:
             yield (
                 f'The cell {called(guess.cell)} does not show what may be answered: write `on=`, '
                 'such as `on=bool`.'
