@@ -64,8 +64,7 @@ def sentence(name: str, listed: dict[str, list[str]]) -> str:
         f'if {_one_of(_clauses(troubles), ", or ")}{_link(lesson)}'
         for lesson, troubles in sorted(by_lesson.items(), key=lambda group: group[0] == '')
     ]
-    where = 'On a base that keeps the last command, a robot with this program is not safe'
-    return f'{where} {"; ".join(groups)}.'
+    return f'On a base that keeps the last command, this program fails {"; ".join(groups)}.'
 
 
 def _clauses(troubles: Troubles) -> Iterator[str]:
