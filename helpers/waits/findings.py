@@ -470,18 +470,18 @@ class Look:
             where = f'in line {frame.f_lineno} of {frame.f_code.co_name}()'
             if other.thread is activity.thread and not other.suspended:
                 stop = Blocker(
-                    'itself', f'it is the same thread, {where}: a Lock lets no one in twice'
+                    'itself', f'it is the same thread, {where}: a Lock lets no thread in twice'
                 )
                 ends.append(Ender('who holds it would leave its `with`', (stop,)))
                 continue
-            ends.append(self._leaves(activity, other, where))
+            ends.append(self._leaves(other, where))
         if not ends:
             found = changes(self.snapshot, reading.last_name(expression), {'release'})
             ends = self._changers(activity, found, 'release it')
             name += '; no `with` that runs now holds it, so somebody has called acquire()'
         return Finding(activity, 'lock', f'a lock ({name})', ends)
 
-    def _leaves(self, waiter: Activity, holder: Activity, where: str) -> Ender:
+    def _leaves(self, holder: Activity, where: str) -> Ender:
         text = f'{name_of_activity(holder)}, {where}, would leave its `with`'
         stops = self._stops(holder)
         return Ender(text, stops, '' if stops else f'it is at {place_of(holder)}')
