@@ -175,9 +175,7 @@ def test_paper_has_the_text_and_nothing_else(file_page, artefacts):
 
 
 def test_a_message_with_names_of_mine_is_found(file_page):
-    mine = (
-        'RCLError: Failed to create publisher: topic rt/scan with incompatible type'
-    )
+    mine = 'RCLError: Failed to create publisher: topic rt/scan with incompatible type'
     with file_page(1280, 740) as tab:
         tab.goto((SITE / 'messages.html').as_uri())
         tab.get_by_label('Your message').fill(mine)
