@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -104,6 +105,14 @@ class Checkout:
     def stamp(self) -> str:
         stamp = self.root / '.venv/set_up.stamp'
         return f'{stamp.stat().st_mtime_ns} {stamp.read_text()}' if stamp.exists() else ''
+
+
+@pytest.fixture
+def folder_for_all():
+    """A folder that each user may enter: TMPDIR may lie in one that only its owner may."""
+    with tempfile.TemporaryDirectory(dir='/tmp') as folder:
+        Path(folder).chmod(0o755)
+        yield Path(folder)
 
 
 @pytest.fixture(scope='module')
@@ -343,12 +352,9 @@ def full_up_to(disk: Path) -> int:
 
 
 @as_root
-def test_what_another_user_owns_is_named(tmp_path_factory):
+def test_what_another_user_owns_is_named(folder_for_all):
     nobody = 65534
-    folder = tmp_path_factory.mktemp('shared')
-    for parent in (folder, folder.parent, folder.parent.parent):
-        parent.chmod(0o755)
-    others = Checkout(folder)
+    others = Checkout(folder_for_all)
     answer = others.set_up(user=nobody)
     assert (answer.returncode, answer.stderr) == (
         1,
