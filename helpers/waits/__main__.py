@@ -62,11 +62,17 @@ def main(arguments: list[str]) -> None:
         return
     if not arguments or arguments[0].startswith('-'):
         sys.exit('Use: python3 -m waits PROGRAM [ARGUMENTS ...], or --kernel [CONNECTION_FILE]')
+    if Path(arguments[0]).name.startswith('python') and len(arguments) > 1:
+        arguments = arguments[1:]  # `ros2 run --prefix` may name the interpreter, too
     sys.path.append(str(HERE.parent))
     answer_signals()
-    print(f'Ctrl+\\\\ or `kill -QUIT {os.getpid()}` says what waits.', file=sys.stderr, flush=True)
+    print(f'Ctrl+\\ or `kill -QUIT {os.getpid()}` says what waits.', file=sys.stderr, flush=True)
     sys.argv = arguments
     sys.path[0] = str(Path(arguments[0]).resolve().parent)
+    try:
+        compile(Path(arguments[0]).read_bytes(), arguments[0], 'exec')
+    except (OSError, SyntaxError, ValueError) as error:
+        sys.exit(f'{arguments[0]} is no program in Python: {error}')
     runpy.run_path(arguments[0], run_name='__main__')
 
 

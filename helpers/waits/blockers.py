@@ -45,6 +45,7 @@ class Blocker:
 
     cause: str
     text: str
+    holders: tuple[Activity, ...] = ()  # what holds the threads or the group: it may come to an end
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,7 @@ def of_threads(count: int, held: list[Activity]) -> Blocker:
     names = sorted({name_of_activity(one) for one in held})
     only = 'the only thread' if count == 1 else f'each of the {count} threads'
     hold = 'holds' if len(names) == 1 else 'hold'
-    return Blocker('thread', f'{", ".join(names)} {hold} {only} of its executor')
+    return Blocker('thread', f'{", ".join(names)} {hold} {only} of its executor', tuple(held))
 
 
 def _of_group(snapshot: Snapshot, entity: object) -> list[Blocker]:
@@ -166,7 +167,8 @@ def _of_group(snapshot: Snapshot, entity: object) -> list[Blocker]:
         return []
     name = name_of_activity(activity) if activity is not None else name_of_callback(holder)
     waits = ' (an `await` does not give it back)' if activity and activity.suspended else ''
-    return [Blocker('group', f'{name} holds its callback group{waits}')]
+    holders = () if activity is None else (activity,)
+    return [Blocker('group', f'{name} holds its callback group{waits}', holders)]
 
 
 def _of_timer(snapshot: Snapshot, node: Node, entity: object) -> list[Blocker]:

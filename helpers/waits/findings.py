@@ -123,7 +123,10 @@ class Look:
             self.known[activity] = None
             # What the program destroys meanwhile is not said: nothing stands still while we look.
             with contextlib.suppress(InvalidHandle, RCLError):
-                self.known[activity] = self._look(activity)
+                found = self._look(activity)
+                if found is not None:
+                    found.enders = list(map(self._weigh, found.enders))
+                self.known[activity] = found
             self.open.remove(activity)
         return self.known[activity]
 
@@ -134,6 +137,16 @@ class Look:
         """Add why the code that works on the end of a wait does not come to it."""
         stops = self._stops(ender.activity) if ender.activity is not None else ()
         return replace(ender, blockers=stops) if stops else ender
+
+    def _weigh(self, ender: Ender) -> Ender:
+        """Leave out what only takes long: a callback that works gives its thread back."""
+        lasting = tuple(stop for stop in ender.blockers if self._lasts(stop))
+        passing = [stop.text for stop in ender.blockers if stop not in lasting]
+        now = f'not yet, for {"; ".join(passing)}' if passing and not lasting else ender.now
+        return replace(ender, blockers=lasting, now=now)
+
+    def _lasts(self, blocker: Blocker) -> bool:
+        return all(self._stops(one) or _is_endless(one) for one in blocker.holders)
 
     def _stops(self, activity: Activity) -> tuple[Blocker, ...]:
         """Return why something that runs does not come to its end: it waits itself."""
@@ -346,11 +359,9 @@ class Look:
         if found is not None and found.stuck:
             waits = f'it waits for {found.what}, at {place}'
             return Ender(text, (Blocker('held', waits),))
-        for frame in one.own:
-            for loop in reading.loops_around(frame):
-                if _has_no_end(loop):
-                    stop = f'`{_head(loop)}` in line {loop.lineno} has no end'
-                    return Ender(text, (Blocker('endless', stop),))
+        if loop := _is_endless(one):
+            stop = f'`{_head(loop)}` in line {loop.lineno} has no end'
+            return Ender(text, (Blocker('endless', stop),))
         return Ender(text, (), f'it is at {place}' if place else '')
 
     def _of_thread(self, thread: threading.Thread) -> list[Activity]:
@@ -459,18 +470,18 @@ class Look:
             where = f'in line {frame.f_lineno} of {frame.f_code.co_name}()'
             if other.thread is activity.thread and not other.suspended:
                 stop = Blocker(
-                    'itself', f'it is the same thread, {where}: a Lock lets no one in twice'
+                    'itself', f'it is the same thread, {where}: a Lock lets no thread in twice'
                 )
                 ends.append(Ender('who holds it would leave its `with`', (stop,)))
                 continue
-            ends.append(self._leaves(activity, other, where))
+            ends.append(self._leaves(other, where))
         if not ends:
             found = changes(self.snapshot, reading.last_name(expression), {'release'})
             ends = self._changers(activity, found, 'release it')
             name += '; no `with` that runs now holds it, so somebody has called acquire()'
         return Finding(activity, 'lock', f'a lock ({name})', ends)
 
-    def _leaves(self, waiter: Activity, holder: Activity, where: str) -> Ender:
+    def _leaves(self, holder: Activity, where: str) -> Ender:
         text = f'{name_of_activity(holder)}, {where}, would leave its `with`'
         stops = self._stops(holder)
         return Ender(text, stops, '' if stops else f'it is at {place_of(holder)}')
@@ -633,6 +644,12 @@ def _has_no_end(loop: ast.AST) -> bool:
         return False
     tests = [test for test in _exits(loop) if not (isinstance(test, ast.Constant) or _is_ok(test))]
     return not tests
+
+
+def _is_endless(activity: Activity) -> ast.AST | None:
+    """Return the loop without an end that something is in."""
+    loops = (loop for frame in activity.own for loop in reading.loops_around(frame))
+    return next((loop for loop in loops if _has_no_end(loop)), None)
 
 
 def _may_end_by_itself(atom: ast.AST, frame: FrameType) -> bool:

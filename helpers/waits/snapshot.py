@@ -276,9 +276,19 @@ def _entity(stack: list[FrameType]) -> object:
     return None
 
 
+def _tasks_of(executor: Executor) -> list[Task]:
+    """Return the tasks that an executor keeps: in a list of tuples, from rclpy 7.1.9 on in a dict.
+
+    https://github.com/ros2/rclpy/pull/1560
+    """
+    kept = [part for part in vars(executor).values() if isinstance(part, list | dict)]
+    things = [thing[0] if isinstance(thing, tuple) else thing for part in kept for thing in [*part]]
+    return list(dict.fromkeys(thing for thing in things if isinstance(thing, Task)))
+
+
 def _suspended(executor: Executor) -> Iterator[Activity]:
     """Yield the coroutines that an executor will continue."""
-    for task, *_ in list(executor._tasks):  # private: an executor, rclpy 7.1.6
+    for task in _tasks_of(executor):
         coroutine = task._handler  # private: a task, rclpy 7.1.6
         stack, awaits = [], None
         while coroutine is not None:
