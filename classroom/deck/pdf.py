@@ -55,6 +55,8 @@ def pages(notebook: NotebookNode) -> str:
             continue
         waits = False
         cell.metadata.pop('jupyter', None)
+        if 'check' in tags(cell):
+            cell.outputs = []  # of the starter
         place = f'#page-{len(shown)}'
         if starts and shown:
             breaks.append(place)

@@ -30,7 +30,7 @@ import yaml
 
 from classroom.grade.submissions import ARCHIVES, Submission, submissions_of, workspace_files
 from classroom.grade.tables import harmless, text_of
-from helpers.faults.cases import FAULTS, FILE, KINDS, NAME, Fault, read
+from helpers.faults import FAULTS, FILE, KINDS, NAME, Fault, read
 
 ROBOTS = ('uma', 'vic', 'wim', 'xia', 'yuri', 'zoe')
 EACH = 3

@@ -13,7 +13,19 @@ tempting and wrong. Another fault is another folder: CONTRIBUTING.md says what i
     robots   the robots of the lesson: which comes next, what it did, by what its fault is seen
 """
 
-from helpers.faults.cases import FAULTS, KINDS, Case, Fault, Mend, forget, mend_in_words, take
+from helpers.faults.cases import (
+    FAULTS,
+    FILE,
+    KINDS,
+    NAME,
+    Case,
+    Fault,
+    Mend,
+    forget,
+    mend_in_words,
+    read,
+    take,
+)
 from helpers.faults.drives import FRESH_S, OTHER, SEEN, Drive, drive
 from helpers.faults.robots import (
     CORE,
@@ -38,6 +50,7 @@ __all__ = [
     'show_drive',
     'seen',
     'robot',
+    'read',
     'proves',
     'order_of',
     'mend',
@@ -48,6 +61,8 @@ __all__ = [
     'FAULTS',
     'FRESH_S',
     'KINDS',
+    'NAME',
+    'FILE',
     'OTHER',
     'SEEN',
     'Case',
