@@ -87,6 +87,7 @@ class Kernel:
             'PYTEST_CURRENT_TEST': 'classroom/grade/judge.py',
         }
         self._killed = _killed_for_memory()
+        self._others = _children()
         self._manager = KernelManager(kernel_name='python3')
         quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
         self._manager.start_kernel(cwd=str(folder), env=environment, **quiet)
@@ -97,7 +98,7 @@ class Kernel:
         Path(self._manager.connection_file).unlink(missing_ok=True)
 
     def close(self) -> None:
-        children = psutil.Process().children(recursive=True)
+        children = _children() - self._others
         self._client.stop_channels()
         self._manager.shutdown_kernel(now=True)
         for child in children:
@@ -144,6 +145,10 @@ class Kernel:
         if _killed_for_memory() > self._killed:
             return 'it used more memory than the container has'
         return 'its code ended the kernel'
+
+
+def _children() -> set[psutil.Process]:
+    return {*psutil.Process().children(recursive=True)}
 
 
 def _killed_for_memory() -> int:

@@ -69,7 +69,7 @@ def test_from_join_to_the_end(lab_page, tabs, student_server, artefacts):
                     assert 'Verdict' in lab.run(2)
                 if name == 'ada':
                     assert lab.run(3).endswith('Your hand is up. lower_hand() takes it down.\n')
-                    page.get_by_text('Seat 1').wait_for()
+                    page.locator('#hands').get_by_text('Seat 1').wait_for()
         assert page.locator('#seats').inner_text() == '3'
         assert page.locator('[aria-current] b').inner_text() == '3'
         assert page.locator('#tasks td').first.inner_text() == '1'
@@ -87,7 +87,7 @@ def test_from_join_to_the_end(lab_page, tabs, student_server, artefacts):
         page.screenshot(path=artefacts / 'class_wall.png')
         page.go_back()
         page.get_by_role('button', name='Done').click()
-        page.get_by_text('Seat 1').wait_for(state='detached')
+        page.locator('#hands').get_by_text('Seat 1').wait_for(state='detached')
         page.get_by_role('button', name='End the class').click()
         page.get_by_text('The class is over.').wait_for()
         assert process.wait(60) == 0
