@@ -1,4 +1,4 @@
-// Show the messages that share words with what was pasted, the nearest one first.
+// Show the messages that share most words with what was pasted, which may be a part or have more.
 const field = document.querySelector('.find-message input');
 const told = document.querySelector('.find-message output');
 const body = document.querySelector('table tbody');
@@ -8,9 +8,9 @@ const rows = [...body.rows].map(row => ({ row, words: words(row.cells[0].textCon
 field.addEventListener('input', () => {
   const asked = words(field.value);
   const shared = entry => [...entry.words].filter(word => asked.has(word)).length;
-  const part = entry => shared(entry) / entry.words.size;
-  const found = rows.filter(entry => !asked.size || part(entry) >= 0.5)
-    .sort((a, b) => asked.size ? part(b) - part(a) : 0);
+  const part = entry => shared(entry) / Math.min(entry.words.size, asked.size);
+  const found = rows.filter(entry => !asked.size || part(entry) >= 0.6)
+    .sort((a, b) => shared(b) - shared(a));
   body.replaceChildren(...found.map(entry => entry.row));
   told.textContent = asked.size && !found.length
     ? 'No lesson has this message. Try its first words, without names of yours.' : '';
