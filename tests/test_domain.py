@@ -50,6 +50,22 @@ def test_no_domain_left():
     ]
 
 
+def test_a_domain_with_nodes_that_nobody_has_reserved_comes_last():
+    said = run_python("""
+        import domain_coordinator.impl
+        import rclpy
+        from helpers.ros.domain import change_domain_id, reserve_domain_id
+        domain_coordinator.impl.PORT_BASE = 21200
+        rclpy.init(domain_id=reserve_domain_id())
+        left_over = rclpy.create_node('left_over')
+        domain_coordinator.impl.PORT_BASE = 21400  # nothing is reserved here
+        change_domain_id()
+        print(reserve_domain_id() != rclpy.get_default_context().get_domain_id())
+        rclpy.shutdown()
+    """)
+    assert said.strip() == 'True'
+
+
 @pytest.fixture
 def shared_id():
     """Return a domain id that no process of this machine has reserved."""
