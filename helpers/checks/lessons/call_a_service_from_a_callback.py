@@ -207,6 +207,34 @@ def with_one_thread(make_brake, *hints):
 
 
 @tasks.add
+def ask_what_hangs(Survey):
+    def asks_twice(sees, together):
+        """Let the timer call twice, each node with one thread of its own, or both with the same."""
+        with Bench() as bench:
+            survey, camera = Survey(), Camera(sees, takes_s=0.0)
+            if together:
+                bench.spin(survey, camera)
+            else:
+                bench.spin_each(survey, camera)
+            for calls in (1, 2):
+                if not bench.wait(lambda calls=calls: len(survey.answers) >= calls):
+                    found = f'timer_callback was called, and answers is {survey.answers}'
+                    raise Failed(f'{found}. {bench.line_of_callback()}'.rstrip('. '))
+                if calls == 1:
+                    survey.timer.reset()
+            bench.quiet()
+        return expect(survey.answers, [sees] * camera.looks, f'of {camera.looks} answers, it has')
+
+    told = 'add_done_callback, as in task 6: a method of yours gets the future, which is done.'
+    return rows(
+        asks_twice,
+        told,
+        ('one thread for both: it has the answers', 'dust', True),
+        ('a thread for each: it has them, too', 'bricks', False),
+    )
+
+
+@tasks.add
 def the_rule(rule, stops):
     def explains(threads):
         measured = min(threads, 2)  # a third thread frees nothing that a second one does not

@@ -13,7 +13,7 @@ from courier.ahead import distance_ahead
 from courier.program import run
 
 MAX_AGE_S = 0.5  # of what it hears
-AHEAD_S = 0.1  # so far may two clocks differ
+AHEAD_S = 0.1  # two clocks may differ by so much
 NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 

@@ -6,11 +6,14 @@ from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+from rclpy.time import Time
 
 from courier.program import run
 
 GAIN = 4.0  # rad/s for each rad
 MAX_TURN = 1.0  # rad/s
+MAX_AGE_S = 0.5  # of what it hears
+AHEAD_S = 0.1  # two clocks may differ by so much
 
 
 class Route(LifecycleNode):
@@ -37,6 +40,9 @@ class Route(LifecycleNode):
 
     def on_odom(self, odom):
         q = odom.pose.pose.orientation
+        age_s = (self.get_clock().now() - Time.from_msg(odom.header.stamp)).nanoseconds / 1e9
+        if not -AHEAD_S <= age_s <= MAX_AGE_S or not math.isfinite(q.z + q.w):
+            return  # of another time, or no number
         self.yaw = 2 * math.atan2(q.z, q.w)
 
     def want(self):
