@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import difflib
+import functools
 import random
 import re
 from collections.abc import Iterable, Iterator
@@ -240,6 +241,7 @@ def _from_python(code: str, frame: int, hidden: list[str]) -> str:
     return re.sub(rf'{HIDDEN}(\d+)', lambda found: hidden[int(found[1])], code).rstrip('\n')
 
 
+@functools.lru_cache(maxsize=10_000)  # each mutant is compared with each written answer
 def _program(source: str) -> str | None:
     """Return what a source says, whatever its spaces and comments; None if it is no program."""
     magics, body, kind = _parts(source)
