@@ -106,14 +106,16 @@ from helpers.checks import *
 from helpers.lesson import path_of
 {started[1]}
 guess({QUESTION!r}, 14)
+print('guessed', flush=True)
 sys.stdin.read()
 """
         with (
-            running(tell, **student(tmp_path / 'ada', LESSON)),
+            running(tell, **student(tmp_path / 'ada', LESSON)) as ada,
             lab_page(presenter, 'class_deck', DeckPage) as deck,
         ):
             deck.present(LESSON)
             deck.walk_to(GUESS)
+            assert 'guessed\n' in iter(ada.stdout.readline, '')
             frame = deck.page.frame_locator('#deck-guesses')
             frame.get_by_text('1 of 1 have answered').wait_for()
             deck.screenshot('class_deck_hidden')
