@@ -10,8 +10,8 @@ BAR, ESCAPED = re.compile(r'(?<!\\)\|'), r'\\|'
 SCRIPT = Path(__file__).with_suffix('.js')
 BEFORE = """# What a message means
 
-The messages of errors that the lessons make or name, as the tools write them. Paste yours: the
-names in it, of your files and nodes, may differ.
+The messages of errors that the lessons make or name, and others that people ask about, as the tools
+write them. Paste yours: the names in it, of your files and nodes, may differ.
 
 ```{{raw}} html
 <p class="find-message"><label>Your message <input type="search" autocomplete="off"></label>
@@ -28,7 +28,7 @@ names in it, of your files and nodes, may differ.
 
 def page(known: list[Lesson]) -> str:
     """Return the page in Markdown, in the order of the lessons."""
-    rows = [_row(message) for lesson in known if lesson.is_lesson for message in messages(lesson)]
+    rows = [_row(message) for lesson in known for message in messages(lesson)]
     return BEFORE.format(script=SCRIPT.read_text('utf-8')) + '\n'.join(rows) + '\n'
 
 
