@@ -6,7 +6,8 @@ import sys
 import nbformat
 import pytest
 
-from helpers.checks import progress
+from helpers.checks import compare_prediction, guess, progress
+from helpers.checks.portrait import portrait
 from helpers.checks.tasks import Tasks
 
 
@@ -198,3 +199,72 @@ def test_where_it_is_kept(tmp_path, monkeypatch):
     monkeypatch.delenv('JUPYTER_DATA_DIR')  # on a JupyterHub
     monkeypatch.setenv('HOME', str(tmp_path / 'home'))
     assert progress.file().is_relative_to(tmp_path / 'home')
+
+
+# --- The portrait
+
+
+class Asked:
+    """Compares guesses as the cells of a lesson do."""
+
+    def __init__(self, monkeypatch):
+        self.monkeypatch = monkeypatch
+
+    def level(self, question, said, was):
+        self._compare(question, said, was, on=(0.0, 10.0), unit='s')
+
+    def choice(self, question, said, was):
+        self._compare(question, said, was, on=bool)
+
+    def _compare(self, question, said, was, **options):
+        compare_prediction(question, guess(question, said, **options), was)
+
+    def in_lesson(self, file):
+        self.monkeypatch.setenv('JPY_SESSION_NAME', f'notebooks/{file}.ipynb')
+
+
+@pytest.fixture
+def asked(kept, monkeypatch):
+    return Asked(monkeypatch)
+
+
+def portrait_of(capsys):
+    capsys.readouterr()
+    return shown(capsys).partition('are solved.\n')[2]
+
+
+def test_without_a_guess_there_is_no_portrait(kept, capsys):
+    assert portrait_of(capsys) == ''
+
+
+def test_the_portrait_says_what_the_guesses_say_together(asked, capsys):
+    for number in range(3):
+        asked.level(f'How old is {number}?', 2.0, 5.0)
+    asked.in_lesson('93_share_cpp')
+    for number in range(3):
+        asked.choice(f'Does {number} build?', 'yes', True)
+    assert portrait_of(capsys) == (
+        'Of your 6 guesses, 3 came out right. Of 3 numbers that did not, 3 were too little. '
+        'You were right most often in Share "C++", least in Lose them.\n'
+    )
+
+
+def test_two_numbers_are_chance(asked, capsys):
+    asked.level('How old is it?', 2.0, 5.0)
+    asked.level('How late is it?', 2.0, 5.0)
+    assert portrait_of(capsys) == 'Of your 2 guesses, 0 came out right.\n'
+
+
+def test_a_question_that_was_answered_again_counts_once(asked, capsys):
+    asked.choice('Does it build?', 'no', True)
+    asked.choice('Does it build?', 'yes', True)
+    assert portrait_of(capsys) == 'Of your 1 guesses, 1 came out right.\n'
+
+
+def test_the_pictures_have_words_and_a_lesson_with_its_link(asked):
+    asked.level('How old <is> it?', 2.0, 12.0)
+    asked.choice('Does it build?', 'no', True)
+    html = portrait(progress.with_tasks())._repr_html_()
+    assert 'href="92_lose_them.ipynb"' in html
+    assert '<title>How old &lt;is&gt; it? You said 2, and it was 12.</title>' in html
+    assert '<title>Does it build? You said no, and it was yes.</title>' in html

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from IPython import get_ipython
 from IPython.display import display
 
-from helpers.checks import classroom
+from helpers.checks import classroom, portrait
 from helpers.notebook import can_ask
 
 if TYPE_CHECKING:
@@ -109,6 +109,7 @@ def _compare(
         from helpers.guesses import Gap
 
         display(Gap(guess, outcome))
+        portrait.keep(guess, outcome)
         classroom.tell_outcome(question, guess.kind.told(_plain(outcome['at'])))
     if because:
         print(f'  {because}')

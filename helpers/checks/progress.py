@@ -5,7 +5,8 @@ each task, such as `lose_messages be_the_queue`: the names of the lesson and of 
 numbers, which change when a lesson or a task is added before them. Lines of version 0.3 had a
 number, and are read as the task that had it then. What `checks.remember` keeps are lines that begin
 with `memory`; `borrowed lose_messages be_the_queue` is a task that a student has gone on without,
-which is not solved by that. Lines are only ever added, so kernels that write at once lose nothing.
+which is not solved by that. Lines that begin with `gap` are those of `checks.portrait`. Lines are
+only ever added, so kernels that write at once lose nothing.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from IPython import get_ipython
+from IPython.display import display
 from jupyter_core.paths import jupyter_data_dir
 
 from helpers import notebook as text
@@ -114,7 +116,10 @@ def about(task: str) -> list[str]:
 
 
 def show() -> None:
-    """Print for each lesson which tasks are solved, and where progress cannot be kept, why."""
+    """Print for each lesson which tasks are solved, and show the portrait of the guesses.
+
+    Where progress cannot be kept, it says why.
+    """
     path, lines, known = file(), [], with_tasks()
     if path is not None:
         try:
@@ -123,6 +128,10 @@ def show() -> None:
             why = f'Your progress is not kept, because {path} cannot be used: {error.strerror}.'
             print(*text.wrap(why), sep='\n')
     print(table(known, lines))
+    from helpers.checks.portrait import portrait
+
+    if seen := portrait(known):
+        display(seen)
 
 
 def total() -> str:
@@ -161,11 +170,11 @@ def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
         ]
         if borrowed:
             words += f' (borrowed: {_runs(borrowed)})'
-        rows.append([f'{lesson.number} {_title(lesson)}', f'{done} of {len(lesson.tasks)}', words])
+        rows.append([f'{lesson.number} {title(lesson)}', f'{done} of {len(lesson.tasks)}', words])
     return f'{text.table(rows)}\n{sums[0]} of {sums[1]} tasks are solved.'
 
 
-def _title(lesson: Lesson) -> str:
+def title(lesson: Lesson) -> str:
     """Return the title of a lesson, or its name if a student has changed the title."""
     try:
         return lesson.title
