@@ -76,8 +76,11 @@ judge() {
     esac
     name=$1
     shift
+    # Podman would copy what the image has there, which is more than a file system of 1 MB takes.
+    empty=ro,size=1m
+    case $($container --version) in *podman*) empty=$empty,notmpcopyup ;; esac
     exec $container run --rm --interactive --name "$name" "$@" --network none --read-only \
-        --tmpfs /opt/ros2_notebooks/notebooks:ro,size=1m --tmpfs /home/student:ro,size=1m \
+        --tmpfs "/opt/ros2_notebooks/notebooks:$empty" --tmpfs "/home/student:$empty" \
         --tmpfs /tmp:rw,exec,nosuid,nodev,size=1g,mode=1777 --shm-size=256m \
         --memory 3g --memory-swap 3g --pids-limit 400 \
         --cap-drop ALL --security-opt no-new-privileges \
