@@ -170,7 +170,7 @@ sys.stdin.read()
 
 
 def test_a_session_announces_itself_often():
-    """While a plain participant says twice more who it is, a session says so five times, or more.
+    """In a pause of a plain participant, which is 3 s long, a session says five times who it is.
 
     Both send to the ports of participants that may be there: here to that of the twentieth.
     """
@@ -184,10 +184,13 @@ def test_a_session_announces_itself_often():
                 pass
             while announced[theirs] < 6:  # it begins with five, 0.1 s apart
                 announced[sender_of(port)] += 1
-            announced.clear()
-            while announced[theirs] < 2:
-                announced[sender_of(port)] += 1
-    assert announced[ours] >= 5
+            most = 0
+            for _ in range(4):  # what discovers another says so at once: not each pause is whole
+                announced.clear()
+                while not announced[theirs]:
+                    announced[sender_of(port)] += 1
+                most = max(most, announced[ours])
+    assert most >= 5
 
 
 def sender_of(port):
