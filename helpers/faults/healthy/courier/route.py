@@ -41,8 +41,8 @@ class Route(LifecycleNode):
     def on_odom(self, odom):
         q = odom.pose.pose.orientation
         age_s = (self.get_clock().now() - Time.from_msg(odom.header.stamp)).nanoseconds / 1e9
-        if not -AHEAD_S <= age_s <= MAX_AGE_S or not math.isfinite(q.z + q.w):
-            return  # of another time, or no number
+        if not -AHEAD_S <= age_s <= MAX_AGE_S or not abs(q.z**2 + q.w**2 - 1) < 0.1:
+            return  # of another time, or no direction
         self.yaw = 2 * math.atan2(q.z, q.w)
 
     def want(self):
