@@ -283,8 +283,16 @@ class Kernel:
         return printed
 
     async def end(self) -> None:
+        """End the kernel. While its server starts one anew that was killed, it answers 500."""
         self._socket.close()
-        await self.student.ask(f'api/kernels/{self.id}', 'DELETE')
+        async with asyncio.timeout(END_S):
+            while True:
+                try:
+                    return await self.student.ask(f'api/kernels/{self.id}', 'DELETE')
+                except HTTPClientError as error:
+                    if error.code != 500:
+                        raise
+                await asyncio.sleep(0.5)
 
 
 class Student:
