@@ -7,7 +7,7 @@ import nbformat
 import pytest
 
 from helpers.checks import compare_prediction, guess, progress
-from helpers.checks.portrait import portrait
+from helpers.checks.portrait import KEPT, portrait
 from helpers.checks.tasks import Tasks
 
 
@@ -244,7 +244,7 @@ def test_the_portrait_says_what_the_guesses_say_together(asked, capsys):
     for number in range(3):
         asked.choice(f'Does {number} build?', 'yes', True)
     assert portrait_of(capsys) == (
-        'Of your 6 guesses, 3 came out right. Of 3 numbers that did not, 3 were too little. '
+        'Of your 6 guesses, 3 came out right. Of 3 wrong numbers, 3 were too low. '
         'You were right most often in Share "C++", least in Lose them.\n'
     )
 
@@ -258,13 +258,21 @@ def test_two_numbers_are_chance(asked, capsys):
 def test_a_question_that_was_answered_again_counts_once(asked, capsys):
     asked.choice('Does it build?', 'no', True)
     asked.choice('Does it build?', 'yes', True)
-    assert portrait_of(capsys) == 'Of your 1 guesses, 1 came out right.\n'
+    assert portrait_of(capsys) == 'Of your 1 guess, 1 came out right.\n'
 
 
 def test_the_pictures_have_words_and_a_lesson_with_its_link(asked):
     asked.level('How old <is> it?', 2.0, 12.0)
     asked.choice('Does it build?', 'no', True)
-    html = portrait(progress.with_tasks())._repr_html_()
+    lines = progress.lines_of(KEPT)
+    html = portrait(progress.with_tasks(), lines)._repr_html_()
     assert 'href="92_lose_them.ipynb"' in html
     assert '<title>How old &lt;is&gt; it? You said 2, and it was 12.</title>' in html
     assert '<title>Does it build? You said no, and it was yes.</title>' in html
+
+
+def test_a_line_that_was_not_written_to_its_end_is_passed_over(asked, kept, capsys):
+    asked.choice('Does it build?', 'yes', True)
+    with kept.open('a') as lines:
+        lines.write('gap lose_them {"asked": "Does\ngap\n')
+    assert portrait_of(capsys) == 'Of your 1 guess, 1 came out right.\n'

@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING
 from IPython import get_ipython
 from IPython.display import display
 
-from helpers.checks import classroom, portrait
+from helpers.checks import classroom, progress
+from helpers.checks.portrait import line_of
 from helpers.notebook import can_ask
 
 if TYPE_CHECKING:
@@ -109,7 +110,8 @@ def _compare(
         from helpers.guesses import Gap
 
         display(Gap(guess, outcome))
-        portrait.keep(guess, outcome)
+        if lesson := progress.this_lesson():
+            progress.add(line_of(lesson, guess, outcome))
         classroom.tell_outcome(question, guess.kind.told(_plain(outcome['at'])))
     if because:
         print(f'  {because}')

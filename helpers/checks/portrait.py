@@ -7,100 +7,102 @@ was asked, what was said, what came out, whether it was right, and for a number 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
-from helpers.checks import progress
+from helpers.checks.verdict import AMBER, GREEN
 
 if TYPE_CHECKING:
     from helpers.guesses import Guess
     from helpers.lesson import Lesson
 
 KEPT = 'gap'  # begins the line of a guess that was compared
-ENOUGH = 3  # so many numbers say something, fewer are chance
+ENOUGH = 3  # so many guesses say something, fewer are chance
 WIDE, HIGH, EDGE = 64, 24, 6  # px, of the picture of one guess
 
 
-def keep(guess: Guess, outcome: Mapping) -> None:
-    """Keep a guess of the running lesson, and what came out, in place of an earlier one."""
-    lesson = progress.this_lesson()
-    if not lesson:
-        return
-    record, at = guess.kind.record(), outcome['at']
-    axis = None
-    if record['kind'] == 'level':
-        axis = [record['low'], record['high']]
-    elif record['kind'] == 'place':
-        axis = [0.0, record['ahead']]
-    line = {
+def line_of(lesson: str, guess: Guess, outcome: Mapping) -> str:
+    """Return the line that keeps a guess of this lesson, and what came out."""
+    kind, said, was = guess.kind, guess.value, outcome['at']
+    if kind.axis is None:
+        said, was = kind.told(said), kind.told(was)
+    kept = {
         'asked': guess.question,
-        'said': guess.kind.told(guess.value),
-        'was': guess.kind.told(at),
-        'right': bool(guess.gap(outcome)['right']),
-        'axis': axis,
+        'said': said,
+        'was': was,
+        'right': guess.gap(outcome)['right'],
+        'axis': kind.axis,
     }
-    progress.add(f'{KEPT} {lesson} {json.dumps(line, ensure_ascii=False)}')
+    return f'{KEPT} {lesson} {json.dumps(kept, ensure_ascii=False)}'
 
 
 @dataclass(frozen=True)
 class Portrait:
-    """All guesses that were compared, the newest of each question, by the names of the lessons."""
+    """Of some lessons, all guesses that were compared, by the names of the lessons."""
 
-    guesses: Mapping[str, list[dict]]
-    known: Iterable[Lesson]
+    known: Collection[Lesson]
+    guesses: Mapping[str, Collection[Mapping]]
 
     def __str__(self) -> str:
-        """Return what all guesses say together: sentences, none of them without three numbers."""
+        """Return what all guesses say together: sentences, none of what may be chance."""
         every = [one for guesses in self.guesses.values() for one in guesses]
         right = sum(one['right'] for one in every)
-        words = [f'Of your {len(every)} guesses, {right} came out right.']
+        count = f'{len(every)} guess{"es" * (len(every) > 1)}'
+        words = [f'Of your {count}, {right} came out right.']
         missed = [one for one in every if one['axis'] and not one['right']]
-        low = sum(one['said'] < one['was'] for one in missed)
-        for count, side in ((low, 'little'), (len(missed) - low, 'much')):
-            if len(missed) >= ENOUGH and count > len(missed) * 2 / 3:
-                words.append(f'Of {len(missed)} numbers that did not, {count} were too {side}.')
-        shares = {
-            lesson: sum(one['right'] for one in guesses) / len(guesses)
-            for lesson, guesses in self.guesses.items()
-            if len(guesses) >= ENOUGH
+        sides = {
+            'low': sum(one['said'] < one['was'] for one in missed),
+            'high': sum(one['said'] > one['was'] for one in missed),
         }
-        titles = {lesson.name: progress.title(lesson) for lesson in self.known}
+        for side, count in sides.items():
+            if len(missed) >= ENOUGH and count > len(missed) * 2 / 3:
+                words.append(f'Of {len(missed)} wrong numbers, {count} were too {side}.')
+        shares = {
+            lesson.title_or_name: sum(one['right'] for one in guesses) / len(guesses)
+            for lesson in self.known
+            if len(guesses := self.guesses[lesson.name]) >= ENOUGH
+        }
         best, worst = (pick(shares, key=shares.get, default='') for pick in (max, min))
         if best and shares[best] > shares[worst]:
-            words.append(f'You were right most often in {titles[best]}, least in {titles[worst]}.')
+            words.append(f'You were right most often in {best}, least in {worst}.')
         return ' '.join(words)
 
     def _repr_html_(self) -> str:
         rows = [
             f'<tr><th scope="row" style="text-align:left"><a href="{escape(lesson.file)}">'
-            f'{lesson.number} {escape(progress.title(lesson))}</a></th>'
+            f'{lesson.number} {escape(lesson.title_or_name)}</a></th>'
             f'<td style="text-align:left">{"".join(map(_picture, self.guesses[lesson.name]))}</td>'
             '</tr>'
             for lesson in self.known
-            if lesson.name in self.guesses
         ]
         key = 'A ring is your guess, a bar is what came out.'
         return f'<table>{"".join(rows)}</table><p>{key} {escape(str(self))}</p>'
 
 
-def portrait(known: Iterable[Lesson]) -> Portrait | None:
-    """Return the portrait of the student, or None if there is no guess yet."""
+def portrait(known: Iterable[Lesson], lines: Iterable[str]) -> Portrait | None:
+    """Return the portrait that lines of the progress make, or None if no guess was compared.
+
+    Of each question the newest guess counts. A line that cannot be read is passed over.
+    """
     found: dict[str, dict[str, dict]] = {}
-    for line in progress.lines_of(KEPT):
-        _, lesson, text = line.split(' ', 2)
-        one = json.loads(text)
-        found.setdefault(lesson, {})[one['asked']] = one
+    for line in lines:
+        if line.startswith(f'{KEPT} '):
+            with suppress(ValueError):
+                _, lesson, text = line.split(' ', 2)
+                one = json.loads(text)
+                found.setdefault(lesson, {})[one['asked']] = one
     known = [lesson for lesson in known if lesson.name in found]
-    guesses = {lesson.name: [*found[lesson.name].values()] for lesson in known}
-    return Portrait(guesses, known) if guesses else None
+    guesses = {lesson.name: found[lesson.name].values() for lesson in known}
+    return Portrait(known, guesses) if known else None
 
 
 def _picture(one: Mapping) -> str:
     """Return a small SVG: the guess is a ring, what came out is a bar; or a tick, or a cross."""
     says = f'{one["asked"]} You said {_written(one["said"])}, and it was {_written(one["was"])}.'
-    color = '#2e7d32' if one['right'] else '#b26a00'
+    color = GREEN if one['right'] else AMBER
     if one['axis']:
         said, was = (_at(number, *one['axis']) for number in (one['said'], one['was']))
         middle = HIGH / 2

@@ -22,6 +22,7 @@ from IPython.display import display
 from jupyter_core.paths import jupyter_data_dir
 
 from helpers import notebook as text
+from helpers.checks.portrait import portrait
 from helpers.lesson import FOLDER, Lesson, earlier_name, outlines, paths
 
 BORROWED = 'borrowed'  # begins the line of a task that a student has gone on without
@@ -128,9 +129,7 @@ def show() -> None:
             why = f'Your progress is not kept, because {path} cannot be used: {error.strerror}.'
             print(*text.wrap(why), sep='\n')
     print(table(known, lines))
-    from helpers.checks.portrait import portrait
-
-    if seen := portrait(known):
+    if seen := portrait(known, lines):
         display(seen)
 
 
@@ -170,16 +169,10 @@ def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
         ]
         if borrowed:
             words += f' (borrowed: {_runs(borrowed)})'
-        rows.append([f'{lesson.number} {title(lesson)}', f'{done} of {len(lesson.tasks)}', words])
+        rows.append(
+            [f'{lesson.number} {lesson.title_or_name}', f'{done} of {len(lesson.tasks)}', words]
+        )
     return f'{text.table(rows)}\n{sums[0]} of {sums[1]} tasks are solved.'
-
-
-def title(lesson: Lesson) -> str:
-    """Return the title of a lesson, or its name if a student has changed the title."""
-    try:
-        return lesson.title
-    except ValueError:
-        return lesson.name.replace('_', ' ').capitalize()
 
 
 def _lines_of(lesson: Lesson) -> list[str]:

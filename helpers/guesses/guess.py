@@ -23,6 +23,7 @@ class Kind(Protocol):
 
     asks: str  # what one does with it: a sentence
     forms: str  # what may be typed in place of the dots
+    axis: tuple[float, float] | None  # on which the value is a number
     scripts: tuple[Path, ...]  # the first has its words, without a page
 
     def record(self) -> dict:

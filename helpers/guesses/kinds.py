@@ -36,6 +36,10 @@ class Level:
             raise ValueError(f'An axis goes up, and this one from {self.low} to {self.high}.')
 
     @property
+    def axis(self) -> tuple[float, float]:
+        return self.low, self.high
+
+    @property
     def is_whole(self) -> bool:
         return isinstance(self.low, int) and isinstance(self.high, int)
 
@@ -98,6 +102,7 @@ class Options:
     points: Mapping[str, tuple[float, float]] | None = None
 
     scripts = (HERE / 'options.js',)
+    axis = None
 
     @property
     def asks(self) -> str:
@@ -179,6 +184,7 @@ class Rows:
     rows: Mapping[str, Options]
 
     scripts = (HERE / 'rows.js', HERE / 'options.js')
+    axis = None
     asks = 'Choose one in each row.'
 
     @property

@@ -247,6 +247,14 @@ class Lesson:
         return self._find(r'# \d\d (.+)', self._opening, 'title such as `# 02 Lose messages`')[1]
 
     @property
+    def title_or_name(self) -> str:
+        """The title, or the name in words if a student has changed the title."""
+        try:
+            return self.title
+        except ValueError:
+            return self.name.replace('_', ' ').capitalize()
+
+    @property
     def minutes(self) -> int:
         """The minutes that the opening promises."""
         wanted = r'^\*\*Time\*\*:? (\d+) minutes?\.?$'

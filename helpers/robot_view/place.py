@@ -45,6 +45,11 @@ class Place:
         )
 
     @property
+    def axis(self) -> tuple[float, float]:
+        """The metres before what is ahead, up to where the robot starts."""
+        return 0.0, self.ahead_m
+
+    @property
     def begin(self) -> Pose:
         return self.start or self.floor.start
 

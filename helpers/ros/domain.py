@@ -15,7 +15,7 @@ from helpers.ros.session_record import recorded
 
 SHARED_MEMORY = '/dev/shm'
 DOMAIN_IDS = range(1, 101)  # those of domain_coordinator
-# RTPS 2.5, 9.6.2.3: "Default Port Numbers".
+# portBase and domainIDGain of Fast DDS (class PortParameters): the ports of domain 1 begin at 7650.
 FIRST_PORT, PORTS_PER_DOMAIN = 7400, 250
 MARK_ADDRESS = '127.0.0.2'  # of this machine; no connection comes from it
 TURN_TIMEOUT_S = 5.0

@@ -225,7 +225,7 @@ def ask_what_hangs(Survey):
             bench.quiet()
         return expect(survey.answers, [sees] * camera.looks, f'of {camera.looks} answers, it has')
 
-    told = 'add_done_callback, as in task 6: a method of yours gets the future, which is done.'
+    told = 'future.add_done_callback(self.answered): answered gets the future, which is done.'
     return rows(
         asks_twice,
         told,
