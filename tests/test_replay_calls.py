@@ -1,5 +1,7 @@
 """Calls of services, recorded with the real rclpy and replayed."""
 
+from itertools import pairwise
+
 import pytest
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
@@ -62,6 +64,23 @@ def test_the_circle_closes_when_the_question_is_asked(script):
         'it waits for the group of tick and client',
     ]
     assert steps[-1]['queues'] == [0, 0, 1]
+
+
+def test_the_arrows_come_one_at_a_time_and_the_last_one_closes_the_circle(script):
+    shown, _ = record(2, 1)
+    steps = script.call('grown', shown.runs[0].record())
+    counts = [0, *(len(step['arrows']) for step in steps)]
+    assert {after - before for before, after in pairwise(counts)} <= {0, 1}
+    closed = [step['closed'] for step in steps]
+    first = closed.index(True)
+    assert closed == [False] * first + [True] * (len(steps) - first)
+    assert steps[first]['says'] == (
+        'Nobody can go on: tick waits for the answer of look, '
+        'it waits for the group of tick and client, tick holds the group of tick and client.'
+    )
+    assert set(steps[first]['arrows']) - set(steps[first - 1]['arrows']) == {
+        'it waits for the group of tick and client'
+    }
 
 
 def test_a_callback_that_does_not_wait_ends():

@@ -98,3 +98,89 @@ function circleOf(setup, state) {
     says: stuck.length ? `Nobody can go on: ${(turns ?? []).map(({ says }) => says).join(', ')}.` : '',
   };
 }
+
+// An arrow is the same in two states if it leads from and to the same.
+const sameArrow = ({ from, to }) => `${from} > ${to}`;
+
+// The boxes of a circle, in the order in which its arrows turn; of a chain that is open, all of them.
+function placed({ stuck, boxes, arrows, isOpen }) {
+  if (isOpen) return boxes;
+  const found = new Set();
+  const follow = id => {
+    if (found.has(id)) return;
+    found.add(id);
+    arrows.filter(({ from, hot }) => from === id && hot).forEach(({ to }) => follow(to));
+  };
+  stuck.forEach(id => follow(`run ${id}`));
+  return [...found].map(id => boxes.find(box => box.id === id));
+}
+
+// Return a circle that did not close: of a run that waits and will go on, what it holds, its answer,
+// and what the answer needs, which is free. undefined if nobody waits.
+function openOf(setup, state) {
+  const run = model.going(state).find(({ waits }) => waits);
+  if (!run) return undefined;
+  const { client, call: service } = model.step(setup, run);
+  const { name } = setup.callbacks[run.callback];
+  const group = at => setup.groups[setup.callbacks[at].group];
+  const isGroup = group(run.callback).exclusive;
+  const spare = setup.threads.find((_, thread) => thread !== run.thread);
+  const held = isGroup ? group(run.callback).name : setup.threads[run.thread];
+  const free = isGroup ? group(client).name : spare;
+  const answer = `the answer of ${setup.callbacks[service].name}`;
+  const boxes = [['held', held], [`run ${run.id}`, name], ['answer', answer], ['free', free]];
+  const arrow = (from, to, label, says) => ({ from: boxes[from][0], to: boxes[to][0], label, says });
+  return {
+    stuck: [],
+    isOpen: true,
+    boxes: boxes.map(([id, box]) => ({ id, name: box })),
+    arrows: [
+      arrow(0, 1, 'held by', `${name} holds ${held}`),
+      arrow(1, 2, 'waits for', `${name} waits for ${answer}`),
+      arrow(2, 3, 'needs', `it needs ${free}, which is free`),
+    ],
+  };
+}
+
+// Give a run that can never go on its circle. Its arrows come one at a time, each with a step of its
+// own. `circle(step)` is what circleOf returns then, and `end` that of the last step. `says` has the
+// sentences that are not those of the run, `almost` is the step before the circle closes.
+function close(run, { setup }) {
+  if (!setup?.callbacks.some(({ does = [] }) => does.some(step => 'client' in step))) return run;
+  const at = move => circleOf(setup, run.seek(move).state);
+  const end = at(run.times.length);
+  if (!end.stuck.length) return run;
+  const here = new Set(placed(end).map(({ id }) => id));
+  const steps = [{ move: 0, circle: at(0) }];
+  let known = new Set();
+  run.times.forEach((_, i) => {
+    const circle = at(i + 1);
+    const seen = circle.arrows.filter(({ from, to }) => here.has(from) && here.has(to));
+    const late = seen.filter(one => !known.has(sameArrow(one))).slice(1);
+    const closes = circle.stuck.length && !steps.at(-1).circle.stuck.length;
+    // Until the last arrow has come, the circle is not closed.
+    late.forEach((one, k) => steps.push({
+      move: i + 1,
+      circle: {
+        ...circle,
+        ...(closes ? { stuck: [], says: '' } : {}),
+        arrows: circle.arrows.filter(it => !late.slice(k).includes(it)).map(it => ({ ...it, hot: it.hot && !closes })),
+      },
+      says: k ? `${model.capital(late[k - 1].says)}.` : undefined,
+    }));
+    const told = late.length ? `${model.capital(late.at(-1).says)}.` : undefined;
+    steps.push({ move: i + 1, circle, says: closes ? circle.says : told });
+    known = new Set(seen.map(sameArrow));
+  });
+  const closing = steps.findIndex(({ circle }) => circle.stuck.length);
+  return {
+    ...run, end,
+    times: steps.slice(1).map(({ move }) => run.times[move - 1]),
+    seek: step => run.seek(steps[step].move),
+    scan: () => run.scan().map(move => steps.findLastIndex(one => one.move === move)),
+    circle: step => steps[step].circle,
+    says: step => steps[step].says,
+    ranks: steps.slice(1).map((_, i) => (i + 1 === closing ? 2 : 0)),
+    almost: closing - 1,
+  };
+}

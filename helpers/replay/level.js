@@ -18,6 +18,7 @@ function show(root, level) {
   let state;
   let lists;
   let waits;
+  let open; // the newest circle that did not close
 
   const says = element('div', { 'aria-live': 'polite', class: 'replay-says' });
   const ready = element('ul', { 'aria-label': 'ready', role: 'list', class: 'level-ready' });
@@ -34,7 +35,8 @@ function show(root, level) {
     const over = now.isOver(state);
     const circle = circleOf(setup, state);
     lists.draw(state, over ? circle.stuck : []);
-    if (over) waits.draw(circle);
+    open = openOf(setup, state) ?? open;
+    if (over) waits.draw(circle.stuck.length || !open ? circle : open);
     time.textContent = `${+state.now.toFixed(3)} s`;
 
     const index = [...ready.children].findIndex(item => item.contains(document.activeElement));
@@ -43,12 +45,16 @@ function show(root, level) {
       element('button', { type: 'button', onclick: () => choose(move) },
         element('span', { 'aria-hidden': 'true', class: 'level-key' }, `${place + 1}`), text))));
     ready.classList.toggle('level-over', over);
-    if (over) say(...result());
+    if (over) tell(result());
     if (index >= 0) (buttons()[index] ?? buttons()[0] ?? again).focus();
   }
 
   const buttons = () => [...ready.querySelectorAll('button')];
-  const say = (...texts) => says.append(...texts.map(text => element('p', {}, text)));
+  const say = (text, kind) => says.append(element('p', { class: kind }, text));
+  const tell = ([score, lesson]) => {
+    say(score, 'level-score');
+    say(lesson);
+  };
 
   function result() {
     const own = now.score(state);
@@ -65,7 +71,7 @@ function show(root, level) {
     says.textContent = '';
     if (refused) {
       say(`No. ${refused}`);
-      if (now.isOver(state)) say(...result());
+      if (now.isOver(state)) tell(result());
       return;
     }
     const done = now.choose(state, move);
@@ -81,6 +87,7 @@ function show(root, level) {
     setup = variant.setup;
     now = game({ ...variant, goal: level.goal });
     state = now.start();
+    open = undefined;
     const { threads, groups, arrivals } = setup;
     const grouped = threads.length * groups.length > 1 ? ['groups'] : [];
     const names = ['threads', ...grouped, 'queue', ...ROWS[level.goal]];

@@ -4,7 +4,7 @@ const [RING_WIDE, RING_HIGH] = [340, 260]; // pixels: letters keep their size on
 const LETTERS = 17; // of a line in a box
 
 // Return the node of the picture, and `draw(now, last)`: what circle.js returns of this state, and of
-// the end. Only the boxes that those who never go on hold or wait for have a place.
+// the end. Only the boxes of the circle have a place, or those of a chain that is open.
 function ring() {
   const draws = (tag, attributes, ...children) => {
     const made = document.createElementNS('http://www.w3.org/2000/svg', tag);
@@ -14,18 +14,7 @@ function ring() {
   };
   const text = (words, x, y, kind) => draws('text', { x, y, class: kind }, words);
   const node = element('div', { class: 'ring' });
-
-  // All that those on the circle wait for, in the order in which the arrows turn.
-  function reached({ stuck, boxes, arrows }) {
-    const found = new Set();
-    const follow = id => {
-      if (found.has(id)) return;
-      found.add(id);
-      arrows.filter(({ from, hot }) => from === id && hot).forEach(({ to }) => follow(to));
-    };
-    stuck.forEach(id => follow(`run ${id}`));
-    return [...found].map(id => boxes.find(box => box.id === id));
-  }
+  let known; // the arrows that are drawn already
 
   function lines(name) {
     const found = [''];
@@ -44,21 +33,21 @@ function ring() {
     return [x + part * dx, y + part * dy];
   }
 
-  function drawArrow({ label, hot }, from, to) {
+  function drawArrow({ label, hot }, from, to, isNew) {
     const [[x1, y1], [x2, y2]] = [edge(from, to, 2), edge(to, from, 4)];
     const angle = Math.atan2(y2 - y1, x2 - x1);
     const at = (along, aside) => `${(x2 - along * Math.cos(angle) - aside * Math.sin(angle)).toFixed(1)} ${(y2 - along * Math.sin(angle) + aside * Math.cos(angle)).toFixed(1)}`;
     const head = hot ? 13 : 10;
-    return draws('g', { class: hot ? 'ring-hot' : 'ring-arrow' },
-      draws('path', { d: `M${x1.toFixed(1)} ${y1.toFixed(1)}L${at(head - 2, 0)}` }),
+    return draws('g', { class: `${hot ? 'ring-hot' : 'ring-arrow'}${isNew ? ' ring-new' : ''}` },
+      draws('path', { class: 'ring-line', pathLength: 1, d: `M${x1.toFixed(1)} ${y1.toFixed(1)}L${at(head - 2, 0)}` }),
       draws('path', { class: 'ring-head', d: `M${at(0, 0)}L${at(head, head / 2)}L${at(head, -head / 2)}z` }),
       text(label, ((x1 + x2) / 2).toFixed(1), ((y1 + y2) / 2 + 4).toFixed(1), 'ring-label'));
   }
 
   function draw(now, last = now) {
     node.replaceChildren();
-    if (!last.stuck.length) return;
-    const all = reached(last);
+    const all = placed(last);
+    if (!all.length) return;
     const places = new Map(all.map((box, i) => {
       const words = lines(box.name);
       const [w, h] = [Math.max(...words.map(line => line.length)) * 7.3 + 16, 16 * words.length + 10];
@@ -70,7 +59,8 @@ function ring() {
     const here = now.boxes.filter(({ id }) => places.has(id));
     const arrows = now.arrows.filter(({ from, to }) => places.has(from) && places.has(to));
     const closed = now.stuck.length > 0;
-    const drawn = arrows.map(one => drawArrow(one, places.get(one.from), places.get(one.to)));
+    const drawn = arrows.map(one => drawArrow(one, places.get(one.from), places.get(one.to), known && !known.has(sameArrow(one))));
+    known = new Set(arrows.map(sameArrow));
     const boxes = here.map(({ id }) => {
       const { x, y, w, h, words } = places.get(id);
       const hot = arrows.some(one => one.hot && (one.from === id || one.to === id));
@@ -79,23 +69,14 @@ function ring() {
         draws('rect', { x: x - w / 2, y: y - h / 2, width: w, height: h, rx: id.startsWith('run') ? 4 : h / 2 }),
         ...words.map((line, i) => text(line, x, y + 4 + 16 * (i - (words.length - 1) / 2))));
     });
-    const middle = closed ? ['Nobody', 'can go on'].map((line, i) =>
-      text(line, all.length === 3 ? 162 : RING_WIDE / 2, RING_HIGH / 2 + 18 * i - 2, 'ring-closed')) : [];
-    const words = [...arrows.map(({ says }) => model.capital(says)), ...(closed ? ['Nobody can go on'] : [])].join('. ');
-    node.replaceChildren(seen(draws('svg', { viewBox: `0 0 ${RING_WIDE} ${RING_HIGH}` }, ...drawn, ...boxes, ...middle),
+    const result = closed ? 'Nobody can go on' : now.isOpen ? 'The circle is open' : '';
+    const middle = result ? [result.split(' ').slice(0, -2).join(' '), result.split(' ').slice(-2).join(' ')] : [];
+    const written = middle.map((line, i) =>
+      text(line, all.length === 3 ? 162 : RING_WIDE / 2, RING_HIGH / 2 + 18 * i - 2, 'ring-closed'));
+    const words = [...arrows.map(({ says }) => model.capital(says)), ...(result ? [result] : [])].join('. ');
+    node.replaceChildren(seen(draws('svg', { viewBox: `0 0 ${RING_WIDE} ${RING_HIGH}` }, ...drawn, ...boxes, ...written),
       words ? `${words}.` : 'Nobody holds or waits for anything.'));
   }
 
   return { node, draw };
-}
-
-// Give a run that can never go on its `end`, and the sentence at the step that closes the circle.
-function close(run, { setup }) {
-  if (!setup?.callbacks.some(({ does = [] }) => does.some(step => 'client' in step))) return run;
-  const at = step => circleOf(setup, run.seek(step).state);
-  const end = at(run.times.length);
-  if (!end.stuck.length) return run;
-  const closes = run.times.findIndex((_, step) => at(step + 1).stuck.length) + 1;
-  const says = step => (step === closes ? at(step).says : undefined);
-  return { ...run, end, says, ranks: run.times.map((_, step) => (step + 1 === closes ? 2 : 0)) };
 }

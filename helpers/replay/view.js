@@ -39,7 +39,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew, counts)
 
   return { node, draw(position, us) {
     const { state, says } = run.seek(position);
-    const now = circle ? circleOf(setup, state) : { stuck: [] };
+    const now = run.circle?.(position) ?? { stuck: [] };
     draw(state, now.stuck);
     count.firstChild.textContent = `${state.lost.length} lost`;
     circle?.draw(now, run.end);
@@ -53,7 +53,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew, counts)
     const part = Math.min(Math.max((us / 1e6 - from) / (until - from), 0), 1);
     const at = part * svg.dataset.wide;
     cursor.setAttribute('transform', `translate(${at.toFixed(1)})`);
-    if (later) place(later, { x: +svg.dataset.left + at, width: svg.dataset.wide - at });
+    if (later) place(later, { x: +svg.dataset.left + at, width: svg.dataset.wide - at + 4 });
   }
 
   function light(is) {
@@ -107,12 +107,15 @@ function show(root, record) {
     const says = runs[who].outcome?.() ?? runs[who].end?.says;
     return says ? [named(who, says)] : [];
   }).join(' ');
-  // It opens where it tells most: at the bump of the drive, else at the last loss, else at the end.
-  // A page whose reader is to guess first opens it at its start.
+  // It opens where it tells most: at the bump of the drive, else at the last loss, else at the end. A
+  // circle opens at its start, for it is to close before the reader's eyes, and so does each replay on
+  // a page whose reader is to guess first.
   const drives = record.runs.flatMap((one, who) => (one.setup ? [] : [who]));
   const hides = root.dataset.opens === 'start';
+  const grows = runs.some(({ circle }) => circle);
+  const isNew = hides || grows;
   const bump = drives.length === 1 && record.opens !== 'end' ? stops[drives[0]][0] : undefined;
-  const telling = hides ? 0 : bump ?? (drives.length ? last : losses.at(-1) ?? last);
+  const telling = isNew ? 0 : bump ?? (drives.length ? last : losses.at(-1) ?? last);
   const length = steps.at(-1)?.us ?? 0;
   let position = 0;
   let fresh = true; // as it was opened
@@ -123,7 +126,7 @@ function show(root, record) {
   const images = [...root.querySelectorAll('figure > img')];
   // One thread that runs one callback needs no group to be understood.
   const grouped = record.runs.some(({ setup }) => setup?.callbacks.length > 1 || setup?.threads.length > 1);
-  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped, length < SHORT_US, hides && drives.length, record.runs.some(other => other.strip))
+  const panels = record.runs.map((one, i) => (one.setup ? panel(runs[i], one, images[i], record.span, grouped, length < SHORT_US, grows || (hides && drives.length), record.runs.some(other => other.strip))
     : floor(runs[i], one, drawing(images[i]))));
   const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
   const slider = element('input', {
@@ -275,11 +278,14 @@ function show(root, record) {
     KEYS[key]();
   }
 
-  // A clicker walks by two stops: the first loss, and the end. The deck asks for the next one.
+  // A clicker walks by two stops: the first loss, or the step before a circle closes, and the end. The
+  // deck asks for the next one.
+  const almost = runs.flatMap((run, who) => (run.almost > 0 ? [counts[who].indexOf(run.almost)] : []));
   function onStop(event) {
     if (position === last) return;
     event.preventDefault();
-    rest(losses.slice(0, 1).find(first => first !== position && (fresh || first > position)) ?? last);
+    const halts = [...losses.slice(0, 1), ...almost].sort((one, other) => one - other);
+    rest(halts.find(halt => halt !== position && (fresh || halt > position)) ?? last);
   }
 
   // The picture is the slider, too: a pointer that is pressed takes the time with it.
@@ -320,12 +326,13 @@ function show(root, record) {
   root.querySelector('.replay-on > p').before(controls, says, shown); // which is then below
   nameSpeed();
   rest(telling);
-  fresh = !hides;
-  if (hides) {
+  fresh = telling > 0;
+  if (isNew) {
     root.classList.add('replay-new');
-    says.textContent = 'Have you guessed? Then play it.';
     shown.nextElementSibling.remove(); // it tells the end
-  } else if (bump !== undefined && outcome()) says.textContent = outcome();
+  }
+  if (hides) says.textContent = 'Have you guessed? Then play it.';
+  else if (bump !== undefined && outcome()) says.textContent = outcome();
   nameButton();
 }
 

@@ -45,6 +45,19 @@ function steps(record) {
   });
 }
 
+// Of each step of a run that ends in a circle: the arrows on the page, whether it is closed, and
+// the sentence, undefined if it is that of the run.
+function grown(record) {
+  const run = close(walk(record), record);
+  const here = new Set(placed(run.end).map(({ id }) => id));
+  const isHere = ({ from, to }) => here.has(from) && here.has(to);
+  return run.times.map((_, i) => ({
+    arrows: run.circle(i + 1).arrows.filter(isHere).map(({ says }) => says),
+    closed: run.circle(i + 1).stuck.length > 0,
+    says: run.says(i + 1),
+  }));
+}
+
 // The states of some steps, asked for in this order.
 const seek = (record, steps) => {
   const run = walk(record);
