@@ -8,6 +8,7 @@ import psutil
 import pytest
 from support.kernel import Kernel
 
+from helpers.checks import showing
 from helpers.checks import tasks as module
 from helpers.checks.errors import Failed, sentence
 from helpers.checks.points import needs
@@ -194,9 +195,9 @@ def test_an_interrupt_takes_the_message_of_a_running_check_away(capsys, lesson, 
             if shown[-1]:
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr(module, 'somebody_watches', lambda: True)
-    monkeypatch.setattr(module, 'SHOW_AFTER_S', 0)
-    monkeypatch.setattr(module, 'display', Shown)
+    monkeypatch.setattr(showing, 'somebody_watches', lambda: True)
+    monkeypatch.setattr(showing, 'SHOW_AFTER_S', 0)
+    monkeypatch.setattr(showing, 'display', Shown)
     with pytest.raises(KeyboardInterrupt):
         tried(capsys, lesson)
     assert shown == ['Checking: 0 of 2 …', 'Checking: 1 of 2 …', '']

@@ -43,7 +43,6 @@ from functools import cached_property
 
 from IPython import get_ipython
 from IPython.core.error import UsageError
-from IPython.display import display
 from IPython.utils.capture import capture_output
 
 from helpers.checks import classroom, progress
@@ -51,7 +50,8 @@ from helpers.checks.honest import CHANGED, Untouched
 from helpers.checks.needs import Needs, needs_of
 from helpers.checks.points import Test, judge_points
 from helpers.checks.sandbox import Ending, Sandbox
-from helpers.checks.verdict import AGAIN, BELOW, Point, Verdict, bundle
+from helpers.checks.showing import Running, show
+from helpers.checks.verdict import AGAIN, BELOW, Point, Verdict
 from helpers.lesson import (
     Lesson,
     check_call,
@@ -61,13 +61,12 @@ from helpers.lesson import (
     outline,
     path_of,
 )
-from helpers.notebook import names_of, own_line, somebody_watches, wrap
+from helpers.notebook import names_of, own_line, wrap
 from helpers.ros import change_domain_id
 
 CPU_LIMIT_S = 5.0  # of one point: an endless loop uses it up
 LIMIT_S = 15.0  # of one point by the clock, on an idle machine
 TOGETHER_S = 15.0  # of all points, once one of them is wrong
-SHOW_AFTER_S = 1.0
 ENDLESS = 'it did not end. Is there an endless loop, or a spin() that never returns?'
 NOT_TRIED = 'not tried, because the one above did not end'
 NO_TIME = 'not tried, because those above took too long'
@@ -168,7 +167,7 @@ class Tasks:
             if open_files and verdict.points and not verdict.solved:
                 # What it has found may come from the files of these tasks: that is no try.
                 verdict.note = self._says(open_files, 'This may come from', 'check this one again')
-                _show(verdict)
+                show(verdict)
                 return
             attempt.failed = 0 if verdict.solved else attempt.failed + 1
             if attempt.failed > 1 or progress.IS_GRADED in os.environ:
@@ -177,14 +176,14 @@ class Tasks:
             if verdict.solved and (changed := self._what_has_changed(task)):
                 verdict.note = f'{CHANGED.format(changed).capitalize()}. Restart the kernel.'
         if not verdict.points:
-            _show(verdict)
+            show(verdict)
             return
         about = ''
         if verdict.solved:
             about = judge.about(*answer) if judge.about else ''
             progress.record(task, about)
             verdict.total = progress.total()
-        _show(verdict)
+        show(verdict)
         attempt.solved = verdict.solved
         if verdict.solved:
             attempt.stands_in = ''
@@ -212,7 +211,7 @@ class Tasks:
         answer = [eval(argument, names) for argument in attempt.arguments]
         verdict = Verdict(task, judge.number, of='solution')
         _judge(verdict, lambda: judge.points(answer), judge.cpu_s, judge.limit_s)
-        _show(verdict)
+        show(verdict)
 
     def borrow(self, task: str) -> None:
         """Put what the next steps need of a task into place, without showing it.
@@ -559,44 +558,6 @@ class Cells:
 
 _cells = Cells()
 _untouched = Untouched()
-
-
-# --- Showing --------------------------------------------------------------------------------------
-
-
-class Running:
-    """Says how far a check is, if a person watches and it takes a while. Nothing of it stays."""
-
-    def __init__(self, verdict: Verdict) -> None:
-        self._verdict = verdict
-        self._watched = somebody_watches()
-        self._display = None
-
-    def __enter__(self) -> Running:
-        return self
-
-    def update(self, waited_s: float) -> None:
-        """Show how many points were tried, once the check has taken `SHOW_AFTER_S`."""
-        if not self._watched or waited_s < SHOW_AFTER_S:
-            return
-        count = sum(bool(point.ok or point.found) for point in self._verdict.points)
-        data = {'text/html': f'Checking: {count} of {len(self._verdict.points)} …'}
-        if self._display is None:
-            self._display = display(data, raw=True, display_id=True)
-        else:
-            self._display.update(data, raw=True)
-
-    def __exit__(self, *exception) -> None:
-        if self._display is not None:
-            self._display.update({'text/html': ''}, raw=True)
-
-
-def _show(verdict: Verdict) -> None:
-    if get_ipython() is None:
-        print(verdict.text())
-        return
-    data, metadata = bundle(verdict)
-    display(data, metadata=metadata, raw=True)
 
 
 if shell := get_ipython():

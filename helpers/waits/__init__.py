@@ -10,7 +10,8 @@ from __future__ import annotations
 import threading
 from types import FrameType
 
-from .findings import Finding, find
+from .finding import Finding
+from .findings import find
 from .sentences import NOTHING, sentences
 from .snapshot import Snapshot
 

@@ -13,7 +13,7 @@ import subprocess
 import threading
 from collections.abc import Callable
 from concurrent import futures
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from types import FrameType
 
 import rclpy
@@ -45,6 +45,8 @@ from .blockers import (
     server_enders,
 )
 from .changers import changes, enders, methods_of
+from .finding import Finding
+from .loops import PEER_METHODS, exits, head, is_call, is_endless, may_end_by_itself
 from .snapshot import (
     ENDS,
     SPINS,
@@ -64,34 +66,6 @@ LOCKS = (type(threading.Lock()), type(threading.RLock()))
 RCLError = rclpy_implementation.RCLError
 ENDLESS_S = 1e6
 NOT_OF_A_LEARNER = ('/parameter_events', '/rosout', '/clock')
-
-
-@dataclass(eq=False)
-class Finding:
-    """A wait. `kind` is one word for tests and cures; `what` completes 'waits for'."""
-
-    activity: Activity
-    kind: str
-    what: str
-    enders: list[Ender] = field(default_factory=list)
-    needs_all: bool = False  # an answer needs the server and the client; a lock one of its holders
-    limited: bool = False  # a time-out ends the wait
-    loops: bool = False  # it asks again and again
-    spins: bool = False  # it spins an executor meanwhile
-
-    @property
-    def stuck(self) -> bool:
-        """Return whether something that was read keeps this wait from ending."""
-        if self.limited or not self.enders:
-            return False
-        blocked = [bool(ender.blockers) for ender in self.enders]
-        return any(blocked) if self.needs_all else all(blocked)
-
-    @property
-    def causes(self) -> set[str]:
-        """Return the causes of it: those of its blockers, and 'spin in callback'."""
-        found = {blocker.cause for ender in self.enders for blocker in ender.blockers}
-        return found | ({'spin in callback'} if self.spins and self.activity.task else set())
 
 
 def find(snapshot: Snapshot) -> list[Finding]:
@@ -146,7 +120,7 @@ class Look:
         return replace(ender, blockers=lasting, now=now)
 
     def _lasts(self, blocker: Blocker) -> bool:
-        return all(self._stops(one) or _is_endless(one) for one in blocker.holders)
+        return all(self._stops(one) or is_endless(one) for one in blocker.holders)
 
     def _stops(self, activity: Activity) -> tuple[Blocker, ...]:
         """Return why something that runs does not come to its end: it waits itself."""
@@ -268,7 +242,7 @@ class Look:
     def _argument(self, activity: Activity, value: object) -> str:
         """Return the name by which the learner's line hands over a value."""
         here = reading.expression_at(activity.own[0])
-        arguments = here.args + [word.value for word in here.keywords] if _is_call(here) else []
+        arguments = here.args + [word.value for word in here.keywords] if is_call(here) else []
         names = [
             reading.last_name(argument)
             for argument in arguments
@@ -331,7 +305,7 @@ class Look:
     ) -> Finding:
         """Look for the code that calls a method of what the line names."""
         here = reading.expression_at(activity.own[0])
-        owner = here.func.value if _is_call(here) and isinstance(here.func, ast.Attribute) else here
+        owner = here.func.value if is_call(here) and isinstance(here.func, ast.Attribute) else here
         name = reading.last_name(owner)
         if name:
             what = f'{what} ({reading.text_of(owner)})'
@@ -359,8 +333,8 @@ class Look:
         if found is not None and found.stuck:
             waits = f'it waits for {found.what}, at {place}'
             return Ender(text, (Blocker('held', waits),))
-        if loop := _is_endless(one):
-            stop = f'`{_head(loop)}` in line {loop.lineno} has no end'
+        if loop := is_endless(one):
+            stop = f'`{head(loop)}` in line {loop.lineno} has no end'
             return Ender(text, (Blocker('endless', stop),))
         return Ender(text, (), f'it is at {place}' if place else '')
 
@@ -437,7 +411,7 @@ class Look:
         frame = activity.own[0]
         here = reading.expression_at(frame)
         thing = here
-        if _is_call(here):
+        if is_call(here):
             function = reading.evaluate(here.func, frame)
             if getattr(function, '__module__', None) == 'time' and function.__name__ == 'sleep':
                 return Finding(activity, 'sleep', 'a while', limited=True)
@@ -452,7 +426,7 @@ class Look:
             if here.func.attr != 'acquire':
                 return None
         lock = reading.evaluate(thing, frame)
-        if isinstance(lock, LOCKS) and (not _is_call(here) or not (here.args or here.keywords)):
+        if isinstance(lock, LOCKS) and (not is_call(here) or not (here.args or here.keywords)):
             return self._lock(activity, lock, thing)
         return None
 
@@ -511,8 +485,8 @@ class Look:
             for loop in reading.loops_around(frame):
                 if not isinstance(loop, ast.While):
                     return None  # a `for` ends by itself
-                atoms = [atom for test in _exits(loop) for atom in ast.walk(test)]
-                if any(_may_end_by_itself(atom, frame) for atom in atoms):
+                atoms = [atom for test in exits(loop) for atom in ast.walk(test)]
+                if any(may_end_by_itself(atom, frame) for atom in atoms):
                     return None
                 found = self._of_atoms(activity, frame, atoms, loop)
                 if found is not None:
@@ -523,7 +497,7 @@ class Look:
     def _of_atoms(self, activity: Activity, frame: FrameType, atoms: list, loop) -> Finding | None:
         """Return the wait for what a condition names, if it names something that is known."""
         for atom in atoms:
-            if not (_is_call(atom) and isinstance(atom.func, ast.Attribute)):
+            if not (is_call(atom) and isinstance(atom.func, ast.Attribute)):
                 continue
             thing, method = reading.evaluate(atom.func.value, frame), atom.func.attr
             name = reading.last_name(atom.func.value)
@@ -575,7 +549,6 @@ class Look:
 
 
 _GONE = Blocker('gone', 'it was destroyed')
-PEER_METHODS = ('wait_for_service', 'service_is_ready', 'wait_for_server', 'server_is_ready')
 KNOWN: dict[object, Callable] = {
     Client.call.__code__: Look.call,
     ActionClient.send_goal.__code__: Look.call,
@@ -614,52 +587,6 @@ def _server_of(client: object) -> str:
     if isinstance(client, ActionClient):
         return f'the action {action_name(client)}'
     return f'the service {client.srv_name}'
-
-
-def _is_call(thing: object) -> bool:
-    return isinstance(thing, ast.Call)
-
-
-def _head(loop: ast.AST) -> str:
-    return reading.text_of(loop).splitlines()[0].rstrip(':')
-
-
-def _exits(loop: ast.While) -> list[ast.AST]:
-    """Return the conditions that end a loop: its own, and those of its `break` and `return`."""
-    found = [loop.test]
-    for thing in reading.inside(loop):
-        if isinstance(thing, ast.If) and any(
-            isinstance(one, ast.Break | ast.Return) for part in thing.body for one in ast.walk(part)
-        ):
-            found.append(thing.test)
-    return found
-
-
-def _is_ok(atom: ast.AST) -> bool:
-    return _is_call(atom) and reading.text_of(atom.func).endswith('ok')
-
-
-def _has_no_end(loop: ast.AST) -> bool:
-    if not isinstance(loop, ast.While):
-        return False
-    tests = [test for test in _exits(loop) if not (isinstance(test, ast.Constant) or _is_ok(test))]
-    return not tests
-
-
-def _is_endless(activity: Activity) -> ast.AST | None:
-    """Return the loop without an end that something is in."""
-    loops = (loop for frame in activity.own for loop in reading.loops_around(frame))
-    return next((loop for loop in loops if _has_no_end(loop)), None)
-
-
-def _may_end_by_itself(atom: ast.AST, frame: FrameType) -> bool:
-    """Return whether a condition calls something that is not known, such as a time."""
-    if not _is_call(atom) or _is_ok(atom):
-        return False
-    if isinstance(atom.func, ast.Attribute):
-        known = {'done', 'is_set', 'wait', 'is_alive', 'get_subscription_count', *PEER_METHODS}
-        return atom.func.attr not in known
-    return reading.last_name(atom.func) not in ('len', 'bool', 'any', 'all', 'not')
 
 
 def _is_of_library(value: object) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .blockers import Ender, name_of_activity, place_of
-from .findings import Finding
+from .finding import Finding
 
 NOTHING = 'Nothing waits for anything that is known.'
 ASK = 'Call a service from a callback'
