@@ -211,10 +211,10 @@ def test_a_folder_that_was_copied_works_beside_any_program(tmp_path):
         command = [sys.executable, str(folder), str(file)]
         process = subprocess.Popen(command, stdout=out, stderr=out, env=variables, cwd='/')
     asked = Asked(process.pid, output)
-    answer = asked.ask_until(lambda said: wanted(file)[-1] in said)
+    answer = asked.ask_until(lambda said: all(line in said for line in wanted(file)))
     process.kill()
     process.wait()
-    assert wanted(file)[0] in answer
+    assert [line for line in wanted(file) if line not in answer] == [], answer
 
 
 def test_there_are_thirty_and_ten_and_ten_are_of_public_threads():
