@@ -214,7 +214,7 @@ def test_a_folder_that_was_copied_works_beside_any_program(tmp_path):
     answer = asked.ask_until(lambda said: all(line in said for line in wanted(file)))
     process.kill()
     process.wait()
-    assert [line for line in wanted(file) if line not in answer] == [], answer
+    assert [line for line in wanted(file) if line not in answer] == [], asked.said
 
 
 def test_there_are_thirty_and_ten_and_ten_are_of_public_threads():

@@ -19,13 +19,14 @@ import signal
 import socket
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 
 
-def answer_signals() -> None:
-    """Let this process print what waits when the signal QUIT comes, in a thread of its own.
+def answer_signals(say: Callable[[], None]) -> None:
+    """Let this process `say` what waits when the signal QUIT comes, in a thread of its own.
 
     A handler in Python would have to wait until the main thread is back from C, and the wait of rcl
     does not come back. The byte that Python writes for each signal comes at once.
@@ -43,14 +44,17 @@ def answer_signals() -> None:
     threading.Thread(target=watch, name='waits', daemon=True).start()
 
 
-def say() -> None:
-    # Not before it is asked: to import rclpy is the program's affair. A folder that runs as a
-    # program has no package around it.
-    try:
+def what_to_say() -> Callable[[], None]:
+    """Return a function that prints what waits. It imports nothing more.
+
+    Two threads that import parts of one package at the same time can end with an error, and one of
+    them would be the program: so rclpy is here before the program begins.
+    """
+    try:  # a folder that runs as a program has no package around it
         from helpers.waits import NOTHING, explain
     except ImportError:
         from waits import NOTHING, explain
-    print(explain() or NOTHING, file=sys.stderr, flush=True)
+    return lambda: print(explain() or NOTHING, file=sys.stderr, flush=True)
 
 
 def main(arguments: list[str]) -> None:
@@ -64,15 +68,15 @@ def main(arguments: list[str]) -> None:
         sys.exit('Use: python3 -m waits PROGRAM [ARGUMENTS ...], or --kernel [CONNECTION_FILE]')
     if Path(arguments[0]).name.startswith('python') and len(arguments) > 1:
         arguments = arguments[1:]  # `ros2 run --prefix` may name the interpreter, too
-    sys.path.append(str(HERE.parent))
-    answer_signals()
-    print(f'Ctrl+\\ or `kill -QUIT {os.getpid()}` says what waits.', file=sys.stderr, flush=True)
-    sys.argv = arguments
-    sys.path[0] = str(Path(arguments[0]).resolve().parent)
     try:
         compile(Path(arguments[0]).read_bytes(), arguments[0], 'exec')
     except (OSError, SyntaxError, ValueError) as error:
         sys.exit(f'{arguments[0]} is no program in Python: {error}')
+    sys.path.append(str(HERE.parent))
+    answer_signals(what_to_say())
+    print(f'Ctrl+\\ or `kill -QUIT {os.getpid()}` says what waits.', file=sys.stderr, flush=True)
+    sys.argv = arguments
+    sys.path[0] = str(Path(arguments[0]).resolve().parent)
     runpy.run_path(arguments[0], run_name='__main__')
 
 
