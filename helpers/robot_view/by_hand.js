@@ -37,6 +37,16 @@ function onPointer(event) {
   if (name && name !== 'end') press(name);
 }
 
+// Wherever one has clicked in the picture, the keys drive: else they would go to JupyterLab, which
+// folds the lesson away.
+function onEnd() {
+  if (!isOver()) setTimeout(focus);
+}
+
+function focus() {
+  area.querySelector('.by-hand-keys')?.focus({ preventScroll: true });
+}
+
 // A press that was held is over when it is let go: its click would begin it again.
 function onClick(event) {
   if (event.isTrusted && event.detail && event.target.closest?.('.by-hand button:not(.hand-end)')) event.stopPropagation();
@@ -48,7 +58,8 @@ area.addEventListener('keyup', onKey, true);
 area.addEventListener('pointerdown', onPointer);
 area.addEventListener('blur', () => byKey && release(), true);
 for (const name of ['pointerup', 'pointercancel']) window.addEventListener(name, release);
-area.querySelector('.by-hand-keys').focus({ preventScroll: true });
+area.addEventListener('click', onEnd);
+focus();
 // JupyterLab has brought the next cell into view, and with it pushed the picture out.
 area.scrollIntoView({ block: 'end' });
 // When the buttons go, the selected cell gets the keys: Shift+Enter runs it.

@@ -87,6 +87,9 @@ def test_watched_driven_and_replayed(lab):
         wait_for_another(page, ROBOT, before)
         release()
         wait_until_it_stands(page)
+    # A click into the picture takes no key away.
+    page.locator('.robot-live').click()
+    page.wait_for_selector('.by-hand-keys:focus')
     lab.screenshot('robot_by_hand')
     width = page.evaluate(WIDTH)
     stopped = place(page)
