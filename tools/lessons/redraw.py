@@ -63,11 +63,27 @@ def files_in(text: str, kind: str) -> list[Path | str]:
     return sorted(places, key=places.get)
 
 
+def names_in(text: str) -> set[str]:
+    """Return the functions and constants of today's files `.js` that a script has."""
+    known = {name for patterns in marks('js').values() for name in patterns}
+    return {name for name in known if re.search(name, text)}
+
+
 def redrawn(html: str) -> str:
-    """Return an output with the files of today."""
+    """Return an output with the files of today.
+
+    Raises ValueError if a file has changed so much that it is not known again in the output.
+    """
     if OURS not in html:
         return html
-    html = SCRIPT.sub(lambda old: script(*files_in(old[0], 'js')), html)
+
+    def of_today(old: re.Match) -> str:
+        new = script(*files_in(old[0], 'js'))
+        if lost := names_in(old[0]) - names_in(new):
+            raise ValueError(f'it would lose {min(lost)}: run the lesson.')
+        return new
+
+    html = SCRIPT.sub(of_today, html)
     rows = not html.startswith(GUESS)
     return STYLE.sub(lambda old: style(*files_in(old[0], 'css'), rows=rows), html)
 
@@ -86,4 +102,7 @@ def redraw(path: Path) -> bool:
 
 if __name__ == '__main__':
     for path in chosen(' '.join(sys.argv[1:]), ROOT / 'notebooks'):
-        print(f'{path.name}: {"redrawn" if redraw(path) else "unchanged"}')
+        try:
+            print(f'{path.name}: {"redrawn" if redraw(path) else "unchanged"}')
+        except ValueError as error:
+            print(f'{path.name}: not redrawn, {error}')
