@@ -126,7 +126,9 @@ def a_slow_listener(workspace, file):
 
     def ends_after_a_launch():
         needs(ends)
-        with listener(workspace, file) as (_, program):
+        with listener(workspace, file) as (bench, program):
+            bench.say('topic', String(data=first[0]))
+            bench.wait(lambda: program.lines or not program.running, 8)  # then it spins
             if not program.end(signal.SIGTERM, limit_s=4):
                 return 'it does not end when a launch ends it (SIGTERM)'
             if program.failed:
