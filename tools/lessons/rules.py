@@ -277,7 +277,8 @@ def named(lesson: Lesson) -> Iterator[str]:
 
 def links_lead_somewhere(lesson: Lesson) -> Iterator[str]:
     """Every relative link names a file, seen from the notebook's folder."""
-    for target in re.findall(r'\]\(([^)\s]+)', prose(lesson)):
+    text = re.sub(r'`[^`\n]*`', '', prose(lesson))  # `[this](const auto & scan)` is no link
+    for target in re.findall(r'\]\(([^)\s]+)', text):
         file = target.partition('#')[0]
         if not re.match(r'[a-z]+:|#', target) and not (FOLDER / file).exists():
             yield f'The link {target} leads nowhere.'
