@@ -69,12 +69,11 @@ function ring() {
         draws('rect', { x: x - w / 2, y: y - h / 2, width: w, height: h, rx: id.startsWith('run') ? 4 : h / 2 }),
         ...words.map((line, i) => text(line, x, y + 4 + 16 * (i - (words.length - 1) / 2))));
     });
-    const result = closed ? 'Nobody can go on' : now.isOpen ? 'The circle is open' : '';
-    const middle = result ? [result.split(' ').slice(0, -2).join(' '), result.split(' ').slice(-2).join(' ')] : [];
-    const written = middle.map((line, i) =>
+    const result = closed ? ['Nobody', 'can go on'] : now.isOpen ? ['The circle', 'is open'] : [];
+    const middle = result.map((line, i) =>
       text(line, all.length === 3 ? 162 : RING_WIDE / 2, RING_HIGH / 2 + 18 * i - 2, 'ring-closed'));
-    const words = [...arrows.map(({ says }) => model.capital(says)), ...(result ? [result] : [])].join('. ');
-    node.replaceChildren(seen(draws('svg', { viewBox: `0 0 ${RING_WIDE} ${RING_HIGH}` }, ...drawn, ...boxes, ...written),
+    const words = [...arrows.map(({ says }) => model.capital(says)), ...(result.length ? [result.join(' ')] : [])].join('. ');
+    node.replaceChildren(seen(draws('svg', { viewBox: `0 0 ${RING_WIDE} ${RING_HIGH}` }, ...drawn, ...boxes, ...middle),
       words ? `${words}.` : 'Nobody holds or waits for anything.'));
   }
 

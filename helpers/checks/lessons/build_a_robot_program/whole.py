@@ -131,7 +131,7 @@ def the_whole_node(workspace):
             # Only those of the scans: wheels and IMU are right, so the node knows where it is.
             tour.cables['scan'].change = lambda scan: scan
             tour.run(1)
-            tour.cables['scan'].change, now_s = later_by(ahead_s), tour.robot.t_s
+            tour.cables['scan'].change, now_s = with_stamp(ahead_s), tour.robot.t_s
             tour.run(1)
             when = f'{ahead_s:g} s in the future' if ahead_s > 0 else f'{-ahead_s:g} s old'
             drives = any(v or w for v, w in tour.speeds(now_s + 0.2))
@@ -232,17 +232,6 @@ def the_whole_node(workspace):
     ]
 
 
-def later_by(seconds):
-    """Return a function that makes the stamp of a message so much later."""
-
-    def change(message):
-        stamp = Time.from_msg(message.header.stamp) + Duration(seconds=seconds)
-        message.header.stamp = stamp.to_msg()
-        return message
-
-    return change
-
-
 def says_nan(message):
     """Return a message of wheels or IMU without numbers."""
     if isinstance(message, Imu):
@@ -252,11 +241,11 @@ def says_nan(message):
     return message
 
 
-def with_stamp(late_s):
-    """Return a function that changes the stamp of a message."""
+def with_stamp(later_s):
+    """Return a function that makes the stamp of a message so much later (s)."""
 
     def change(message):
-        stamp = Time.from_msg(message.header.stamp) + Duration(seconds=late_s)
+        stamp = Time.from_msg(message.header.stamp) + Duration(seconds=later_s)
         message.header.stamp = stamp.to_msg()
         return message
 
