@@ -47,15 +47,15 @@ def test_lesson_00_shows_the_tasks_that_there_are():
 def test_each_task_has_answers_that_try_its_check(lesson):
     file = ANSWERS / f'{lesson.name}.yaml'
     answers = answers_of(file) if file.exists() else {}
-    wanted = {f'{task.name} {kind}' for task in lesson.tasks for kind in LEAST}
-    may_be = {f'{task.name} {EQUAL}' for task in lesson.tasks}
+    wanted = {f'{task.name} right' for task in lesson.tasks}
+    may_be = {f'{task.name} {kind}' for task in lesson.tasks for kind in ('wrong', EQUAL)}
     differ = ', '.join(sorted((answers.keys() - may_be) ^ wanted))
     assert not differ, (
         f'tests/answers/{file.name} lacks these, or has too many: {differ}. The top of '
         'tests/answers/test_answers.py says how answers are written.'
     )
-    few = [key for key, given in answers.items() if len(given) < LEAST.get(key.split()[1], 1)]
-    assert not few, f'{file.name} has too few answers below {", ".join(few)}: {LEAST} are wanted.'
+    few = [key for key in sorted(wanted) if len(answers[key]) < LEAST['right']]
+    assert not few, f'{file.name} has fewer than {LEAST["right"]} answers below {", ".join(few)}.'
 
 
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
@@ -76,12 +76,22 @@ def test_each_answer_can_still_be_made_from_its_task(lesson):
 
 
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
-def test_each_equal_mutant_has_a_reason_and_is_made_by_a_rule(lesson):
+def test_answers_and_the_rules_of_wrong_ones_fit_together(lesson):
     file = ANSWERS / f'{lesson.name}.yaml'
-    if not file.exists() or not any(key.endswith(f' {EQUAL}') for key in answers_of(file)):
+    if not lesson.tasks:
         return
-    stale = [f'{task}: {old}' for task, of in of_lesson(lesson.name).items() for old in of.stale]
-    assert not stale, f'No rule makes these any more, below `equal:` of {lesson.name}.yaml: {stale}'
+    answers, of_tasks = answers_of(file), of_lesson(lesson.name)
+    stale = [f'{task}: {old}' for task, of in of_tasks.items() for old in of.stale]
+    assert not stale, f'No rule makes these any more, below `equal:` of {file.name}: {stale}'
+    for task, of in of_tasks.items():
+        known = '\n\n'.join(of.known)
+        assert not known, f'{task}: take out of {file.name} what a rule makes as well:\n{known}'
+    found = {
+        task: len(answers.get(f'{task} wrong', [])) + len(of.mutants)
+        for task, of in of_tasks.items()
+    }
+    few = {task: number for task, number in found.items() if number < LEAST['wrong']}
+    assert not few, f'There must be {LEAST["wrong"]} wrong answers, with those of rules: {few}'
 
 
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])

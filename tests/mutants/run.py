@@ -220,10 +220,6 @@ def main() -> int:
                 for one in mutants:
                     print(f'\n{name}, {task}: {one.rule.replace("_", " ")} ({one.id})')
                     print(textwrap.indent(one.difference, '    '))
-            for task in tasks:
-                for source in of_lesson(name)[task].known:
-                    print(f'\n{name}, {task}: a rule makes this wrong answer of tests/answers, too')
-                    print(textwrap.indent(source, '    '))
         return 0
     counts: dict[str, Counter] = {name: Counter() for name in drawn}
     slowest: list[tuple[float, str, Judged]] = []
@@ -241,14 +237,6 @@ def main() -> int:
         equal = sum(len(of.equal) for task, of in of_tasks.items() if task in drawn[name])
         numbers = made[name] + equal, count[NOTICED], equal, made[name] - count[NOTICED]
         print(f'{name:40} {"{:4} {:7} {:5} {:4}".format(*numbers)}')
-        known = sum(len(of.known) for task, of in of_tasks.items() if task in drawn[name])
-        if known:
-            print(
-                f'  Rules make {known} of the wrong answers in tests/answers: LIST=yes shows them.'
-            )
-        for task, of in of_tasks.items():
-            for old in of.stale:
-                print(f'  No rule makes this any more, below `{task} equal:`: {old}')
     _, name, one = max(slowest, key=lambda entry: entry[0], default=(0, '', None))
     if one:
         print(f'The slowest: {one.seconds:.0f} s, {name}, {one.task}, {one.mutant.id}. ', end='')

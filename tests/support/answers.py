@@ -8,7 +8,7 @@ from pathlib import Path
 
 import yaml
 
-LEAST = {'wrong': 5, 'right': 3}  # answers of a task
+LEAST = {'wrong': 5, 'right': 3}  # answers of a task: wrong ones with those that rules make
 EQUAL = 'equal'  # mutants of a task that no check need notice: they may be there
 
 
