@@ -207,6 +207,15 @@ def test_true_evidence_is_accepted_from_each_row(name, command, line, right, tmp
     assert proves(case, command, words(line)) == right
 
 
+@pytest.mark.parametrize(
+    ('said', 'right'),
+    [('Publisher count: 2', True), ('count: 2', True), ('Publisher count:', False)],
+)
+def test_a_part_of_a_line_must_go_as_far_as_what_shows_the_fault(said, right, tmp_path):
+    case = Case(Offline(tmp_path), FAULTS['second_voice'], 'dan')
+    assert proves(case, 'ros2 topic info /cmd_vel', 'Publisher count: 2', said) == right
+
+
 @pytest.mark.parametrize('seeds', [[1], [3], range(32)])
 def test_after_the_others_all_robots_come_again_each_with_its_fault(seeds, tmp_path, monkeypatch):
     monkeypatch.setenv(progress.FILE_VARIABLE, str(tmp_path / 'progress.txt'))

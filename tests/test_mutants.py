@@ -286,6 +286,7 @@ def test_only_what_the_learner_writes_has_mistakes():
     differences = [one.difference for one in mutants_of(solution, ['given(1, 2)\nown = ...'])]
     assert differences
     assert not [one for one in differences if '-given' in one]
+    assert not mutants_of('given(1, 2)', ['# given(1, 2)\n...']), 'the comment gives the line'
 
 
 def test_each_mutant_is_another_program_and_can_be_compiled():

@@ -24,6 +24,9 @@ not in what the task asks for, stands in the file as well:
     - self.speed = 0.5: self.speed = 1 / 2
       because: it is the same number
 
+A task in which the learner writes tests is judged by what they find. There `mutant: each that
+survives` says, with a reason, that what the check takes is right.
+
 YAML wants quotes around text that begins with a quote, a bracket or another sign of its own, or
 that has a colon with a space behind it, or a # with a space before it.
 """

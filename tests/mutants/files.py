@@ -34,6 +34,8 @@ OPTIONS = (
     ('--packages-up-to', '--packages-select'), ('-p', '-r'), ('--once', '--times 2'),
     ('--start-offset', '--delay'),
 )  # fmt: skip
+# Commands that change nothing when they run a second time, or only tell something.
+ONCE_IS_ENOUGH = r'\s*(sed -i|cp -r|mkdir -p|ros2 (topic|param|node) (info|get|list))\b'
 DEPENDS = ('depend', 'exec_depend', 'build_depend', 'test_depend', 'buildtool_depend')
 TYPES = {
     'float64': 'float32', 'float32': 'int32', 'int32': 'float64', 'int64': 'int32',
@@ -154,7 +156,8 @@ def a_line_twice(lines: Lines, written: set[int], kind: str) -> Iterator[Lines]:
         for begin, end in _pieces(lines, kind):
             # What gets the same value twice has it.
             is_call = re.match(r'\s*(?!return)([\w.:>-]+(\(| [+-]= )|[+-]{2}\w)', lines[begin])
-            if end - begin == 1 and begin in written and (kind == 'commands' or is_call):
+            again = is_call or (kind == 'commands' and not re.match(ONCE_IS_ENOUGH, lines[begin]))
+            if end - begin == 1 and begin in written and again:
                 yield _with(lines, begin, lines[begin], lines[begin])
 
 

@@ -13,6 +13,7 @@ from mutants.made import Mutant, drawn, mutants_of, same_program
 
 ANSWERS = Path(__file__).resolve().parents[1] / 'answers'
 BY_ID = 'mutant'  # an entry that names a mutant by its id, where no edit can
+EACH = 'each that survives'  # in place of an id: of tests, which are judged by what they find
 
 
 @dataclass(frozen=True)
@@ -21,12 +22,14 @@ class OfTask:
 
     `equal` are those that stand below `NAME equal:` with their reasons, `stale` the entries that no
     rule makes any more, and `known` the wrong answers written by hand that a rule makes as well.
+    With `each_equal` a mutant that the check takes is as good as the solution.
     """
 
     mutants: list[Mutant]
     equal: list[tuple[Mutant, str]]
     stale: list[str]
     known: list[str]
+    each_equal: bool = False
 
 
 @cache
@@ -62,8 +65,11 @@ def _of_task(answers: dict[str, list], task: str, cells: Cells) -> OfTask:
 
     # A right answer that a rule makes is equal, and its check judges it anyway.
     mutants = mutants_of(solution, starters, (*sources('right'), *starters))
-    equal, stale, left = [], [], [*mutants]
+    equal, stale, left, each_equal = [], [], [*mutants], False
     for edits, reason in equal_of(answers, task):
+        if edits.get(BY_ID) == EACH:
+            each_equal = True
+            continue
         if BY_ID in edits:
             found = next((one for one in left if one.id == edits[BY_ID]), None)
         else:
@@ -79,4 +85,4 @@ def _of_task(answers: dict[str, list], task: str, cells: Cells) -> OfTask:
         for source in sources('wrong')
         if any(same_program(source, mutant.source) for mutant in mutants)
     ]
-    return OfTask(left, equal, stale, known)
+    return OfTask(left, equal, stale, known, each_equal)

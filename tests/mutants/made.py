@@ -84,12 +84,20 @@ def same_program(one: str, other: str) -> bool:
 
 
 def written_lines(solution: str, starters: Iterable[str]) -> set[int]:
-    """Return the numbers, from 0, of the lines of a solution that are in no starter."""
-    given = [line.strip() for source in starters for line in source.splitlines()]
-    lines = [line.strip() for line in solution.splitlines()]
+    """Return the numbers, from 0, of the lines of a solution that are in no starter.
+
+    A line of a starter is also given in a comment, which the learner only makes a line.
+    """
+    given = [_bare(line) for one in starters for line in one.splitlines()]
+    lines = [_bare(line) for line in solution.splitlines()]
     matched = difflib.SequenceMatcher(None, given, lines, autojunk=False).get_matching_blocks()
     kept = {at for block in matched for at in range(block.b, block.b + block.size)}
     return {at for at, line in enumerate(lines) if line and at not in kept}
+
+
+def _bare(line: str) -> str:
+    """Return a line without indentation, and without the sign of a comment."""
+    return re.sub(r'^\s*(#|//)?\s*', '', line).rstrip()
 
 
 def entry_of(mutant: Mutant) -> tuple[str, str]:

@@ -38,7 +38,7 @@ ENDS_WORK = {
 }  # fmt: skip
 ONCE_IS_ENOUGH = {
     'set', 'clear', 'cancel', 'notify', 'notify_all', 'join', 'shutdown', 'try_shutdown',
-    'add_node', 'spin',
+    'add_node', 'spin', 'terminal', 'mend',
 }  # fmt: skip
 EXECUTORS = ('SingleThreadedExecutor', 'MultiThreadedExecutor')
 GROUPS = ('MutuallyExclusiveCallbackGroup', 'ReentrantCallbackGroup')

@@ -16,7 +16,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 
 import yaml
@@ -30,7 +30,7 @@ from mutants.made import Mutant, entry_of
 
 SEED = 1
 LIMIT_S = 120  # of a cell: what takes longer has no verdict
-NOTICED, SURVIVED, NO_VERDICT = 'noticed', 'survived', 'no verdict'
+NOTICED, SURVIVED, EQUAL, NO_VERDICT = 'noticed', 'survived', 'equal', 'no verdict'
 HOW = {'right': SURVIVED, 'wrong': NOTICED, 'not judged': NO_VERDICT}
 STOP_EARLY = """
 import helpers.checks.tasks
@@ -103,7 +103,10 @@ class Judge:
         solution = mutants[0].solution
         control = self.judge(task, Mutant('solution', solution, solution))
         if control.how == SURVIVED:
-            return [self.judge(task, mutant) for mutant in mutants]
+            judged = [self.judge(task, mutant) for mutant in mutants]
+            if of_lesson(self._name)[task].each_equal:
+                return [replace(one, how=EQUAL) if one.how == SURVIVED else one for one in judged]
+            return judged
         said = f'The check does not take the solution itself. {control.said}'
         return [Judged(task, mutant, NO_VERDICT, control.seconds, said) for mutant in mutants]
 
@@ -127,7 +130,7 @@ def judge_part(name: str, mutants: dict[str, list[Mutant]]) -> list[Judged]:
         for task, of_task in mutants.items():
             judged += judge.judge_all(task, of_task)
             if of_task:
-                left = sum(one.task == task and one.how != NOTICED for one in judged)
+                left = sum(one.task == task and one.how not in (NOTICED, EQUAL) for one in judged)
                 print(
                     f'{name}, {task}: {len(of_task)} judged, {left} left',
                     file=sys.stderr,
@@ -228,14 +231,15 @@ def main() -> int:
     for name, one in judge_lessons(drawn, options.jobs):
         counts[name][one.how] += 1
         slowest.append((one.seconds, name, one))
-        if one.how != NOTICED:
+        if one.how not in (NOTICED, EQUAL):
             left.append((name, one))
             print(report_of(name, one), flush=True)
     print(f'{"lesson":40} made noticed equal left')
     for name, count in counts.items():
         of_tasks = of_lesson(name)
-        equal = sum(len(of.equal) for task, of in of_tasks.items() if task in drawn[name])
-        numbers = made[name] + equal, count[NOTICED], equal, made[name] - count[NOTICED]
+        listed = sum(len(of.equal) for task, of in of_tasks.items() if task in drawn[name])
+        left_here = count[SURVIVED] + count[NO_VERDICT]
+        numbers = made[name] + listed, count[NOTICED], listed + count[EQUAL], left_here
         print(f'{name:40} {"{:4} {:7} {:5} {:4}".format(*numbers)}')
     _, name, one = max(slowest, key=lambda entry: entry[0], default=(0, '', None))
     if one:

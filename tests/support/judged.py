@@ -10,14 +10,20 @@ from pathlib import Path
 from helpers.lesson import check_call, code_of_solution, path_of, read
 from support.kernel import NOTEBOOKS, Kernel
 
-KEEP_NAMES = 'get_ipython().names_before = dict(get_ipython().user_ns)'
+# What was run in terminals is evidence in lesson 19, and another answer has not run it.
+KEEP_NAMES = """
+get_ipython().names_before = dict(get_ipython().user_ns)
+get_ipython().ran_before = [*getattr(globals().get('workspace'), '_ran', [])]
+"""
 PUT_NAMES_BACK = """
-def put_back(names, before):
+def put_back(names, before, ran_before):
     names.clear()
     names.update(before)
+    if 'workspace' in names:
+        names['workspace']._ran[:] = ran_before
 
 
-put_back(get_ipython().user_ns, get_ipython().names_before)
+put_back(get_ipython().user_ns, get_ipython().names_before, get_ipython().ran_before)
 """
 STANDS_IN = """
 check.__self__.attempts[{task!r}].given.clear()

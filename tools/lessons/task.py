@@ -50,8 +50,6 @@ def {name}(largest):
 """
 ANSWERS = """
 {name} wrong:
-- 'max(numbers, default=0)': max(numbers)  # fails for an empty list
-- 'max(numbers, default=0)': min(numbers, default=0)  # the smallest
 - 'max(numbers, default=0)': numbers[-1] if numbers else 0  # the last one
 - 'max(numbers, default=0)': sum(numbers)  # all together
 - 'return max(numbers, default=0)': print(max(numbers, default=0))  # shows it, and returns None

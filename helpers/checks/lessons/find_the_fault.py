@@ -52,7 +52,7 @@ def found(case, kind, command, line):
 
     def shows_the_fault():
         needs(was_printed)
-        shows = any(proves(case, command_said, one) for one in lines())
+        shows = any(proves(case, command_said, one, line_said) for one in lines())
         return shows or 'this line alone does not show it: a good robot could print it, too'
 
     def is_of_this_kind():

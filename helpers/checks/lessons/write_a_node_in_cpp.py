@@ -236,17 +236,21 @@ def its_cmakelists(workspace):
     packages = 'scan_tools', 'small_rclcpp', 'std_msgs'
     built = cached(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'watcher'))
 
-    def finds_the_packages():
-        """Test the text: a package that another one has found is there, too."""
+    def names_what_it_uses():
+        """Test the text: what another package has found or links is there, too."""
         code = code_of(workspace, 'src/watcher/CMakeLists.txt')
-        missing = [
-            package
-            for package in packages
-            if not re.search(rf'find_package\s*\(\s*"?{package}\b', code)
-        ]
-        if not missing or 'foreach' in code.lower():
+        if re.search(r'\b(foreach|set)\s*\(', code, re.IGNORECASE):
             return True
-        return f'no find_package for {", ".join(missing)}'
+        links = r'(target_link_libraries|ament_target_dependencies)\s*\([^)]*[\s"{]'
+        missing = {
+            'no find_package for': r'find_package\s*\(\s*"?',
+            'watcher is not linked to': links,
+        }
+        for said, command in missing.items():
+            without = [one for one in packages if not re.search(rf'{command}{one}(_|\b)', code)]
+            if without:
+                return f'{said} {", ".join(without)}'
+        return True
 
     def watches(*distances):
         needs(built)
@@ -259,9 +263,10 @@ def its_cmakelists(workspace):
     hint = (
         'Four commands: find_package, add_executable, target_link_libraries, install(TARGETS ...).'
     )
+    finds = 'find_package(NAME REQUIRED), and what it brings in target_link_libraries.'
     return [
         ('it builds', built, hint),
-        ('it finds each package that it uses', finds_the_packages, 'find_package(NAME REQUIRED)'),
+        ('it finds and links each package that it uses', names_what_it_uses, finds),
         ('it runs and says the nearest range', lambda: watches(2.5, 0.75), hint),
     ]
 
@@ -321,7 +326,7 @@ int main(int argc, char ** argv)
 @tasks.add(limit_s=BUILD_S)
 def a_node_of_your_own(workspace):
     built = cached(lambda: install_anew(workspace, 'scan_tools', 'small_rclcpp', 'brake'))
-    walls = 3, 0.55, 0.25, 2, math.nan, 3
+    walls = 3, 0.65, 0.45, 0.35, 0.75, math.nan, 3
 
     @cached
     def heard():
@@ -337,7 +342,7 @@ def a_node_of_your_own(workspace):
 
     def stops_without_a_distance():
         return all_of(
-            brakes(heard(), (2, 0.5), (math.nan, 0.0), (3, 0.5), after=3),
+            brakes(heard(), (0.75, 0.5), (math.nan, 0.0), (3, 0.5), after=4),
             not any(EMPTY_OPTIONAL in line for line in tried())
             or f'of no known beam {READS_EMPTY}',
         )
@@ -373,12 +378,12 @@ def a_node_of_your_own(workspace):
     return [
         (
             'it drives, slows down, stops',
-            lambda: brakes(heard(), (3, 0.5), (0.55, 0.2), (0.25, 0.0)),
+            lambda: brakes(heard(), (3, 0.5), (0.65, 0.2), (0.45, 0.2), (0.35, 0.0)),
             nearer,
         ),
         (
             'it drives on when the way is free',
-            lambda: brakes(heard(), (0.25, 0.0), (2, 0.5), after=2),
+            lambda: brakes(heard(), (0.35, 0.0), (0.75, 0.5), after=3),
             nearer,
         ),
         ('it stops if no beam is known', stops_without_a_distance, unknown),

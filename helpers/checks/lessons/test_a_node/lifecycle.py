@@ -89,15 +89,20 @@ def test_parameter(bench):
         Log, '/rosout', lambda log: log.level >= 40 and errors.append(log.msg), 100
     )
     for wrong in (-1.0, 0.0):
+        errors.clear()
         bench.brake.set_parameters([Parameter('full_mps', value=wrong)])
         step(bench, 'configure', Return.FAILURE, f'with full_mps {wrong}, ')
-    soon(bench, lambda: errors, 'a wrong full_mps is refused, and no error is logged')
+        soon(bench, lambda: errors, f'full_mps {wrong} is refused, and no error is logged')
+        left = bench.brake.count_publishers('cmd_vel') + bench.brake.count_subscribers('range')
+        assert not left, 'a configure that fails leaves a publisher or a subscription'
+    errors.clear()
     bench.brake.set_parameters([Parameter('full_mps', value=1.0)])
     up(bench)
     publisher = getattr(bench.brake, 'publisher', None)
     assert hasattr(publisher, 'publish'), 'it has no publisher with the name self.publisher'
     found = answers(bench, 9.0)
     assert found == [1.0], f'with full_mps 1.0, of 9.0 m it makes {found}, not [1.0]'
+    assert not errors, f'with full_mps 1.0, it logs an error: {errors[0]}'
 
 def test_active(bench):
     step(bench, 'configure')
@@ -179,9 +184,11 @@ def a_camera_that_fails(Camera):
 
     def is_failure():
         _, result, errors = state_after(Camera, Device('open'), 'configure')
+        _, _, later_errors = state_after(Camera, Device('open'), 'configure')
         return all_of(
             expect(result, 'FAILURE', 'on_configure returned'),
             bool(errors) or 'it logs no error',
+            bool(later_errors) or 'it logs an error the first time only',
             ends(['open'], ['configure'], 'unconfigured', 'open'),
         )
 
