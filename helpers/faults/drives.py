@@ -21,9 +21,10 @@ from helpers.workspace import DIED, Process, without_folders
 
 DRIVER = TURTLEBOT3.but(max_speed=0.5)  # twice as fast as a real one, which is slow to look at
 LAUNCH = 'source install/setup.bash\nros2 launch {name} bringup.launch.xml robot:=false'
-# Once its nodes are known: so long, or longer if it has not heard a command yet, a robot may stand.
-# Two of its nodes may know each other only when one says again who it is: in Fast DDS every 3 s.
-READY_S, PATIENCE_S, SILENT_S = 30.0, 5.0, 6.0
+# Once its nodes are known, a robot may stand so long; and longer, as long as it has not heard a
+# command, or nobody has configured its route. Two of its nodes may know each other only when one
+# says again who it is: in Fast DDS every 3 s, and on a busy machine that is lost, too.
+READY_S, PATIENCE_S, UNFOUND_S = 30.0, 5.0, 10.0
 STILL_S, LONGEST_S = 1.2, 12.0
 LIMIT_S = 57.0  # of a drive in which nothing is decided
 TROUBLE_M, TROUBLE_S, PUSH_S = 0.4, 1.4, 0.5
@@ -220,12 +221,14 @@ class Watcher:
             if answer.done() and answer.result().values[0].bool_value
         ]
 
+    def _voices(self, topic: str) -> int:
+        found = self.node.get_publishers_info_by_topic(topic)
+        return sum(publisher.node_name not in self.ours for publisher in found)
+
     def _look_at_its_nodes(self) -> None:
         """Count who publishes, without us, and ask once whether they use simulated time."""
         for topic in TOPICS:
-            found = self.node.get_publishers_info_by_topic(topic)
-            voices = sum(publisher.node_name not in self.ours for publisher in found)
-            self.voices[topic] = max(self.voices[topic], voices)
+            self.voices[topic] = max(self.voices[topic], self._voices(topic))
         for name, client in self._clients.items():
             if name not in self._answers and client.service_is_ready():
                 request = GetParameters.Request(names=['use_sim_time'])
@@ -263,7 +266,8 @@ class Watcher:
             if len(names) < NODES and now_s - self._begun_s < READY_S:
                 return False
             self._ready_s = now_s
-        patience_s = PATIENCE_S if self.robot.record.commands else SILENT_S
+        is_found = self.robot.record.commands and self._voices('wanted')
+        patience_s = PATIENCE_S if is_found else UNFOUND_S
         return now_s - self._ready_s > max(patience_s, 1.5 * (self._ready_s - self._begun_s))
 
 

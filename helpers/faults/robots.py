@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import string
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -95,10 +96,16 @@ def seen(case: Case) -> tuple[str, str, str]:
     return fault.kind, look, fault.line
 
 
-def proves(case: Case, command: str, line: str) -> bool:
-    """Return whether a line of what a command printed shows the fault."""
+def proves(case: Case, command: str, line: str, said: str | None = None) -> bool:
+    """Return whether a line of what a command printed shows the fault, in the part that is said.
+
+    That part must go as far as what shows it: `Publisher count:` is printed by a good robot, too.
+    """
+    said_to = len(line) if said is None else line.find(said) + len(said)
     return any(
-        re.search(case.named(pair.command), command) and re.search(pair.line, line)
+        re.search(case.named(pair.command), command)
+        and (shown := re.search(pair.line, line))
+        and said_to >= len(line[: shown.end()].rstrip(f'{string.punctuation} '))
         for pair in case.fault.evidence
     )
 

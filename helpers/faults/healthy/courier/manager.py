@@ -11,6 +11,7 @@ NEXT = {
     State.PRIMARY_STATE_UNCONFIGURED: Transition.TRANSITION_CONFIGURE,
     State.PRIMARY_STATE_INACTIVE: Transition.TRANSITION_ACTIVATE,
 }
+LOST = 5  # looks without an answer: it is lost, as it may be while two nodes find each other
 
 
 class Manager(Node):
@@ -35,20 +36,26 @@ class Managed:
     def __init__(self, manager, name):
         self.states = manager.create_client(GetState, f'{name}/get_state')
         self.changes = manager.create_client(ChangeState, f'{name}/change_state')
-        self.asked = None
+        self.client, self.asked, self.looks = self.states, None, 0
 
     def look(self):
+        self.looks += 1
         if not self.states.service_is_ready() or not self.changes.service_is_ready():
             self.asked = None  # it is not there, or not any more
         elif self.asked is None or self.asked.done():
-            self.asked = self.states.call_async(GetState.Request())
+            self.ask(self.states, GetState.Request())
             self.asked.add_done_callback(self.on_state)
+        elif self.looks > LOST:
+            self.client.remove_pending_request(self.asked)
+            self.asked = None
+
+    def ask(self, client, request):
+        self.client, self.asked, self.looks = client, client.call_async(request), 0
 
     def on_state(self, future):
         change = NEXT.get(future.result().current_state.id)
         if change is not None:
-            request = ChangeState.Request(transition=Transition(id=change))
-            self.asked = self.changes.call_async(request)
+            self.ask(self.changes, ChangeState.Request(transition=Transition(id=change)))
 
 
 def main():
