@@ -31,6 +31,7 @@ from mutants.made import Mutant, entry_of
 SEED = 1
 LIMIT_S = 120  # of a cell: what takes longer has no verdict
 NOTICED, SURVIVED, EQUAL, NO_VERDICT = 'noticed', 'survived', 'equal', 'no verdict'
+LEFT = SURVIVED, NO_VERDICT
 HOW = {'right': SURVIVED, 'wrong': NOTICED, 'not judged': NO_VERDICT}
 STOP_EARLY = """
 import helpers.checks.tasks
@@ -130,7 +131,7 @@ def judge_part(name: str, mutants: dict[str, list[Mutant]]) -> list[Judged]:
         for task, of_task in mutants.items():
             judged += judge.judge_all(task, of_task)
             if of_task:
-                left = sum(one.task == task and one.how not in (NOTICED, EQUAL) for one in judged)
+                left = sum(one.task == task and one.how in LEFT for one in judged)
                 print(
                     f'{name}, {task}: {len(of_task)} judged, {left} left',
                     file=sys.stderr,
@@ -231,15 +232,15 @@ def main() -> int:
     for name, one in judge_lessons(drawn, options.jobs):
         counts[name][one.how] += 1
         slowest.append((one.seconds, name, one))
-        if one.how not in (NOTICED, EQUAL):
+        if one.how in LEFT:
             left.append((name, one))
             print(report_of(name, one), flush=True)
     print(f'{"lesson":40} made noticed equal left')
     for name, count in counts.items():
         of_tasks = of_lesson(name)
         listed = sum(len(of.equal) for task, of in of_tasks.items() if task in drawn[name])
-        left_here = count[SURVIVED] + count[NO_VERDICT]
-        numbers = made[name] + listed, count[NOTICED], listed + count[EQUAL], left_here
+        equal, open_ones = listed + count[EQUAL], sum(count[how] for how in LEFT)
+        numbers = made[name] + listed, count[NOTICED], equal, open_ones
         print(f'{name:40} {"{:4} {:7} {:5} {:4}".format(*numbers)}')
     _, name, one = max(slowest, key=lambda entry: entry[0], default=(0, '', None))
     if one:
