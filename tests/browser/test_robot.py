@@ -52,6 +52,18 @@ def wait_for_another(page, what, before):
     )
 
 
+def wait_until_it_drove(page, sign, before):
+    """Wait until the robot is further to the right, or with -1 to the left, than it was."""
+    page.wait_for_function(
+        """([robot, sign, before]) => {
+            const x = place => Number(place?.match(/translate\\((\\S+)/)?.[1]);
+            const now = document.querySelector(robot)?.getAttribute('transform');
+            return sign * (x(now) - x(before)) > 0;
+        }""",
+        arg=[ROBOT, sign, before],
+    )
+
+
 def wait_until_it_stands(page):
     """Wait until the robot has been in one place for half a second."""
     page.wait_for_function(
@@ -76,15 +88,16 @@ def test_watched_driven_and_replayed(lab):
     # By hand, while the cell runs: keys, then the mouse. The robot stops when they are let go.
     lab.start(1)
     page.wait_for_selector('.by-hand-keys:focus')
-    for press, release in (
-        (lambda: page.keyboard.down('ArrowUp'), lambda: page.keyboard.up('ArrowUp')),
-        (page.mouse.down, page.mouse.up),
+    for sign, press, release in (
+        (1, lambda: page.keyboard.down('ArrowUp'), lambda: page.keyboard.up('ArrowUp')),
+        (-1, page.mouse.down, page.mouse.up),
     ):
         page.locator('.hand-back').scroll_into_view_if_needed()
         page.locator('.hand-back').hover()
         before = place(page)
         press()
-        wait_for_another(page, ROBOT, before)
+        # A picture may come late: the rest of the first drive is not the second one.
+        wait_until_it_drove(page, sign, before)
         release()
         wait_until_it_stands(page)
     # A click into the picture takes no key away.
@@ -117,7 +130,8 @@ def test_watched_driven_and_replayed(lab):
     driven = robot.get_attribute('transform')
     page.keyboard.press('End')
     assert robot.get_attribute('transform') == stopped
-    assert len({start, driven, stopped}) == 3
+    # As far back as it went ahead, the robot stops where it started.
+    assert driven not in (start, stopped)
     page.keyboard.press('Home')
     assert robot.get_attribute('transform') == start
     shown.get_by_role('button', name='Play').click()
