@@ -2,12 +2,12 @@
 
 import nbformat
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
-from support.lab_page import WIDER
+from support.lab_page import WIDER, printed
 
 from helpers.guesses import Gap, Guess, Level, Options, kind_of
 from helpers.robot import CORRIDOR
 from helpers.robot_view import Place
-from tools.lessons.clean import NOTEBOOK_METADATA
+from tools.lessons.clean import EXPLAINS, NOTEBOOK_METADATA
 
 PLACE = Guess('Where does it end?', Place(CORRIDOR, 0.6))
 LEVEL = Guess('How many are received?', Level(0, 41, 'messages'))
@@ -124,11 +124,15 @@ compare_prediction('Where does it end?', my_end, robot)"""
 
 def test_the_drive_goes_through_it_in_jupyterlab(lab):
     cells = [new_markdown_cell('# 96 Guess'), new_code_cell(ASK), new_code_cell(DRIVE)]
+    cells.append(new_markdown_cell(f'{EXPLAINS}Nobody told it to stop.'))
     path = lab.server.folder / 'notebooks' / '96_guess.ipynb'
     nbformat.write(new_notebook(cells=cells, metadata=NOTEBOOK_METADATA), path)
     lab.open(path.name)
     page = lab.page
     lab.run(1)
+    why = page.get_by_text('Nobody told it to stop.', exact=True)
+    assert not why.is_visible()
+    lab.screenshot('guess_why')
     assert 'No guess yet. Put your robot' in lab.run(2)
     before = [(c['cell_type'], c['source']) for c in lab.cells()]
     lab.show(1)
@@ -140,7 +144,12 @@ def test_the_drive_goes_through_it_in_jupyterlab(lab):
     assert page.locator('.guess-says').inner_text() == 'You say: it stops 0.61 m before the wall.'
     assert [(c['cell_type'], c['source']) for c in lab.cells()] == before
     page.wait_for_function("""() => document.querySelector('.guess-line input').value === '0.61'""")
-    said = lab.run(2)
+    lab.start(2)
+    page.wait_for_selector('.robot-live')
+    assert not why.is_visible()
+    lab.wait_until_ran(2)
+    assert why.is_visible()
+    said = printed(lab.cells()[2])
     assert 'You say: it stops 0.61 m before the wall.' in said
     assert 'It is in the wall, 0.50 m further than you said.' in said
     shown = page.locator('.replay:not(.guess)')

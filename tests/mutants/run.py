@@ -21,6 +21,7 @@ from multiprocessing import get_context
 
 import yaml
 from nbclient.exceptions import CellTimeoutError, DeadKernelError
+from nbclient.util import run_sync
 from support.judged import Cells, Lesson, run_all
 
 from helpers.checks.progress import FILE_VARIABLE
@@ -118,7 +119,7 @@ def _verdict_of(lesson: Lesson, cells: Cells, mutant: Mutant) -> tuple[str, str]
         said = run_all(lesson.kernel, files, [mutant.source])
     except CellTimeoutError:
         # A student would see that the own cell does not end. No check runs then.
-        lesson.kernel.km.interrupt_kernel()
+        run_sync(lesson.kernel.km.interrupt_kernel)()
         return NOTICED, 'Its cell does not end.'
     said += run_all(lesson.kernel, cells['check'])
     return HOW[lesson.kernel.judged], said

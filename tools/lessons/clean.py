@@ -1,6 +1,7 @@
 """Clean a notebook, so that a diff shows only what changed, and write it at once."""
 
 import hashlib
+import re
 import shutil
 from collections.abc import Iterator
 from copy import deepcopy
@@ -9,6 +10,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
+from helpers.lesson import compares, guess_of
 from helpers.notebook import AS_SAVED, MARK
 
 NOTEBOOK_METADATA = {
@@ -22,13 +24,18 @@ NOTEBOOK_METADATA = {
 }
 MADE_FROM = 'ros2_notebooks_made_from'  # what made the outputs: see outputs.py
 WIDGET = 'application/vnd.jupyter.widget-view+json'
+# Begins what explains an answer: lab.css and the site hide it until the answer is there.
+EXPLAINS = '<span class="explains"></span>'
+# A paragraph, and none that leads to the next cell.
+PARAGRAPH = re.compile(r'(?!#)(?!.*:$)', re.MULTILINE)
 
 
 def clean(notebook: NotebookNode) -> NotebookNode:
     """Return a copy of a notebook without what changes by itself from run to run.
 
     Kept are sources, tags, hidden sources, cell ids, execution counts, outputs, and what made them.
-    Made anew is which cells JupyterLab does not let edit: answers that unfold.
+    Made anew is which cells JupyterLab does not let edit, answers that unfold, and which begin with
+    EXPLAINS.
     Neighbouring pieces of one stream become one, because where a stream is cut is chance. The
     model of a widget lives only as long as its kernel: of its view, the text is kept.
     """
@@ -46,7 +53,21 @@ def clean(notebook: NotebookNode) -> NotebookNode:
             cell.metadata.editable = False  # a double click on an answer must not show the source
         if cell.cell_type == 'code':
             cell.outputs = _clean_outputs(cell)
+    _mark_explanations(notebook.cells)
     return notebook
+
+
+def _mark_explanations(cells: list[NotebookNode]) -> None:
+    """Let the paragraph below the answer of a guess begin with EXPLAINS, and no other one."""
+    guess, answered = None, False
+    for cell in cells:
+        if cell.cell_type == 'markdown':
+            text = cell.source.removeprefix(EXPLAINS)
+            cell.source = EXPLAINS + text if answered and PARAGRAPH.match(text) else text
+        guess = guess_of(cell) or guess
+        answered = guess is not None and compares(cell, guess)
+        if answered:
+            guess = None
 
 
 def _kept_metadata(metadata: NotebookNode) -> Iterator[tuple[str, object]]:

@@ -29,6 +29,7 @@ from helpers.lesson import (
     tags,
     with_slugs,
 )
+from tools.lessons.clean import EXPLAINS
 
 IMPORTS = ast.Import, ast.ImportFrom
 FOLDED_IMPORTS = 3  # and more of them in a cell are folded
@@ -38,8 +39,6 @@ STYLE = re.compile(r'<style>(?P<text>.*?)</style>', re.DOTALL)
 FIRST_PICTURE = 'first-picture'  # the cell of a lesson that has it
 AT_START = '<div class="replay" ', '<div class="replay" data-opens="start" '  # see view.js
 SHOW_ANSWER = 'I have guessed: show the answer'
-# A paragraph, and none that leads to the next cell.
-EXPLAINS = re.compile(r'(?!#)(?!.*:$)', re.MULTILINE)
 # A first picture plays once when it is loaded: so it is loaded anew when it comes into view later.
 PLAY_AGAIN = """<p class="again"><button type="button">▶ Play again</button></p>
 <script>
@@ -140,8 +139,8 @@ def _with_answers_hidden(cells: list[NotebookNode]) -> list[NotebookNode]:
         kept.append(cell)
         if asked := guess_of(cell):
             guess = asked
-        elif after_answer and cell.cell_type == 'markdown' and EXPLAINS.match(cell.source):
-            cell.source = f'{{.explains}}\n{cell.source}'
+        elif after_answer and cell.source.startswith(EXPLAINS):
+            cell.source = cell.source.replace(EXPLAINS, '{.explains}\n', 1)
         elif cell.cell_type == 'code' and guess:
             for output in cell.outputs:
                 if is_replay(output):

@@ -59,7 +59,7 @@ def say_none_if_you_do_not_know(distance_ahead):
             says(None, NAN, NAN, NAN),
             says(None, NAN, 2.0, NAN),
             says(2.0, NAN, 2.0, NAN, 3.0),
-            says(None, 0.0, 0.0, 0.0, 2.0),
+            says(None, 0.0, 0.0, 0.0, 2.0, 3.0),
         )
         return says(None) if beams is True else beams  # without a beam, `min` raises
 

@@ -69,6 +69,8 @@ def test_alone(bench):
 
 def test_again_begins(bench):
     before.append(bench)
+    for node in bench.brake, bench.node:
+        assert list(node.publishers), f'in a test, the node {node.get_name()} is gone already'
 
 def test_again_ends():
     assert not rclpy.ok(), 'after a test, rclpy is not shut down'
