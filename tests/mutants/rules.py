@@ -660,6 +660,8 @@ def a_value_that_is_kept(program: Program) -> Made:
             value = program.above(call, cst.Call) or call
         if program.method_of(call) == '__init__' or isinstance(value, cst.Lambda):
             continue
+        if isinstance(program.parent(value), cst.Expr):  # the new call would still be made
+            continue
         owner = 'self' if program.above(call, cst.ClassDef) else program.method_of(call)
         key = f'_kept_{name}'
         yield program.changed(value, f"vars({owner}).setdefault('{key}', {program.code(value)})")

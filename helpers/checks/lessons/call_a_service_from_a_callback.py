@@ -1,9 +1,14 @@
 """What the tasks of the lesson "Call a service from a callback" are judged by."""
 
+import inspect
 import math
+import threading
+import time
 import warnings
+from contextlib import contextmanager
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.client import Client
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Empty, Int32
@@ -24,24 +29,59 @@ SOLID = 'bricks'  # a wall, in other words: what counts is `success`
 
 @tasks.add(limit_s=15)
 def ask_from_a_cell(ask):
-    def asks(sees):
-        with Bench() as bench:
-            camera = Camera(sees)
-            asking_node = bench.spin(Node('asking_node'), camera)
+    def asks(sees, late_s):
+        with Bench() as bench, limits_of_clients() as limits_s:
+            asking_node, cameras = bench.spin(Node('asking_node')), []
+            come = threading.Timer(late_s, lambda: cameras.append(bench.spin(Camera(sees))))
+            come.start()
+            if not late_s:
+                come.join()
+            begun_cpu_s = time.thread_time()
             response = ask(asking_node)
-        if camera.looks != 1:
-            return expect(camera.looks, 1, 'the camera was asked', unit='times')
+            cpu_s = time.thread_time() - begun_cpu_s
+            come.join()
+            looks = cameras[0].looks
+        late = f'the camera came {late_s} s late: ' if late_s else ''
+        if looks != 1:
+            return expect(looks, 1, f'{late}it was asked', unit='times')
         if not isinstance(response, Trigger.Response):
-            return f'ask returns {response!r}, which is no response'
+            return f'{late}ask returns {response!r}, which is no response'
+        if cpu_s > late_s / 2 > 0:
+            return f'{late}it does not sleep meanwhile: it keeps a CPU busy'
+        for name in limits_s:
+            if limits_s[name] is None:
+                return f'{name} has no timeout_sec: without a camera, it waits for ever'
         return expect(response.message, sees, 'the message of what ask returns is')
 
     hint = 'Three lines: create the client, wait for the service, return what call returns.'
     return rows(
         asks,
         hint,
-        ('a camera that sees a wall', 'a wall'),
-        ('a camera that sees dust', 'only dust'),
+        ('a camera that sees a wall', 'a wall', 0),
+        ('a camera that sees dust', 'only dust', 0.5),
     )
+
+
+@contextmanager
+def limits_of_clients():
+    """Yield a dict: for how long a method of a client waits at most (s, or None), by its name."""
+    limits_s, plain = {}, {name: getattr(Client, name) for name in ('wait_for_service', 'call')}
+
+    def noted(name):
+        def method(client, *arguments, **options):
+            bound = inspect.signature(plain[name]).bind(client, *arguments, **options)
+            limits_s[name] = bound.arguments.get('timeout_sec')
+            return plain[name](client, *arguments, **options)
+
+        return method
+
+    for name in plain:
+        setattr(Client, name, noted(name))
+    try:
+        yield limits_s
+    finally:
+        for name, method in plain.items():
+            setattr(Client, name, method)
 
 
 @tasks.add
@@ -75,6 +115,18 @@ def stop_for_a_wall(Brake):
             expect(len(stops), times, f'{of}: it stopped', unit='times'),
         )
 
+    def is_blind():
+        found = is_called('a wall', math.nan, 0, 1)
+        return hears_each_once() if found is True else found
+
+    def hears_each_once():
+        with Bench() as bench:
+            stops = bench.hear('stop', Empty)
+            bench.spin(Brake())
+            bench.say('scan', scan(math.nan))
+            bench.wait(lambda: len(stops) > 1, 0.2)
+        return expect(len(stops), 1, 'for one scan that says nothing, it stopped', unit='times')
+
     def has_its_groups():
         with ros_session():
             scan_group, client_group = two_groups()
@@ -103,11 +155,7 @@ def stop_for_a_wall(Brake):
             'Compare with LIMIT_M.',
             ('nothing near: it does not ask', 'a wall', 2.0, 0, 0),
         ),
-        *rows(
-            is_called,
-            blind,
-            ('a blind laser: it stops, and does not ask', 'a wall', math.nan, 0, 1),
-        ),
+        ('a blind laser: it stops, and does not ask', is_blind, blind),
         (
             'a late answer: it waits',
             lambda: is_called('a wall', 0.5, 1, 1, takes_s=1.5),
@@ -257,9 +305,17 @@ def the_rule(rule, stops):
 def if_you_do_not_know_stop(SafeBrake):
     def says_go(what, sees, distance, questions, times, age_s=0.0):
         """Show a scan to a brake that is with the camera, in one thread: which `go` follow?"""
+        too_late = []
+
+        class Tried(SafeBrake):
+            def give_up(self):
+                if self.future is None:
+                    too_late.append(self)
+                super().give_up()
+
         with Bench() as bench:
             goes, stops = bench.hear('go', Empty), bench.hear('stop', Empty)
-            brake, camera = SafeBrake(), Camera(sees)
+            brake, camera = Tried(), Camera(sees)
             bench.spin(brake, camera)
             bench.wait(brake.client.service_is_ready)
             bench.say('scan', scan(distance, age_s=age_s))
@@ -272,6 +328,7 @@ def if_you_do_not_know_stop(SafeBrake):
             expect(len(goes), times, f'{what}: it said go', unit='times'),
             not stops or f'{what}: it said stop, which PermittedRemote does not hear',
             is_over or f'{what}: its timer runs on',
+            not too_late or f'{what}: it gives up, and no question is open any more',
         )
 
     def gives_up(camera_is_there):
@@ -401,6 +458,10 @@ def three_callbacks_four_threads(Explorer):
 
             explorer, executor = Watched(), MultiThreadedExecutor(num_threads=4)
             timers = list(explorer.timers)
+            periods_s = [timer.timer_period_ns / 1e9 for timer in timers]
+            names = [one.topic_name for one in explorer.subscriptions]
+            names += [one.srv_name for one in explorer.services]
+            names = [name.strip('/') for name in names]
             bench.spin(explorer, executor=executor)
             bench.say('scan', Int32(data=0), Int32(data=1), at_once=True)
             if not bench.wait(lambda: 'scan 0' in calls):
@@ -413,16 +474,22 @@ def three_callbacks_four_threads(Explorer):
             gate.open()
             if not bench.wait(lambda: 'save' in calls):
                 raise Failed('save_callback is never called')
-        return len(timers), during
+        return periods_s, names, during
 
     def motors():
-        timers, during = during_scan_0()
-        if timers != 1:
-            return f'it has {timers} timers, and one drives the motors'
+        periods_s, _, during = during_scan_0()
+        if len(periods_s) != 1:
+            return f'it has {len(periods_s)} timers, and one drives the motors'
+        if periods_s != [0.05]:
+            return expect(periods_s[0], 0.05, 'the period of its timer is', unit='s')
         return 'motor' in during or 'while scan 0 was drawn, the motors waited'
 
     def never(call):
-        return call not in during_scan_0()[1] or f'{call} began while scan 0 was drawn'
+        _, names, during = during_scan_0()
+        if call in during:
+            return f'{call} began while scan 0 was drawn'
+        name = call.split()[0]
+        return expect(names.count(name), 1, f'its subscriptions or services with the name {name}:')
 
     return [
         ('the motors never wait', motors, 'What must not wait needs a group of its own.'),
@@ -475,8 +542,9 @@ def stops_for(make_brake, make_executor, sees, distance):
         bench.spin(make_brake(), camera, executor=made(make_executor))
         bench.say('scan', scan(distance))
         waits = bench.line_of_callback()
-        if bool(stops) != right or waits:
-            does = 'stops' if stops else 'does not stop'
+        if len(stops) != right or waits:
+            does = 'stops' if len(stops) == 1 else f'stops {len(stops)} times'
+            does = does if stops else 'does not stop'
             found = f'{sees} at {distance} m: the camera looked {camera.looks} times, and the brake'
             if waits:
                 waits = f'. Its callback still waits. {waits}'

@@ -29,14 +29,16 @@ SPINS_S = 5.0  # for two calls of spin_once, of 0.1 s each
 
 @tasks.add
 def a_gate(GatedSubscriber):
-    def holds(messages, depth, group, events):
+    def holds(messages, depth, group, **events):
         must_define(GatedSubscriber, '__init__')
         with Bench() as bench:
-            node, begun, ended = GatedSubscriber(depth, group, events), [], []
+            node, begun, ended = GatedSubscriber(depth, group, **events), [], []
             must_be_called(node, 'gated_subscriber')
             must_have(node, 'gate', 'subscription')
             if not isinstance(node.gate, threading.Event):
                 return f'self.gate is a {type(node.gate).__name__}, not a threading.Event'
+            if GatedSubscriber(depth, group, **events).gate is node.gate:
+                return 'two of these nodes have the same gate'
             gate = node.gate = WatchedGate()
             subscription, callback = node.subscription, node.subscription.callback
 
@@ -57,7 +59,9 @@ def a_gate(GatedSubscriber):
             found_depth, handlers = subscription.qos_profile.depth, subscription.event_handlers
         if found_depth != depth or subscription.callback_group is not group:
             return f'depth {depth} and its group were asked for, but not passed on'
-        if bool(handlers) == (events is QUIET):
+        if handlers and not events:
+            return 'without events, it has event handlers: events=QUIET is the default'
+        if events and not handlers:
             return 'event_callbacks=events is not passed on'
         if gate.asked > BUSY:
             return 'it asks is_set() without a pause: that takes a whole CPU'
@@ -71,10 +75,10 @@ def a_gate(GatedSubscriber):
     call = 'create_subscription(type, topic, callback, depth, callback_group=, event_callbacks=)'
     exclusive, reentrant = MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
     return [
-        ('four messages are held, then received', lambda: holds(4, 10, reentrant(), QUIET), wait),
+        ('four messages are held, then received', lambda: holds(4, 10, reentrant()), wait),
         (
             'one, with another depth, group and events',
-            lambda: holds(1, 3, exclusive(), None),
+            lambda: holds(1, 3, exclusive(), events=None),
             call,
         ),
     ]
@@ -214,10 +218,14 @@ def work_at_once(WorkingSubscriber, DEPTH):
             bench.say('number', *numbers(messages), qos=20, at_once=True)
             bench.quiet()
             at_once = len(gate.entered)
+            gate.open()
+            bench.quiet()
+            calls = len(gate.entered)
         return all_of(
             expect(depth, DEPTH, 'its depth is'),
             expect(handlers, 0, 'the number of its event handlers is'),
             expect(at_once, min(threads, messages), f'with {threads} threads, at work at once:'),
+            expect(calls, messages, f'for messages: {messages}, calls of work():'),
         )
 
     hint = 'callback_group=ReentrantCallbackGroup(), event_callbacks=QUIET'

@@ -337,6 +337,7 @@ runpy.run_path({file!r}, run_name='__main__')
 """
 LISTENER = 'the listener'  # a program with the name of the talker would end it
 LONGER_THAN_PUBLISHING_S = 2.0
+LONGER_THAN_A_PAUSE_S = 1.0  # in place of a wait
 WAITS_AT_MOST_S = 12.0
 
 
@@ -348,6 +349,10 @@ def a_program_of_its_own(workspace, file):
         topics = topics_of_texts(bench.tester)
         if topics and '/topic' not in topics:
             raise Failed(f'it publishes on {", ".join(topics)}, not on /topic')
+        # Names of nodes come later than their topics.
+        if topics and not bench.wait(lambda: 'talker' in bench.tester.get_node_names(), 2):
+            names = {*bench.tester.get_node_names()} - {bench.tester.get_name()}
+            raise Failed(f'its node is {", ".join(sorted(names))}, not talker')
 
     def ends_well(talker):
         """Wait for the end of the talker. Raises Failed if it does not end, or with an error."""
@@ -399,7 +404,7 @@ def a_program_of_its_own(workspace, file):
         with Bench() as bench, run_python(workspace, file) as talker:
             # Two programs that begin at once in one domain may choose the same port.
             comes(bench, talker)
-            if not talker.running:
+            if bench.wait(lambda: not talker.running, LONGER_THAN_A_PAUSE_S):
                 return too_early(talker)
             with run_python(
                 workspace, '-c', SUBSCRIBER, str(talker.pid), name=LISTENER

@@ -19,6 +19,8 @@ from helpers.ros import STATUS
 tasks = Tasks()
 check = tasks.check
 
+RESULT_S = 3.0  # in which a result comes, if one comes
+
 
 @tasks.add
 def the_job(EagerPatroller):
@@ -38,6 +40,7 @@ def the_job(EagerPatroller):
         return all_of(
             ends_as(end, 'SUCCEEDED', places, f'with {places} places,'),
             expect(job.drives, places, f'with {places} places, it called go_on', unit='times'),
+            job.drives_before_its_end,
         )
 
     feedback = 'goal_handle.publish_feedback(Patrol.Feedback(sequence=visited)), in the loop.'
@@ -71,6 +74,36 @@ def the_client(Operator):
         end = STATUS.get(result.status, result.status), list(result.result.sequence)
         return ends_as(end, 'SUCCEEDED', 3, 'by the result,')
 
+    def keeps_the_newest():
+        """Send a goal of two places, and then one of one place."""
+        places = []
+
+        class Told(Operator):
+            def result_callback(self, future):
+                places.append(len(future.result().result.sequence))
+                super().result_callback(future)
+
+        with Bench() as bench:
+            server, operator = Counted(False, lambda goal_handle: CancelResponse.ACCEPT), Told()
+            server.gate.release(100)
+            bench.spin(server, threads=3)
+            bench.spin(operator)
+            bench.wait(operator.client.server_is_ready)
+            for number in (1, 2):
+                operator.executor.create_task(operator.send, 3 - number)
+                bench.wait(lambda number=number: len(places) >= number, RESULT_S)
+                bench.quiet()
+        last = len(operator.result.result.sequence) if operator.result else None
+        sent = 'send(2), then send(1): '
+        return all_of(
+            expect(places, [2, 1], f'{sent}the places in the results of result_callback are'),
+            expect(last, 1, f'{sent}the places in self.result are'),
+        )
+
+    def keeps_results():
+        found = has_result()
+        return keeps_the_newest() if found is True else found
+
     def lives_with_no():
         _, operator = operate(Operator, 3, refuse=True)
         if operator.goal_handle is None:
@@ -81,7 +114,7 @@ def the_client(Operator):
     keep_it = 'goal_response_callback: keep the goal handle first, then look at its accepted.'
     return [
         ('a goal is sent, feedback is kept', hears, send_it),
-        ('the result is kept', has_result, 'self.result = future.result()'),
+        ('the result is kept', keeps_results, 'self.result = future.result()'),
         ('a goal that is rejected has no result', lives_with_no, keep_it),
     ]
 
@@ -167,6 +200,7 @@ def obey(ObedientPatroller):
         return all_of(
             ends_as(end, 'SUCCEEDED', 3, 'with 3 places,'),
             job.feeds_back_after_each_of(3),
+            job.drives_before_its_end,
             job.stands or 'after the third place the robot was not stopped',
         )
 
@@ -232,11 +266,16 @@ def a_group_of_its_own(options, ChargingPatroller):
 def one_patrol_at_a_time(PolitePatroller):
     def answers_to_goals(how_the_first_ends):
         """Send goals before, during and after a patrol. Return by name which are accepted."""
-        begin, short_ended = threading.Event(), threading.Event()
+        begin, short_ended, answers = threading.Event(), threading.Event(), []
         fails = how_the_first_ends == 'fails'
 
         class Watched(PolitePatroller):
             is_short = False
+
+            def goal_callback(self, goal):
+                answer = super().goal_callback(goal)
+                answers.append(answer)
+                return answer
 
             def handle_accepted_callback(self, goal_handle):
                 if self.is_short:  # a job that has ended before execute() returns
@@ -288,6 +327,8 @@ def one_patrol_at_a_time(PolitePatroller):
             bench.quiet()
             goals['one after a job that was over before execute() returned'] = send(bench, 1)
         job.raise_first_error()
+        if odd := [one for one in answers if not isinstance(one, GoalResponse)]:
+            raise Failed(f'goal_callback returns {odd[0]!r}, which is no GoalResponse')
         return {name: goal.accepted for name, goal in goals.items()}
 
     def is_polite(how_the_first_ends):
@@ -415,9 +456,12 @@ class Job:
 
     def __init__(self, node, drive=lambda: None):
         self.log, self.commands, self._errors = [], [], []
+        self._goal_handle, self._ended_early = None, False
 
         def go_on():
             self.log.append('drive')
+            if self._goal_handle and not self._goal_handle.is_active:
+                self._ended_early = True
             drive()
 
         async def execute_callback(goal_handle):
@@ -428,6 +472,7 @@ class Job:
                 self.log.append(list(feedback.sequence))
 
             goal_handle.publish_feedback = publish_feedback
+            self._goal_handle = goal_handle
             try:
                 result = node.execute_callback(goal_handle)
                 return await result if inspect.isawaitable(result) else result
@@ -452,6 +497,11 @@ class Job:
     def drives(self):
         """How often go_on was called."""
         return self.log.count('drive')
+
+    @property
+    def drives_before_its_end(self):
+        """True, or a text: it has said how the job ends, and then drives on."""
+        return not self._ended_early or 'it says how the job has ended, and then drives on'
 
     def feeds_back_after_each_of(self, places):
         """Return True, or a text: which feedback is wrong, or comes before the robot is there."""

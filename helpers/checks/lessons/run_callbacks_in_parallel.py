@@ -34,9 +34,10 @@ def a_subscriber_with_a_group(SlowSubscriber, DEPTH, CALLBACK_S):
             must_have(node, 'subscription')
             executor.add_node(node)
             bench.publisher('topic', String).publish(String(data='Hello World: 0'))
-            begun_s = time.monotonic()
-            executor.spin_once(timeout_sec=CALLBACK_S / 2)  # nothing heard: it waits no longer
-            took_s = time.monotonic() - begun_s
+            begun_s, begun_cpu_s = time.monotonic(), time.thread_time()
+            with sleeps() as slept_s:
+                executor.spin_once(timeout_sec=CALLBACK_S / 2)  # nothing heard: it waits no longer
+            took_s, cpu_s = time.monotonic() - begun_s, time.thread_time() - begun_cpu_s
             subscription = node.subscription
         if subscription.callback_group is not group:
             return 'its subscription is in another group'
@@ -45,6 +46,8 @@ def a_subscriber_with_a_group(SlowSubscriber, DEPTH, CALLBACK_S):
         return all_of(
             expect(subscription.qos_profile.depth, DEPTH, 'its depth is'),
             took_s >= CALLBACK_S or 'no callback slept for CALLBACK_S seconds when a message came',
+            cpu_s < CALLBACK_S / 2 or 'the callback does not sleep: it keeps a CPU busy',
+            expect(sum(slept_s) or CALLBACK_S, CALLBACK_S, 'it sleeps for', within=0.001, unit='s'),
         )
 
     made = 'super().__init__(name), then self.subscription = self.create_subscription(...).'
@@ -54,6 +57,17 @@ def a_subscriber_with_a_group(SlowSubscriber, DEPTH, CALLBACK_S):
         ('it receives and sleeps, in an exclusive group', lambda: hears(exclusive()), made),
         ('it receives and sleeps, in a reentrant group', lambda: hears(reentrant()), passed),
     ]
+
+
+@contextmanager
+def sleeps():
+    """Yield a list to which each `time.sleep` adds its seconds."""
+    sleep, slept_s = time.sleep, []
+    time.sleep = lambda seconds: (slept_s.append(seconds), sleep(seconds))
+    try:
+        yield slept_s
+    finally:
+        time.sleep = sleep
 
 
 @tasks.add
@@ -177,6 +191,8 @@ def wait_for_the_small_one(UnequalSubscriber):
             if node.small_one_done.is_set():
                 return 'number 0 does not wait'
             bench.say('number', Int32(data=1))
+        if None in node.small_one_done.limits_s:
+            return 'wait() has no timeout: if number 1 never comes, a thread waits for ever'
         return expect(node.finished, [1, 0], 'they finished in the order')
 
     def sets_the_event():
@@ -202,6 +218,12 @@ class LateEvent(threading.Event):
     def __init__(self, finished):
         super().__init__()
         self.finished = finished
+        self.limits_s = []
+
+    def wait(self, timeout=None):
+        """Wait for it, as every Event does, and note for how long at most."""
+        self.limits_s.append(timeout)
+        return super().wait(timeout)
 
     def set(self):
         """Set it, and let another thread finish, if none has: 1 s at most."""
@@ -252,11 +274,41 @@ def an_odometer(Odometer):
             return f'after {count} distances, wrong: self.{" and self.".join(wrong)}'
         return trial().never_goes_back
 
+    def shows_all_in_order():
+        found = shows(forty, 40)
+        return one_by_one() if found is True else found
+
+    def one_by_one():
+        """Let it hear 5 and 3 in one thread, and note its numbers while it works and appends."""
+        at_work, appended = [], []
+
+        class Tried(Odometer):
+            def work(self):
+                at_work.append((self.total, self.longest, [*self.finished]))
+
+        class Noted(list):
+            def append(self, number):
+                appended.append((node.total, node.longest))
+                super().append(number)
+
+        with Bench() as bench:
+            node = Tried()
+            node.finished = Noted()
+            bench.spin(node)
+            bench.say('number', Int32(data=5), Int32(data=3))
+        both = 'self.total, self.longest'
+        return all_of(
+            expect([*node.finished], [5, 3], '5 and 3 came: self.finished is'),
+            expect(at_work, [(0, 0, []), (5, 5, [5])], f'in work(), {both}, self.finished are'),
+            expect(appended or right, right, f'when it appends, {both} are'),
+        )
+
+    right = [(5, 5), (8, 5)]
     compare = 'Compare with LockingSubscriber. super()?'
     reads = 'max(a, b) reads, too: keep it in the lock.'
     overlaps = 'What is inside the lock? In which group?'
     return [
-        ('40 distances', lambda: shows(forty, 40), compare),
+        ('40 distances', shows_all_in_order, compare),
         ('24 distances', lambda: shows(fewer, 24), reads),
         ('the work still overlaps', lambda: work_overlaps(forty()), overlaps),
     ]

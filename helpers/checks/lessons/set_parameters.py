@@ -60,6 +60,7 @@ def limit_the_parameter(LimitedDriver):
         limits = ranges[0].from_value, ranges[0].to_value
         return all_of(
             expect(limits, (0.0, 1.0), 'the range of max_speed is'),
+            default_of(LimitedDriver, 'max_speed', 0.5),
             accepts('max_speed', [0.0, 1.0, -0.1, 50.0], [True, True, False, False]),
         )
 

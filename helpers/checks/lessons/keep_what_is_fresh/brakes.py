@@ -34,6 +34,9 @@ def say_none_if_you_do_not_know(distance_ahead):
             says(2.0, 2.5, 2.0, 3.0, others=0.3),
             says(0.4, 0.4, 5.0, 5.0),
             says(1.5, 1.5, 4.0, 3.0, others=0.3, behind=True),
+            # A range may be just the least or the greatest one; both have an exact float32.
+            says(0.125, 0.125, NAN, NAN, 3.0, limits=(0.125, 8.0)),
+            says(8.0, 8.0, NAN, NAN, 8.0, limits=(0.125, 8.0)),
         )
 
     def unknown_does_not_count():
@@ -52,12 +55,16 @@ def say_none_if_you_do_not_know(distance_ahead):
             says(3.5, INF, INF, limits=(0.12, 3.5)),
             says(2.0, INF, 2.0, INF),
             says(0.0, 2.0, -INF, 2.0),
+            says(0.0, 2.0, 2.0, -INF, NAN),
         )
 
     def none_if_unknown():
         beams = all_of(
             says(None, NAN, NAN, NAN),
             says(None, NAN, 2.0, NAN),
+            says(None, 9.5, 2.0, 9.5),
+            says(None, NAN, INF, NAN, NAN),
+            says(None, NAN, -INF, NAN, NAN),
             says(2.0, NAN, 2.0, NAN, 3.0),
             says(None, 0.0, 0.0, 0.0, 2.0, 3.0),
         )
@@ -255,12 +262,31 @@ def stop_if_you_do_not_know(CarefulBrake):
             expect([*dict.fromkeys(looked_at)], fresh, 'it looked at the scans'),
         )
 
+    def goes_by_the_clock_of_the_node():
+        """Let a scan come, and a minute later another one that is as old."""
+        with Bench() as bench:
+            commands = bench.hear('cmd_vel', Twist)
+            brake = CarefulBrake(9, 5, look=lambda scan: 2.0)
+            brake.set_parameters([Parameter('use_sim_time', value=True)])
+            bench.spin(brake)
+            for minute in 20, 60:
+                bench.advance(minute, step_s=minute)
+                say_and_wait(bench, 'scan', scan(0, stamp=Time(seconds=20).to_msg()), commands)
+            speeds = [twist.linear.x for twist in commands]
+        what = 'most_s=5, in a simulation, a scan of 20 s came at 20 s and at 80 s: it commands'
+        return expect(speeds, [0.5, 0.0], what)
+
+    def stops_for_old_ones():
+        scans = [(2.0, 0), (2.0, 60), (2.0, 6), (0.3, 0)]
+        found = is_careful(5, scans, [0.5, 0.0, 0.0, 0.0])
+        return goes_by_the_clock_of_the_node() if found is True else found
+
     hint = 'The age is that of task 3. Compare its nanoseconds / 1e9 with self.most_s.'
     both = 'A stamp from the future has an age below 0. Below -FUTURE_S it is unknown: stop.'
     return [
         (
             'at most 5 s: the old ones stop it',
-            lambda: is_careful(5, [(2.0, 0), (2.0, 60), (2.0, 6), (0.3, 0)], [0.5, 0.0, 0.0, 0.0]),
+            stops_for_old_ones,
             hint,
         ),
         (
@@ -290,6 +316,30 @@ def the_red_button(StopBrake):
         speeds = [twist.linear.x for twist in heard]
         return expect(speeds, right, f'after {", ".join(topics)} it commanded')
 
+    def stops_and_stays():
+        found = commands([0.5, 0.5, 0.0, 0.0], 'scan', 'scan', 'stop', 'scan')
+        return stops_last() if found is True else found
+
+    def stops_last():
+        """Let a scan be handled just before the event is set: the stop must come behind it."""
+
+        class SetLate(threading.Event):
+            def set(self):
+                thread = threading.Thread(target=brake.scan_callback, args=[scan(0)], daemon=True)
+                thread.start()
+                thread.join(timeout=0.5)  # it waits if the lock is taken
+                super().set()
+
+        with Bench() as bench:
+            heard = bench.hear('cmd_vel', Twist)
+            brake = bench.spin(StopBrake(9, most_s=60, look=lambda scan: 9.0))
+            brake.stopped = SetLate()
+            say_and_wait(bench, 'stop', Empty(), heard)
+            bench.quiet()
+        last = heard[-1].linear.x if heard else None
+        what = 'another thread handles a scan just before `stopped` is set: the last command is'
+        return expect(last, 0.0, what)
+
     def keeps_the_scans():
         with ros_session():
             topic = StopBrake(9, look=lambda scan: 9.0).subscription.topic_name
@@ -301,7 +351,7 @@ def the_red_button(StopBrake):
         ('stop, then a scan: it stays', lambda: commands([0.0, 0.0], 'stop', 'scan'), hint),
         (
             'two scans, stop, a scan: it stops and stays',
-            lambda: commands([0.5, 0.5, 0.0, 0.0], 'scan', 'scan', 'stop', 'scan'),
+            stops_and_stays,
             hint,
         ),
         ('self.subscription is still that of scan', keeps_the_scans, kept),
@@ -338,7 +388,14 @@ def a_place_for_one(Newest):
         thread.join(timeout=0.2)
         place.put(7)
         thread.join(timeout=2)
-        return found == [7] or 'a thread that waits in take is not woken by put'
+        if found != [7]:
+            return 'a thread that waits in take is not woken by put'
+        with place.condition:
+            thread = threading.Thread(target=place.put, args=[8], daemon=True)
+            thread.start()
+            thread.join(timeout=0.2)
+            early = [*place.waiting]
+        return not early or 'put changes what waits while another thread has the lock'
 
     def stays_closed():
         place = Newest()
@@ -356,7 +413,7 @@ def a_place_for_one(Newest):
         ('1, 2, 3 are put: 3 is taken', lambda: takes([3], [1, 2, 3]), hint),
         ('then 4, 5 are put: 5 is taken', lambda: takes([3, 5], [1, 2, 3], [4, 5]), hint),
         ('the replaced ones are forgotten', forgets, hint),
-        ('a thread that waits is woken', wakes, 'put must notify, inside the lock.'),
+        ('a thread that waits is woken', wakes, 'put must replace and notify inside the lock.'),
         ('closed, it stays closed', stays_closed, 'Leave close and take as they are.'),
     ]
 
@@ -411,10 +468,13 @@ def a_worker(NewestBrake):
             brake = make(1, look=lambda scan: 1 / 0)
             commands = bench.hear('cmd_vel', Twist)
             bench.spin(brake)
-            say_and_wait(bench, 'scan', scan(0), commands)
-            bench.wait(lambda: bench.log('brake'), 1.0)
-            lines = bench.log('brake')
-        return any(line.startswith('[ERROR]') for line in lines) or 'nothing is logged as an error'
+            for _ in range(2):
+                say_and_wait(bench, 'scan', scan(0), commands)
+            bench.wait(lambda: len(bench.log('brake')) > 1, 1.0)
+            lines = [line for line in bench.log('brake') if line.startswith('[ERROR]')]
+        if not lines:
+            return 'nothing is logged as an error'
+        return len(lines) > 1 or 'a second error is not logged'
 
     def worker_ends():
         with errors_of_threads() as errors, ros_session():

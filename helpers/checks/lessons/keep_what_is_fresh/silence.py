@@ -35,7 +35,8 @@ def a_watchdog(WatchfulBrake):
         """Let it hear nothing, then two scans, then nothing."""
         with Bench() as bench:
             stops, begun_s = hear_stops(bench), time.monotonic()
-            bench.spin(make(long_s))
+            brake = bench.spin(make(long_s))
+            periods_s = [timer.timer_period_ns / 1e9 for timer in brake.timers]
             bench.wait(lambda: stops, long_s + LATE_S)
             without = [at_s - begun_s for at_s in stops]
             again = bench.wait(lambda: len(stops) >= 3, LATE_S) if stops else False
@@ -46,29 +47,31 @@ def a_watchdog(WatchfulBrake):
             stops.clear()  # those that came before the scan was handled
             bench.wait(lambda: stops, long_s + LATE_S)
             after = [at_s - scan_s for at_s in stops]
-        return without, again, after
+        return without, again, after, periods_s
 
     @cached
     def stops_at_all():
-        without, _, after = trial()
+        without, _, after, _ = trial()
         return bool(without or after) or 'it never stops at all'
 
     def stops_without_a_scan():
-        without, again, _ = trial()
+        without, again, _, periods_s = trial()
         if not without:
             waited_s = long_s + LATE_S
             return f'with most_s={long_s}, no scan ever came, and in {waited_s} s no stop came'
         if without[0] < long_s:
             return f'with most_s={long_s} it stopped {without[0]:.1f} s after it was made'
-        return again or 'one stop came, and then no more'
+        if not again:
+            return 'one stop came, and then no more'
+        return expect(periods_s or [0.1], [0.1], 'the periods of its timers are', unit='s')
 
     def stops_after_a_scan():
-        _, _, after = trial()
+        _, _, after, _ = trial()
         return bool(after) or 'one scan came, and then no stop'
 
     def is_quiet_after_a_scan():
         needs(stops_at_all)
-        _, _, after = trial()
+        _, _, after, _ = trial()
         too_soon = after and after[0] < long_s
         return not too_soon or f'with most_s={long_s} it stopped {after[0]:.1f} s after a scan'
 
@@ -114,9 +117,10 @@ def a_watchdog(WatchfulBrake):
             return 'its timer is on the system clock, which jumps when somebody sets it'
         if silence_s is None and clocks == {ClockType.STEADY_TIME}:
             return 'its timer is steady, but the times that it compares stand still without /clock'
-        late_s = short_s + LATE_S
-        came = silence_s is not None
-        return came or f'with use_sim_time and no /clock, no stop came in {late_s} s'
+        if silence_s is None:
+            return f'with use_sim_time and no /clock, no stop came in {short_s + LATE_S} s'
+        other = clocks - {ClockType.STEADY_TIME}
+        return not other or f'its timer is on a clock of the type {other.pop().name}'
 
     def brakes_as_before():
         scans = [(2.0, 0), (0.3, 0), (2.0, 90), (2.0, 0)]
