@@ -66,6 +66,16 @@ def setup_of(workspace: Workspace, folder: str) -> dict:
     return json.loads(lines[-1])
 
 
+def setup_is_whole(workspace: Workspace, folder: str) -> bool | str:
+    """Return whether a setup.py says of its package all that it should, or what it does not say."""
+    said = setup_of(workspace, folder)
+    tests = said.pop('extras_require').get('test', [])
+    missing = [name for name, value in said.items() if value in (None, 'UNKNOWN')]
+    if missing:
+        return f'setup() does not say its {" and its ".join(missing)}'
+    return 'pytest' in tests or "extras_require does not name pytest for 'test'"
+
+
 def setup_fits(workspace: Workspace, folder: str) -> bool | str:
     """Return whether a setup.py says what the package.xml beside it says, or where they differ."""
     said, package = setup_of(workspace, folder), manifest(workspace, folder)

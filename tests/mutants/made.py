@@ -219,7 +219,8 @@ def _of_text(program: Program, node: cst.SimpleString) -> Iterator[tuple[str, cs
     text = node.raw_value
     if not isinstance(node.evaluated_value, str) or not re.search(r'\s', text.strip()):
         return
-    if isinstance(program.parent(node), cst.Expr):
+    parent = program.parent(node)
+    if isinstance(parent, cst.Expr | cst.Assert):  # a docstring, what an assertion says
         return
     start = program.line_of(node)
     lines = text.split('\n')

@@ -6,7 +6,7 @@ import re
 import signal
 import time
 
-from helpers.checks.builds import builds
+from helpers.checks.builds import builds, setup_is_whole
 from helpers.checks.errors import Failed
 from helpers.checks.points import all_of, cached, expect, needs
 from helpers.checks.programs import Program, launch, manifest, needed
@@ -256,7 +256,9 @@ def install_the_files(workspace):
         files = [*source.glob('launch/*.launch.*'), *source.glob('config/*.yaml')]
         wanted = sorted(file.relative_to(source).as_posix() for file in files)
         absent = [file for file in wanted if not (share / file).is_file()]
-        return not absent or f'share/fleet_pkg has no {", no ".join(absent)}'
+        if absent:
+            return f'share/fleet_pkg has no {", no ".join(absent)}'
+        return setup_is_whole(workspace, 'src/fleet_pkg')
 
     def is_launched():
         needs(built, 'it is not built')

@@ -68,6 +68,9 @@ time.sleep = sleep
 """
 
 
+MORE_THAN_A_SLEEP_S = 0.4  # of its callback, which sleeps for 0.2 s
+
+
 @tasks.add(own_domain=True)
 def a_slow_listener(workspace, file):
     first = ['Hello World: 7', 'Good morning']
@@ -129,6 +132,8 @@ def a_slow_listener(workspace, file):
         with listener(workspace, file) as (bench, program):
             bench.say('topic', String(data=first[0]))
             bench.wait(lambda: program.lines or not program.running, 8)  # then it spins
+            # In a callback it would only see the flag, without an error: so let it wait again.
+            bench.wait(lambda: not program.running, MORE_THAN_A_SLEEP_S)
             if not program.end(signal.SIGTERM, limit_s=4):
                 return 'it does not end when a launch ends it (SIGTERM)'
             if program.failed:
@@ -230,8 +235,9 @@ def a_second_terminal(workspace):
 
 
 MEET = """
-import resource, threading, time
-barrier = threading.Barrier({count})
+import itertools, resource, threading, time
+barrier = threading.Barrier({count}, lambda: print('All are here', flush=True))
+calls = itertools.count()
 real_sleep = time.sleep
 
 def used_s():
@@ -239,6 +245,8 @@ def used_s():
     return used.ru_utime + used.ru_stime
 
 def sleep(seconds):
+    if next(calls) >= {count}:
+        return
     if barrier.wait(3) == 0:  # one of them looks how the others wait
         begun_s = used_s()
         for _ in range(100):
@@ -258,7 +266,9 @@ def callbacks_in_parallel(workspace, file):
     def meet(count):
         """Let each callback wait in its sleep until `count` of them are there."""
         texts = [f'Hello World: {number}' for number in range(count)]
-        run = run_main(workspace, file, texts, MEET.format(count=count), 'They meet')
+        # A text that comes when no thread is free: only then the default looks for it all the time.
+        late = 'All are here', 'Hello again'
+        run = run_main(workspace, file, texts, MEET.format(count=count), 'They meet', late)
         if not any(line.startswith('They meet') for line in run.lines):
             if any('BrokenBarrierError' in line for line in run.lines) or not run.lines:
                 return f'{count} callbacks did not run at the same time'
@@ -524,10 +534,16 @@ def listener(workspace, file, before=''):
         yield bench, program
 
 
-def run_main(workspace, file, texts, before, last):
-    """Run main() of a file, publish texts at once, and press Ctrl+C when `last` was printed."""
+def run_main(workspace, file, texts, before, last, late=None):
+    """Run main() of a file, publish texts at once, and press Ctrl+C when `last` was printed.
+
+    `late` is what it prints before one more text is published, and that text.
+    """
     with listener(workspace, file, before) as (bench, program):
         bench.say('topic', *(String(data=text) for text in texts), at_once=True)
+        if late:
+            bench.wait(lambda: program.says(late[0]) or not program.running, 8)
+            bench.say('topic', String(data=late[1]), at_once=True)
         bench.wait(lambda: program.says(last) or not program.running, 8)
         went_on = program.running
         ended = program.end(limit_s=4)

@@ -221,8 +221,15 @@ def a_message_of_two_packages(workspace):
 
 
 def requires(workspace, package):
-    """Return whether each find_package of a CMakeLists.txt says REQUIRED, or the first without."""
+    """Return whether each find_package of a CMakeLists.txt says REQUIRED, or the first without.
+
+    Its first command is cmake_minimum_required, or CMake only warns.
+    """
     text = workspace.file(f'src/{package}/CMakeLists.txt').read_text()
+    commands = re.findall(r'^\s*(\w+)\s*\(', text, re.MULTILINE)
+    first = 'cmake_minimum_required'
+    if commands and commands[0].lower() != first:
+        return f'its first command is {commands[0]}, not {first}'
     calls = re.findall(r'^\s*find_package\(([^)]*)\)', text, re.MULTILINE | re.IGNORECASE)
     without = [call.strip() for call in calls if 'REQUIRED' not in call.split()]
     return not without or f'find_package({without[0]}) goes on without the package'

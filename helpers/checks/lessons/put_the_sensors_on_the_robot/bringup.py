@@ -163,6 +163,9 @@ def watch_launch(workspace, file):
     return launched
 
 
+MORE_S = 0.2  # for a message that none on odom has caused
+
+
 @tasks.add
 def say_what_you_know(Covariances):
     def relayed(speed):
@@ -174,6 +177,7 @@ def say_what_you_know(Covariances):
             heard = bench.hear('odom/known', Odometry)
             bench.spin(Covariances())
             bench.say('odom', message)
+            bench.wait(lambda: len(heard) > 1, MORE_S)
         return message, heard
 
     def comes(speed):

@@ -48,6 +48,8 @@ def is_transform_to(found, right, what):
     x, y, yaw = found.translation.x, found.translation.y, yaw_of(found.rotation)
     off = x - right[0], y - right[1], math.remainder(yaw - right[2], math.tau)
     is_near = np.allclose(off, 0, atol=1e-6)
+    if is_near and not np.allclose([found.rotation.x, found.rotation.y], 0, atol=1e-6):
+        return f'{what} it also turns about x or y'
     return is_near or f'{what} x, y, yaw = {in_text((x, y, yaw))}, not {in_text(right)}'
 
 
