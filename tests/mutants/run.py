@@ -30,6 +30,7 @@ from mutants.lessons import drawn_of_lesson, of_lesson
 from mutants.made import Mutant, entry_of
 
 SEED = 1
+WAITS_AT_MOST_S = 15  # a student, for a verdict, builds apart
 LIMIT_S = 120  # of a cell: what takes longer has no verdict
 NOTICED, SURVIVED, EQUAL, NO_VERDICT = 'noticed', 'survived', 'equal', 'no verdict'
 LEFT = SURVIVED, NO_VERDICT
@@ -243,9 +244,10 @@ def main() -> int:
         equal, open_ones = listed + count[EQUAL], sum(count[how] for how in LEFT)
         numbers = made[name] + listed, count[NOTICED], equal, open_ones
         print(f'{name:40} {"{:4} {:7} {:5} {:4}".format(*numbers)}')
-    _, name, one = max(slowest, key=lambda entry: entry[0], default=(0, '', None))
-    if one:
-        print(f'The slowest: {one.seconds:.0f} s, {name}, {one.task}, {one.mutant.id}. ', end='')
+    slowest.sort(key=lambda entry: entry[0], reverse=True)
+    for seconds, name, one in slowest:
+        if seconds > WAITS_AT_MOST_S or one is slowest[0][-1]:
+            print(f'Slow: {seconds:.0f} s, {name}, {one.task}, {one.mutant.id}.')
     print(f'{time.monotonic() - started:.0f} s in all.')
     if left:
         print(f'Left: {dict(Counter(one.mutant.rule for _, one in left))}')
