@@ -45,7 +45,7 @@ class Level:
 
     @property
     def asks(self) -> str:
-        return 'Draw your line on the axis.'
+        return 'Put your line on the axis: click there, drag it, or press the arrow keys.'
 
     @property
     def forms(self) -> str:
@@ -108,7 +108,7 @@ class Options:
     def asks(self) -> str:
         if self.several is True:
             return 'Choose all that you expect.'
-        return f'Choose {self.several}.' if self.several else 'Choose one.'
+        return f'Choose {self.several} of them.' if self.several else 'Choose one.'
 
     @property
     def forms(self) -> str:

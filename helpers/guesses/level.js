@@ -1,6 +1,6 @@
 // A level: a number on an axis. `said` and `gap` need no page.
 const levelKind = (() => {
-  const [WIDE, TALL, LEFT, RIGHT, LINE] = [800, 144, 60, 40, 84];
+  const [TALL, LEFT, RIGHT, LINE] = [144, 60, 40, 84];
   const rounded = ({ step }, value) => +(Math.round(value / step) * step).toFixed(3);
   const one = ({ unit }, value) => (value === 1 ? unit.replace(/s$/, '') : unit);
   const named = ({ unit = '', step }, value) => [`${+value.toFixed(3)}`, Number.isInteger(step) ? one({ unit }, value) : unit].filter(Boolean).join(' ');
@@ -29,15 +29,22 @@ const levelKind = (() => {
 
   function draw(record, image, set) {
     const { low, high, step, unit, marks = {}, outcome } = record;
+    // On a phone it is drawn narrower, not smaller: its letters stay as large.
+    const [WIDE, TICKS] = matchMedia('(max-width: 600px)').matches ? [400, 4] : [800, 8];
     const x = value => LEFT + (WIDE - LEFT - RIGHT) * (value - low) / (high - low);
-    const svg = svgElement('svg', { viewBox: `0 0 ${WIDE} ${unit ? TALL : TALL - 24}`, 'font-size': 18, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' });
-    const rough = (high - low) / 8;
+    const svg = svgElement('svg', { class: 'guess-axis', viewBox: `0 0 ${WIDE} ${unit ? TALL : TALL - 24}`, 'font-size': 18, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' });
+    const rough = (high - low) / TICKS;
     const power = 10 ** Math.floor(Math.log10(rough));
     const tick = Math.max([1, 2, 5, 10].find(n => n * power >= rough) * power, Number.isInteger(step) ? 1 : 0);
     svg.append(svgElement('path', { d: `M${LEFT} ${LINE}H${WIDE - RIGHT}`, stroke: 'currentColor', 'stroke-width': 2 }));
-    for (let n = Math.ceil(low / tick); n * tick <= high + 1e-9; n += 1) {
-      svg.append(svgElement('path', { d: `M${x(n * tick)} ${LINE}v8`, stroke: 'currentColor', 'stroke-width': 2 }),
-        svgElement('text', { x: x(n * tick), y: LINE + 28, 'text-anchor': 'middle' }, `${+(n * tick).toPrecision(6)}`));
+    // Both ends have a number, and what is too near to one of them has none.
+    const at = [low, high];
+    for (let n = Math.ceil(low / tick); n * tick < high; n += 1) {
+      if (Math.min(n * tick - low, high - n * tick) > 0.6 * tick) at.push(n * tick);
+    }
+    for (const value of at) {
+      svg.append(svgElement('path', { d: `M${x(value)} ${LINE}v8`, stroke: 'currentColor', 'stroke-width': 2 }),
+        svgElement('text', { x: x(value), y: LINE + 28, 'text-anchor': 'middle' }, `${+value.toPrecision(6)}`));
     }
     svg.append(svgElement('text', { x: WIDE - RIGHT, y: TALL - 8, 'text-anchor': 'end' }, unit));
     for (const [name, value] of Object.entries(marks)) {
@@ -49,7 +56,7 @@ const levelKind = (() => {
     const you = svgElement('g', { class: 'you', tabindex: outcome ? -1 : 0, role: 'slider', 'aria-label': 'Your line', 'aria-valuemin': low, 'aria-valuemax': high });
     you.append(svgElement('path', { class: 'you-round', d: `M0 ${LINE}V34`, stroke: 'var(--look-you)', 'stroke-width': 4 }),
       svgElement('circle', { cy: 34, r: 9, fill: 'var(--look-you)' }),
-      svgElement('text', { class: 'you-label', y: 18 }, 'you'));
+      svgElement('text', { class: 'you-label', y: 18 }));
     const ghosts = svgElement('g', { class: 'class' });
     svg.append(ghosts, gapLine, gapLabel, you);
     classOf(record, values => ghosts.replaceChildren(...values.filter(Number.isFinite).map(value => svgElement('path', {
@@ -67,6 +74,7 @@ const levelKind = (() => {
     function put(value) {
       now = value;
       you.setAttribute('transform', `translate(${value === null ? LEFT / 2 - 8 : x(value)})`);
+      you.querySelector('text').textContent = value === null ? 'you?' : 'you';
       you.setAttribute('aria-valuenow', value ?? low);
       you.setAttribute('aria-valuetext', value === null ? 'not yet' : said(record, value));
       if (outcome && value !== null) measure(x(value), x(Math.min(Math.max(outcome.at, low), high)));

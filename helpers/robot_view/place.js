@@ -72,6 +72,7 @@ const placeKind = (() => {
     function put(value) {
       now = value;
       at(you, along(value ?? ahead / 2));
+      name.textContent = value === null ? 'you?' : 'you';
       you.style.display = '';
     }
 

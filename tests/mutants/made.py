@@ -20,6 +20,7 @@ from mutants.rules import RULES
 from mutants.simple import SIMPLE
 
 FRAME = 'class _:\n'  # around the part of a file that begins in a class
+LOGGER = 'self.get_logger().'  # what it says is not what it does
 HIDDEN = '_hidden_line_'  # in place of `!command`, while the rest is read as Python
 
 
@@ -221,6 +222,8 @@ def _of_text(program: Program, node: cst.SimpleString) -> Iterator[tuple[str, cs
         return
     parent = program.parent(node)
     if isinstance(parent, cst.Expr | cst.Assert):  # a docstring, what an assertion says
+        return
+    if isinstance(parent, cst.Arg) and program.code(program.parent(parent).func).startswith(LOGGER):
         return
     start = program.line_of(node)
     lines = text.split('\n')

@@ -112,7 +112,7 @@ def the_nearest_range(workspace):
             program.gives,
             nan,
             ('NaN does not count', '2', 'nan 3 nan 2', 0, 4),
-            ('also after the nearest', '1', '1 nan 3 nan', 0, 4),
+            ('also after the nearest', '1', '9 1 nan 3 nan', 1, 5),
         ),
         *rows(
             program.gives,

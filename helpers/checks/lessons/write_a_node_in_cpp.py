@@ -359,6 +359,8 @@ def a_node_of_your_own(workspace):
                 return 'Ctrl+C does not end it'
             bench.wait(lambda: commands and commands[-1].linear.x == 0.0, STOP_S)
         last = commands[-1].linear.x if commands else 'nothing'
+        if 'shutdown' not in code_of(workspace, 'src/brake/src/brake.cpp'):
+            return 'main ends without shutdown()'
         return expect(last, 0.0, 'the last speed (m/s) that the robot hears is')
 
     def is_called_brake():
