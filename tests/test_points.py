@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from helpers.checks.errors import Failed, NeverEnds
-from helpers.checks.points import all_of, cached, expect, judge_points, needs, rows
+from helpers.checks.points import all_of, cached, expect, in_turn, judge_points, needs, rows
 
 
 def sent(*points):
@@ -72,6 +72,19 @@ def test_of_several_results_the_first_that_is_not_right_is_said():
     assert all_of(True, np.bool_(True)) is True
     assert all_of(True, 'it drives on', 'it turns') == 'it drives on'
     assert all_of(True, None) is None  # a mistake of the check, which the judge says
+
+
+def test_in_turn_runs_none_behind_the_first_text():
+    run = []
+
+    def test(result):
+        run.append(result)
+        return result
+
+    tests = [lambda result=result: test(result) for result in (True, 'it drives on', 'it turns')]
+    assert in_turn(*tests) == 'it drives on'
+    assert run == [True, 'it drives on']
+    assert in_turn(lambda: True, lambda: np.bool_(True)) is True
 
 
 def test_a_point_can_need_an_earlier_one():

@@ -86,6 +86,11 @@ def all_of(*results: bool | str) -> bool | str:
     return next((result for result in results if not _is_true(result)), True)
 
 
+def in_turn(*tests: Callable[[], bool | str]) -> bool | str:
+    """Return True if these tests all return True, or else the first text: none behind it is run."""
+    return next((result for test in tests if not _is_true(result := test())), True)
+
+
 def needs(point: Callable[[], object], otherwise: str = '') -> None:
     """Raise Failed if an earlier point is not right. Call it at the beginning of a test.
 

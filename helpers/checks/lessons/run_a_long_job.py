@@ -12,7 +12,7 @@ from test_msgs.action import Fibonacci as Patrol
 
 from helpers.checks.bench import Bench
 from helpers.checks.errors import Failed
-from helpers.checks.points import all_of, cached, expect, rows
+from helpers.checks.points import all_of, cached, expect, in_turn, rows
 from helpers.checks.tasks import Tasks
 from helpers.ros import STATUS
 
@@ -104,10 +104,6 @@ def the_client(Operator):
             expect(last, 1, f'{sent}the places in self.result are'),
         )
 
-    def keeps_results():
-        found = has_result()
-        return keeps_the_newest() if found is True else found
-
     def lives_with_no():
         _, operator = operate(Operator, 3, refuse=True)
         if operator.goal_handle is None:
@@ -115,10 +111,11 @@ def the_client(Operator):
         return operator.result is None or 'there is a result'
 
     send_it = 'send: self.client.send_goal_async(goal, self.feedback_callback), a done callback.'
+    kept = 'self.result = future.result()'
     keep_it = 'goal_response_callback: keep the goal handle first, then look at its accepted.'
     return [
         ('a goal is sent, feedback is kept', hears, send_it),
-        ('the result is kept', keeps_results, 'self.result = future.result()'),
+        ('the result is kept', lambda: in_turn(has_result, keeps_the_newest), kept),
         ('a goal that is rejected has no result', lives_with_no, keep_it),
     ]
 

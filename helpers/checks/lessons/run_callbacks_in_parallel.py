@@ -11,7 +11,7 @@ from std_msgs.msg import Int32, String
 
 from helpers.checks.bench import Bench, must_be_called, must_define, must_have, one_cpu
 from helpers.checks.errors import Failed, NeverEnds
-from helpers.checks.points import all_of, cached, expect, rows
+from helpers.checks.points import all_of, cached, expect, in_turn, rows
 from helpers.checks.tasks import Tasks
 from helpers.ros import ros_session
 from helpers.trials import callbacks_at_once
@@ -274,10 +274,6 @@ def an_odometer(Odometer):
             return f'after {count} distances, wrong: self.{" and self.".join(wrong)}'
         return trial().never_goes_back
 
-    def shows_all_in_order():
-        found = shows(forty, 40)
-        return one_by_one() if found is True else found
-
     def one_by_one():
         """Let it hear 5 and 3 in one thread, and note its numbers when it appends."""
         appended = []
@@ -303,7 +299,7 @@ def an_odometer(Odometer):
     reads = 'max(a, b) reads, too: keep it in the lock.'
     overlaps = 'What is inside the lock? In which group?'
     return [
-        ('40 distances', shows_all_in_order, compare),
+        ('40 distances', lambda: in_turn(lambda: shows(forty, 40), one_by_one), compare),
         ('24 distances', lambda: shows(fewer, 24), reads),
         ('the work still overlaps', lambda: work_overlaps(forty()), overlaps),
     ]

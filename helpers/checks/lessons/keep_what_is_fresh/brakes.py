@@ -12,7 +12,7 @@ from std_msgs.msg import Empty
 from helpers.checks.bench import Bench, must_define, scan
 from helpers.checks.errors import sentence
 from helpers.checks.lessons.keep_what_is_fresh.shared import tasks
-from helpers.checks.points import all_of, cached, expect, rows
+from helpers.checks.points import all_of, cached, expect, in_turn, rows
 from helpers.ros import ros_session
 from helpers.trials import stop_while_looking
 
@@ -59,7 +59,10 @@ def say_none_if_you_do_not_know(distance_ahead):
         )
 
     def none_if_unknown():
-        beams = all_of(
+        return in_turn(with_beams, lambda: says(None))  # without a beam, `min` raises
+
+    def with_beams():
+        return all_of(
             says(None, NAN, NAN, NAN),
             says(None, NAN, 2.0, NAN),
             says(None, 9.5, 2.0, 9.5),
@@ -68,7 +71,6 @@ def say_none_if_you_do_not_know(distance_ahead):
             says(2.0, NAN, 2.0, NAN, 3.0),
             says(None, 0.0, 0.0, 0.0, 2.0, 3.0),
         )
-        return says(None) if beams is True else beams  # without a beam, `min` raises
 
     known = 'scan.range_min <= r <= scan.range_max and r > 0 is False for each of these.'
     none = 'Count the known ones: fewer than half of len(ahead), or none at all, is None.'
@@ -277,9 +279,8 @@ def stop_if_you_do_not_know(CarefulBrake):
         return expect(speeds, [0.5, 0.0], what)
 
     def stops_for_old_ones():
-        scans = [(2.0, 0), (2.0, 60), (2.0, 6), (0.3, 0)]
-        found = is_careful(5, scans, [0.5, 0.0, 0.0, 0.0])
-        return goes_by_the_clock_of_the_node() if found is True else found
+        scans, right = [(2.0, 0), (2.0, 60), (2.0, 6), (0.3, 0)], [0.5, 0.0, 0.0, 0.0]
+        return in_turn(lambda: is_careful(5, scans, right), goes_by_the_clock_of_the_node)
 
     hint = 'The age is that of task 3. Compare its nanoseconds / 1e9 with self.most_s.'
     both = 'A stamp from the future has an age below 0. Below -FUTURE_S it is unknown: stop.'
@@ -317,8 +318,8 @@ def the_red_button(StopBrake):
         return expect(speeds, right, f'after {", ".join(topics)} it commanded')
 
     def stops_and_stays():
-        found = commands([0.5, 0.5, 0.0, 0.0], 'scan', 'scan', 'stop', 'scan')
-        return stops_last() if found is True else found
+        right = [0.5, 0.5, 0.0, 0.0]
+        return in_turn(lambda: commands(right, 'scan', 'scan', 'stop', 'scan'), stops_last)
 
     def stops_last():
         """Let a scan be handled just before the event is set: the stop must come behind it."""
