@@ -133,11 +133,10 @@ def judge_part(name: str, mutants: dict[str, list[Mutant]]) -> list[Judged]:
         for task, of_task in mutants.items():
             judged += judge.judge_all(task, of_task)
             if of_task:
-                left = sum(one.task == task and one.how in LEFT for one in judged)
+                left = [one.mutant.id for one in judged if one.task == task and one.how in LEFT]
+                told = ' '.join([f'{len(left)} left', *left])
                 print(
-                    f'{name}, {task}: {len(of_task)} judged, {left} left',
-                    file=sys.stderr,
-                    flush=True,
+                    f'{name}, {task}: {len(of_task)} judged, {told}', file=sys.stderr, flush=True
                 )
     finally:
         judge.close()

@@ -81,7 +81,7 @@ class Slow:
         threading.Thread(target=self.send, daemon=True).start()
 
     def publish(self, message):
-        self.waiting.put((time.monotonic() + 0.3, message))
+        self.waiting.put((time.monotonic() + 0.6, message))
 
     def send(self):
         while True:
@@ -195,7 +195,7 @@ def a_program(workspace):
     def waits_for_the_base():
         needs(lambda: stands('interrupted'), 'not judged: Ctrl+C must end it first')
         found = stands('slow')
-        return found is True or f'over a network that is 0.3 s late {found}'
+        return found is True or f'over a network that is 0.6 s late {found}'
 
     def ends_while_nothing_happens():
         needs(lambda: stands('interrupted'), 'not judged: Ctrl+C must end it first')

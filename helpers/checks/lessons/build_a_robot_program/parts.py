@@ -238,6 +238,13 @@ def the_watchdog(workspace):
         _, records = told(twice)
         return expect(records, ['[ERROR] [tested]: No scan comes: I stop'] * 2, 'it logged')
 
+    def looks():
+        with Bench():
+            node = Node('tested')
+            made(node, list)
+            periods_s = [timer.timer_period_ns / 1e9 for timer in node.timers]
+        return expect(periods_s, [0.05], 'the periods of its timers (s) are')
+
     def with_a_stopped_clock():
         with Bench() as bench:
             node, stops = Node('tested', parameter_overrides=SIM), []
@@ -270,5 +277,6 @@ def the_watchdog(workspace):
             'timeout_s',
         ),
         ('it says so', says_so, 'node.get_logger().error(...)'),
+        ('it looks 20 times a second', looks, 'node.create_timer(0.05, self.look, ...), once'),
         ('even if no /clock comes', with_a_stopped_clock, steady),
     ]

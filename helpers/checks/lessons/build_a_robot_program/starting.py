@@ -3,7 +3,7 @@
 from rcl_interfaces.srv import GetParameters
 
 from helpers.checks.bench import Bench
-from helpers.checks.builds import build, builds
+from helpers.checks.builds import build, builds, setup_is_whole
 from helpers.checks.lessons.build_a_robot_program.shared import DRIVES, NOT_BUILT, tasks
 from helpers.checks.points import all_of, cached, expect, needs
 from helpers.checks.programs import Program
@@ -56,11 +56,7 @@ def install_it(workspace):
 
     def wants_pytest():
         needs(it_builds, NOT_BUILT)
-        code = 'import setuptools; setuptools.setup = lambda **given: print(given)\n'
-        code += "exec(open('setup.py').read())"
-        workspace.write(f'{PACKAGE}/.given.py', code)
-        given = workspace.terminal(f'cd {PACKAGE}; python -B .given.py; rm .given.py')
-        return 'pytest' in given.partition('extras_require')[2] or 'extras_require has no pytest'
+        return setup_is_whole(workspace, PACKAGE)
 
     files = "glob('launch/*launch.[pxy][yma]*') and glob('config/*.yaml')"
     return [

@@ -268,15 +268,20 @@ def where_am_i(workspace):
         return all_of(is_right(turned), is_right(over))
 
     def skips_what_is_no_number():
-        wrong_imus = looking(0, 7.3), looking(0, 7.3)
-        wrong_imus[0].orientation.z = wrong_imus[0].orientation.w = math.nan
-        wrong_imus[1].orientation.w = 0.0
+        def of_length(length):
+            """Return what an IMU says whose quaternion is so long, and not 1."""
+            imu = looking(0, 7.3)
+            imu.orientation.z, imu.orientation.w = 0.6 * length, 0.8 * length
+            return imu
+
         there = 0.0, 0.2, 90.0
         story = told(
             *(looking(90, 7), looking(180, 7), rolling(0.5, 7), rolling(0.5, 7.4)),
-            *(wrong_imus[0], is_at('after an orientation of NaN', *there)),
-            *(wrong_imus[1], is_at('after the orientation 0, 0, 0, 0', *there)),
+            *(of_length(math.nan), is_at('after an orientation of NaN', *there)),
+            *(of_length(0.0), is_at('after the orientation 0, 0, 0, 0', *there)),
+            *(of_length(0.92), is_at('after z**2 + w**2 = 0.85', *there)),
             *(rolling(math.nan, 7.5), is_at('after wheels that say NaN', *there)),
+            *(of_length(0.97), is_at('after z**2 + w**2 = 0.94', 0.0, 0.2, -16.3)),
         )
         return is_right(story)
 
@@ -330,6 +335,11 @@ def where_am_i(workspace):
             gap,
         ),
         (
+            'a clock that was set back does not count',
+            lambda: goes(1.0, 7.0, 7.2, 6.0, counted_s=0.2),
+            gap,
+        ),
+        (
             'the parameter wheel_scale',
             lambda: goes(2.0, 7.0, 7.1, 7.2, 7.6, counted_s=0.6),
             scale,
@@ -346,6 +356,7 @@ def a_free_heading(workspace):
         function = module(workspace, 'logic').direction
         cases = {(1, 1, 0, (1, 2)): 90, (0, 0, 3, (-1, -0.2)): 19.4}
         cases |= {(2, 0, 1.5, (1, 0)): 94.1, (0, 0, 0, (-1, -0.01)): -179.4}
+        cases |= {(0, 2, 0, (1, 3)): 45}
         degrees = [round(math.degrees(function(*arguments)), 1) for arguments in cases]
         right = [*cases.values()]
         return degrees == right or f'{degrees} degrees, not {right}'

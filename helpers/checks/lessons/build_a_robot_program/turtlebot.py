@@ -7,6 +7,7 @@ import time
 
 from geometry_msgs.msg import Twist, TwistStamped
 from rcl_interfaces.srv import GetParameters
+from rclpy.clock import ClockType
 from rclpy.time import Time
 
 from helpers.checks.bench import Bench, must_have
@@ -105,6 +106,15 @@ def the_guard(workspace):
         text = 'with use_sim_time and without /clock it does not stop the robot'
         return stopped_s is not None or text
 
+    def counts_alone():
+        with Bench():
+            timers = [*module(workspace, 'guard').Guard().timers]
+            periods_s = [timer.timer_period_ns / 1e9 for timer in timers]
+            kinds = {timer.clock.clock_type for timer in timers}
+        if 0.1 not in periods_s:
+            return f'the periods of its timers are {periods_s} s, and none is 0.1'
+        return kinds == {ClockType.STEADY_TIME} or 'a timer of it has no steady clock'
+
     def can_be_run(bench, heard):
         guard = module(workspace, 'guard')
         if not callable(getattr(guard, 'main', None)):
@@ -123,6 +133,7 @@ def the_guard(workspace):
         ('it begins with zeros', guarded(begins), zeros),
         ('it stops the robot, and goes on with zeros', guarded(stops), dog),
         ('also without /clock', guarded(stops_without_clock, *SIM), zeros),
+        ('ten times a second, by a steady clock', counts_alone, zeros),
         ('stop() and publisher, for run', guarded(can_be_run), 'self.publisher, stop(), main()'),
     ]
 

@@ -61,6 +61,21 @@ def the_whole_node(workspace):
             one_command_a_scan(tour.robot),
         )
 
+    def turns_to_a_place():
+        with ros_session():
+            tour = Tour(workspace, route=BESIDE)
+            tour.send(1)
+            tour.run(20, until=lambda: tour.ended() or tour.robot.bumps)
+            x, y, _ = tour.robot.pose
+            if tour.robot.bumps or tour.status() != 'SUCCEEDED':
+                return f'{tour.status()} at {x:.1f}, {y:.1f}, bumps: {tour.robot.bumps}'
+        away_m = math.dist((x - ROOMS.start.x, y - ROOMS.start.y), BESIDE)
+        return away_m <= 0.3 or f'it ends {away_m:.1f} m away from {BESIDE}'
+
+    def asks_for_the_place(tour):
+        periods_s = [timer.timer_period_ns / 1e9 for timer in tour.node.timers]
+        return 0.1 in periods_s or f'the periods of its timers are {periods_s} s, and none is 0.1'
+
     def cancel(tour):
         tour.send(2)
         tour.run(2)
@@ -219,7 +234,9 @@ def the_whole_node(workspace):
         (at_once, toured(stands), zeros),
         ('its parts', toured(has_parts), parts),
         ('it visits two places', toured(two_places), steered),
+        ('it turns to a place beside its path', turns_to_a_place, steered),
         ('a cancel stops it', toured(cancel), none),
+        ('ten times a second it asks for the place', toured(asks_for_the_place), timer),
         (also_without, toured(cancel_without_scans), timer),
         ('its speed is a parameter', toured(speed), rule),
         ('also at the start', wrong_at_the_start, first),
@@ -230,6 +247,9 @@ def the_whole_node(workspace):
         ('it stands if wheels or IMU are not to be trusted', toured(needs_each_sensor), knows),
         ('a sensor that hangs ends the job', each_that_hangs, hangs),
     ]
+
+
+BESIDE = 1.0, 1.0  # m from the start: it must turn to the left
 
 
 def says_nan(message):
