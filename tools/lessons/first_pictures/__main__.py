@@ -17,11 +17,11 @@ from functools import partial
 from PIL import Image
 
 from helpers.lesson import FOLDER, PICTURES, lessons
+from tools.lessons.first_pictures.brakes import one_brake_picture, two_brakes_picture
 from tools.lessons.first_pictures.drives import drive_picture
 from tools.lessons.first_pictures.queues import gate_picture, queue_picture, threads_picture
 from tools.lessons.first_pictures.sensors import camera_picture, lidar_picture, wheels_picture
 from tools.lessons.first_pictures.terminals import terminal_picture
-from tools.lessons.first_pictures.two_brakes import two_brakes_picture
 
 IMAGES = FOLDER / PICTURES
 PHOTOGRAPH = re.compile(r'data:image/png;base64,([^"]*)')
@@ -34,7 +34,7 @@ FIRST = {
         threads_picture, cell_id='step-c-and-d-run', name='D', seconds=1.0
     ),
     'choose_the_number_of_threads': partial(gate_picture, cell_id='lesson-04-11'),
-    'keep_what_is_fresh': partial(drive_picture, cell_id='drive-depth-10', share=0.55),
+    'keep_what_is_fresh': one_brake_picture,
     'call_a_service_from_a_callback': partial(drive_picture, cell_id='drive-deadlock', share=0.4),
     'run_a_long_job': partial(drive_picture, cell_id='lesson-07-19', share=0.5),
     'set_parameters': partial(drive_picture, cell_id='run-15-obey'),
