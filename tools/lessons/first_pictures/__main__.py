@@ -18,6 +18,7 @@ from PIL import Image
 
 from helpers.lesson import FOLDER, PICTURES, lessons
 from tools.lessons.first_pictures.brakes import one_brake_picture, two_brakes_picture
+from tools.lessons.first_pictures.calls import call_picture
 from tools.lessons.first_pictures.drives import drive_picture
 from tools.lessons.first_pictures.queues import gate_picture, queue_picture, threads_picture
 from tools.lessons.first_pictures.sensors import camera_picture, lidar_picture, wheels_picture
@@ -35,7 +36,7 @@ FIRST = {
     ),
     'choose_the_number_of_threads': partial(gate_picture, cell_id='lesson-04-11'),
     'keep_what_is_fresh': one_brake_picture,
-    'call_a_service_from_a_callback': partial(drive_picture, cell_id='drive-deadlock', share=0.4),
+    'call_a_service_from_a_callback': partial(call_picture, cell_id='drive-deadlock'),
     'run_a_long_job': partial(drive_picture, cell_id='lesson-07-19', share=0.5),
     'set_parameters': partial(drive_picture, cell_id='run-15-obey'),
     'make_a_package': partial(

@@ -30,6 +30,8 @@ svg{color-scheme:light dark;font:16px system-ui,'Segoe UI',Roboto,'Noto Sans',sa
 @media(max-width:560px){svg{font-size:24px}.wide{display:none}}
 @media(prefers-reduced-motion:reduce){svg *{animation:none!important}}
 """
+# What is there from the first moment on, pale until its turn comes.
+LATER = '.later{animation:later .3s both}@keyframes later{from{opacity:.4}}'
 
 
 def output_of(lesson: Lesson, cell_id: str) -> str:
