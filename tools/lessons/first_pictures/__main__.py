@@ -17,6 +17,7 @@ from functools import partial
 from PIL import Image
 
 from helpers.lesson import FOLDER, PICTURES, lessons
+from tools.lessons.first_pictures.bags import bag_picture
 from tools.lessons.first_pictures.brakes import one_brake_picture, two_brakes_picture
 from tools.lessons.first_pictures.calls import call_picture
 from tools.lessons.first_pictures.drives import drive_picture
@@ -80,7 +81,9 @@ FIRST = {
     'write_a_node_in_cpp': partial(drive_picture, cell_id='cpp-12-drive'),
     'fuse_odometry_imu_and_gps': wheels_picture,
     'put_the_sensors_on_the_robot': lidar_picture,
-    'record_a_bag': partial(drive_picture, cell_id='bag0716d970'),
+    'record_a_bag': partial(
+        bag_picture, drive='bag0716d970', counts='bag91032ad7', ticks='bagfc074d50'
+    ),
     'find_the_fault': partial(drive_picture, cell_id='take-dan'),
     'build_a_robot_program': partial(drive_picture, cell_id='project-082'),
 }
