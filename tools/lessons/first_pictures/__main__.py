@@ -21,6 +21,7 @@ from tools.lessons.first_pictures.bags import bag_picture
 from tools.lessons.first_pictures.brakes import one_brake_picture, two_brakes_picture
 from tools.lessons.first_pictures.calls import call_picture
 from tools.lessons.first_pictures.drives import drive_picture
+from tools.lessons.first_pictures.faults import faults_picture
 from tools.lessons.first_pictures.queues import gate_picture, queue_picture, threads_picture
 from tools.lessons.first_pictures.sensors import camera_picture, lidar_picture, wheels_picture
 from tools.lessons.first_pictures.terminals import terminal_picture
@@ -84,7 +85,10 @@ FIRST = {
     'record_a_bag': partial(
         bag_picture, drive='bag0716d970', counts='bag91032ad7', ticks='bagfc074d50'
     ),
-    'find_the_fault': partial(drive_picture, cell_id='take-dan'),
+    'find_the_fault': partial(
+        faults_picture,
+        cells={'ada': 'drive-ada', 'bo': 'take-bo', 'cleo': 'take-cleo', 'dan': 'take-dan'},
+    ),
     'build_a_robot_program': partial(drive_picture, cell_id='project-082'),
 }
 
