@@ -24,7 +24,7 @@ from tools.lessons.first_pictures.drives import drive_picture
 from tools.lessons.first_pictures.faults import faults_picture
 from tools.lessons.first_pictures.queues import gate_picture, queue_picture, threads_picture
 from tools.lessons.first_pictures.sensors import camera_picture, lidar_picture, wheels_picture
-from tools.lessons.first_pictures.terminals import terminal_picture
+from tools.lessons.first_pictures.windows import program_picture, terminal_picture
 
 IMAGES = FOLDER / PICTURES
 PHOTOGRAPH = re.compile(r'data:image/png;base64,([^"]*)')
@@ -79,7 +79,18 @@ FIRST = {
         ],
     ),
     'share_code_in_a_cpp_library': partial(drive_picture, cell_id='l11-replay'),
-    'write_a_node_in_cpp': partial(drive_picture, cell_id='cpp-12-drive'),
+    'write_a_node_in_cpp': partial(
+        program_picture,
+        cell_id='cpp-12-task-3',
+        lines=[
+            '#include <geometry_msgs/msg/twist.hpp>',
+            '#include <scan_tools/nearest.hpp>',
+            '#include <small_rclcpp/small_rclcpp.hpp>',
+            'using sensor_msgs::msg::LaserScan;',
+            '// Your code: the class Brake',
+        ],
+        drive='cpp-12-drive',
+    ),
     'fuse_odometry_imu_and_gps': wheels_picture,
     'put_the_sensors_on_the_robot': lidar_picture,
     'record_a_bag': partial(

@@ -1,0 +1,93 @@
+"""Windows with text: a terminal and what commands have printed, or a program above its drive."""
+
+from html import escape
+
+from helpers.lesson import Lesson
+from tools.lessons.first_pictures import lanes
+from tools.lessons.first_pictures.lanes import Lane, way_of
+from tools.lessons.first_pictures.look import (
+    LATER,
+    PLAYS_S,
+    WIDTH,
+    cell,
+    output_of,
+    runs_of,
+    svg,
+    text_of,
+)
+
+LINE, PAD = 32, 18  # pixels
+LANE = Lane(from_m=0.95, height=66)
+STOPS_M = 0.4  # where the robot of the program stands
+STYLE = """
+.window{fill:COLOUR(way);stroke:COLOUR(wall);stroke-opacity:.5}
+.typed,.printed,.fault{font:21px ui-monospace,'SF Mono','DejaVu Sans Mono',Consolas,monospace;
+white-space:pre}
+.typed{font-weight:bold}
+"""
+
+
+def terminal_picture(lesson: Lesson, lines: list[str | tuple[str, str]]) -> str:
+    """Return a terminal in which one line after the other gets its full colour.
+
+    A line is what somebody types, or (cell, beginning): the lines that this cell has printed and
+    that begin so. What is not there any more raises ValueError.
+    """
+    shown = []
+    for line in lines:
+        if isinstance(line, str):
+            shown.append(('typed ink', line))
+            continue
+        cell_id, beginning = line
+        printed = text_of(lesson, cell_id).splitlines()
+        found = [text for text in printed if text.startswith(beginning)]
+        if not found:
+            raise ValueError(f'{cell_id} of {lesson.name} prints no {beginning!r} any more.')
+        # A line of two sentences would be too long for the picture.
+        for text in '\n'.join(found).replace('. ', '.\n').splitlines():
+            shown.append(('fault lost' if 'assert' in text else 'printed ink', text))
+    every_s = PLAYS_S / len(shown)
+    shown = [
+        (f'{kind} later" style="animation-delay:{i * every_s:.2f}s', text)
+        for i, (kind, text) in enumerate(shown)
+    ]
+    height, body = window(shown)
+    return svg(height, f'What {lesson.name} has printed', LATER + STYLE, body)
+
+
+def window(lines: list[tuple[str, str]]) -> tuple[float, str]:
+    """Return the height of a window with these lines, (class, text), and the window."""
+    texts = ''.join(
+        f'<text class="{kind}" x="{2 * PAD}" y="{2 * PAD + i * LINE + 14}">{escape(text)}</text>'
+        for i, (kind, text) in enumerate(lines)
+    )
+    height = len(lines) * LINE + 3.4 * PAD
+    frame = (
+        f'<rect class="window" x="{PAD / 2}" y="{PAD / 2}" width="{WIDTH - PAD}" '
+        f'height="{height - PAD}" rx="8"/>'
+    )
+    return height, frame + texts
+
+
+def program_picture(lesson: Lesson, cell_id: str, lines: list[str], drive: str) -> str:
+    """Return lines of a program that a learner completes, and the drive of what it becomes.
+
+    Each of `lines` is how a line of the cell begins. What is not there raises ValueError.
+    """
+    file, *code = cell(lesson, cell_id).source.splitlines()
+    shown = [('typed ink', file.removeprefix('%%write '))]
+    for line in lines:
+        if not any(one.startswith(line) for one in code):
+            raise ValueError(f'{cell_id} of {lesson.name} has no line {line!r} any more.')
+        shown.append(('typed good' if 'Your code' in line else 'printed ink', line))
+    height, program = window(shown)
+    (run,) = runs_of(output_of(lesson, drive))
+    way = way_of(run)
+    robot, css = LANE.robot('r', [(t_s * PLAYS_S / way[-1][0], x) for t_s, x in way])
+    body = (
+        f'{program}{LANE.at(height + 6, LANE.floor(STOPS_M) + robot)}'
+        f'<text class="asks ink" x="{LANE.left}" y="{height + LANE.height + 34:.0f}">'
+        'Which C++ stops it before the wall?</text>'
+    )
+    about = f'A program of {lesson.name}, and its real drive'
+    return svg(height + LANE.height + 50, about, STYLE + lanes.STYLE + css, body)
