@@ -25,16 +25,16 @@ from tools.lessons.first_pictures.look import (
 )
 
 ASKEW = math.radians(-30)  # as MOUNTING of the lesson says
+LIDAR_SAYS = 436, 270  # pixels: in a room that its points do not reach
 RAYS = 45  # so many groups of points come one after the other
 VIEW_W = 170  # pixels
 LABEL = 34
 WAY_PAD = 44  # pixels around two ways
 WAYS = (
-    'path.driven,path.believed{fill:none;stroke-width:3;stroke-linejoin:round;'
-    'stroke:COLOUR(good)}path.believed{stroke:COLOUR(waiting)}'
-    'path.driven,path.believed{stroke-dasharray:1 1;'
-    f'animation:draw {PLAYS_S}s linear both}}@keyframes draw{{from{{stroke-dashoffset:1}}}}'
-    f'circle{{animation:{PLAYS_S}s linear both}}'
+    '.length,.start{stroke:COLOUR(ink);fill:none}.start{stroke-dasharray:3 3}'
+    'use{fill:none;stroke-width:3;stroke-linejoin:round;stroke:COLOUR(good)}'
+    'use.believed{stroke:COLOUR(waiting)}use.all{stroke-opacity:.25}'
+    f'circle,use.now{{animation:{PLAYS_S}s linear both}}use.now{{stroke-dasharray:1 1}}'
     'circle.driven{fill:COLOUR(good)}circle.believed{fill:COLOUR(waiting)}'
 )
 
@@ -46,35 +46,41 @@ def wheels_picture(lesson: Lesson) -> str:
     ways = [table[['x', 'y']].to_numpy()[::25] for table in (truth, believed)]
     low, high = (bound(np.concatenate(ways), axis=0) for bound in (np.min, np.max))
     scale = (WIDTH - 2 * WAY_PAD) / (high[0] - low[0])
-    height = scale * (high[1] - low[1]) + 2 * WAY_PAD
-    body = css = ''
+    height = round(scale * (high[1] - low[1]) + 2 * WAY_PAD)
+    pale = bright = css = ''
     for name, way in zip(('driven', 'believed'), ways, strict=True):
         xs, ys = WAY_PAD + scale * (way[:, 0] - low[0]), WAY_PAD + scale * (high[1] - way[:, 1])
         line = 'M' + 'L'.join(f'{x:.0f} {y:.0f}' for x, y in zip(xs, ys, strict=True))
-        css += f'@keyframes {name}{{'
+        far = np.r_[0, np.cumsum(np.hypot(np.diff(xs), np.diff(ys)))]
+        moves = draws = ''
         for i in range(0, len(xs), 2):
-            css += f'{percent(PLAYS_S * i / (len(xs) - 1))}'
-            css += f'{{transform:translate({xs[i]:.0f}px,{ys[i]:.0f}px)}}'
-        css += '}'
-        body += (
-            f'<path class="{name}" d="{line}" pathLength="1"/>'
+            when = percent(PLAYS_S * i / (len(xs) - 1))
+            moves += f'{when}{{transform:translate({xs[i]:.0f}px,{ys[i]:.0f}px)}}'
+            draws += f'{when}{{stroke-dashoffset:{1 - far[i] / far[-1]:.3f}}}'
+        css += f'@keyframes {name}{{{moves}}}@keyframes {name}-way{{{draws}}}'
+        pale += (
+            f'<defs><path id="{name}" d="{line}" pathLength="1"/></defs>'
+            f'<use href="#{name}" class="all {name}"/>'
+        )
+        bright += (
+            f'<use href="#{name}" class="now {name}" style="animation-name:{name}-way"/>'
             f'<circle class="{name}" r="9" transform="translate({xs[-1]:.0f} {ys[-1]:.0f})" '
             f'style="animation-name:{name}"/>'
         )
     off_m = math.dist(ways[0][-1], ways[1][-1])
-    body += (
+    right = WIDTH - WAY_PAD
+    start = f'M{xs[0] - 13:.0f} {ys[0]:.0f}a13 13 0 1 0 26 0a13 13 0 1 0-26 0'
+    body = (
+        f'{pale}<path class="start" d="{start}"/>{bright}'
         f'<text class="good" x="{WAY_PAD}" y="24">where the robot is</text>'
-        f'<text class="waiting" x="{WIDTH - WAY_PAD}" y="24" text-anchor="end">'
+        f'<text class="waiting" x="{right}" y="24" text-anchor="end">'
         'where its wheels say that it is</text>'
-        f'<text class="says ink" x="{WAY_PAD}" y="{height - 10:.0f}" '
+        f'<path class="length" d="M{right - scale:.0f} {height - 10}v-6m0 3H{right}m0-3v6"/>'
+        f'<text class="ink" x="{right - scale / 2:.0f}" y="{height - 20}" text-anchor="middle">1 m'
+        f'</text><text class="says ink" x="{WAY_PAD}" y="{height - 10}" '
         f'style="animation-delay:{PLAYS_S}s">After 60 s the two are {off_m:.1f} m apart.</text>'
     )
-    return svg(
-        round(height),
-        f'The drive of {lesson.name}, as its wheels report it',
-        WAYS + css,
-        body,
-    )
+    return svg(height, f'The drive of {lesson.name}, as its wheels report it', WAYS + css, body)
 
 
 def lidar_picture(_lesson: Lesson) -> str:
@@ -99,10 +105,14 @@ def lidar_picture(_lesson: Lesson) -> str:
         )
     picture = svg_of(html_of(replay_drive(robot.record)))
     picture = picture.replace("<g class='robot'", f"{points}<g class='robot'")
+    x, y = LIDAR_SAYS
+    says = f"<text class='says' x='{x}' y='{y}' text-anchor='middle'>points of its lidar</text>"
+    picture = picture.replace('</svg>', f'{says}</svg>')
     style = (
         f'svg{{color-scheme:light dark;color:{colour("ink")}}}.fan,.start{{display:none}}'
         f'.seen{{stroke:{colour("lost")};stroke-width:5;stroke-linecap:round;'
-        'animation:in .1s both}@keyframes in{from{opacity:0}}'
+        'animation:in .3s both}@keyframes in{from{stroke-opacity:.3}}'
+        f'.says{{fill:{colour("lost")}}}@media(max-width:560px){{text{{font-size:24px}}}}'
         '@media(prefers-reduced-motion:reduce){.seen{animation:none}}'
     )
     return styled(picture, style)
