@@ -75,6 +75,12 @@ def test_every_program_that_drives_is_in_the_ordeal():
     assert not missing
 
 
+def test_what_builds_a_program_is_in_its_lesson():
+    for name, one in declared().items():
+        cells = {cell.id for cell in lesson(one['lesson']).cells}
+        assert {*one['also']} <= cells, name
+
+
 def test_what_does_not_stand_is_of_the_programs():
     for name, listed in known().items():
         for trouble, bases in listed.items():

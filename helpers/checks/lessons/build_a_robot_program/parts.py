@@ -100,6 +100,9 @@ def the_job(workspace):
         # The last one may come after the result.
         yield 'the feedback after 1 and 2 places', asked.heard[:2], [[0], [0, 1]]
         yield 'place() after the last one', asked.job.place(), None
+        yield 'a goal of 1 place after it', asked.ask(1), 'accepted'
+        asked.job.arrived()
+        yield 'its result', asked.result(), ('SUCCEEDED', [0])
 
     def refusals(asked):
         yield 'a goal of 0 places', asked.ask(0), 'refused'
@@ -128,8 +131,9 @@ def the_job(workspace):
     def broken_off(asked):
         asked.job.end()
         yield 'a goal of 2 places', asked.ask(2), 'accepted'
+        asked.job.arrived()
         asked.job.end()
-        yield 'the result after end()', asked.result(), ('ABORTED', [])
+        yield 'the result after one place and end()', asked.result(), ('ABORTED', [0])
         yield 'a new goal', asked.ask(1), 'accepted'
 
     numbers = 'The numbers go on: 0, 1, 2. goal.succeed(), and publish feedback.'
@@ -165,9 +169,11 @@ def the_battery(workspace):
         return expect(lows, right, f'before and after each of {percentages} low was')
 
     def logs():
-        _, records = battery_says([0.871, 0.87, 0.19])
-        right = [('information', 'The battery is at 87 %'), ('warning', 'The battery is at 19 %')]
-        return expect(records, right, 'of 0.871, 0.87, 0.19 it logged')
+        _, records = battery_says([0.871, 0.87, 0.19, 0.19, 0.5, 0.19])
+        warning = 'warning', 'The battery is at 19 %'
+        right = [('information', 'The battery is at 87 %'), warning]
+        right += [('information', 'The battery is at 50 %'), warning]
+        return expect(records, right, 'of 0.871, 0.87, 0.19, 0.19, 0.5, 0.19 it logged')
 
     least, full = Parameter('least_battery', value=0.5), Parameter('full_battery', value=100.0)
     share = 'battery.percentage / self.full'
@@ -245,6 +251,10 @@ def the_watchdog(workspace):
             periods_s = [timer.timer_period_ns / 1e9 for timer in node.timers]
         return expect(periods_s, [0.05], 'the periods of its timers (s) are')
 
+    def between(dog):
+        """Return the time of the watchdog, between two of our own."""
+        return time.monotonic(), dog.now_s(), time.monotonic()
+
     def with_a_stopped_clock():
         with Bench() as bench:
             node, stops = Node('tested', parameter_overrides=SIM), []
@@ -255,8 +265,13 @@ def the_watchdog(workspace):
                 return 'now_s() is the time of day: whoever sets it sets your watchdog'
             if not bench.wait(lambda: dog.now_s() != begin):
                 return 'now_s() stands still: no /clock comes'
+            before = between(dog)
             if bench.wait(lambda: stops, 0.5):
                 return 'it stops before the first seen()'
+            after = between(dog)
+            waited_s, least_s, most_s = (after[i] - before[j] for i, j in ((1, 1), (0, 2), (2, 0)))
+            if not 0.99 * least_s <= waited_s <= 1.01 * most_s:
+                return f'in {least_s:.1f} s its now_s() grows by {waited_s:.2g}'
             dog.seen()
             if bench.wait(lambda: stops, 10):
                 return True
