@@ -10,7 +10,13 @@ from jsonschema import Draft7Validator
 
 CLASSROOM = Path(__file__).resolve().parents[1]
 HUB = CLASSROOM / 'hub'
-CHART = '4.4.0', '5.5'  # and its JupyterHub
+# The chart, and what its image has: images/hub/requirements.txt of the chart.
+CHART = '4.4.0'
+IN_ITS_IMAGE = {
+    'jupyterhub': r'5\.5\.\d+',
+    'jupyterhub-ltiauthenticator': r'1\.6\.3',
+    'oauthenticator': r'17\.4\.0',
+}
 
 
 @pytest.mark.parametrize('name', sorted(path.name for path in HUB.glob('values*.yaml')))
@@ -24,9 +30,11 @@ def test_the_chart_takes_the_values(name):
     assert [f'{one.json_path}: {one.message}' for one in problems] == []
 
 
-def test_hub_and_image_have_one_jupyterhub():
-    chart, version = CHART
-    assert f'--version {chart}' in (HUB / 'values.yaml').read_text()
-    lock = (CLASSROOM / 'requirements-hub.lock').read_text()
-    [ours] = re.findall(r'^jupyterhub==(\d+\.\d+)\.', lock, re.MULTILINE)
-    assert ours == version
+def test_what_is_tried_here_is_what_the_image_of_the_chart_has():
+    """`make hub` and the lessons' own image have its JupyterHub; test_logins.py has all three."""
+    assert f'--version {CHART}' in (HUB / 'values.yaml').read_text()
+    lock = (CLASSROOM.parent / 'tools/locks/requirements-logins.lock').read_text()
+    hub = (CLASSROOM / 'requirements-hub.lock').read_text()
+    for name, version in IN_ITS_IMAGE.items():
+        assert re.search(rf'^{name}=={version} ', lock, re.MULTILINE), name
+    assert re.search(rf'^jupyterhub=={IN_ITS_IMAGE["jupyterhub"]} ', hub, re.MULTILINE)
