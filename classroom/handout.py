@@ -52,9 +52,9 @@ WHEELS = 'wheels'
 # What `make lab` and `make update` need. The lock of uv is that of the installer itself.
 KEPT = (
     *('LICENSE', 'environment.md', 'pyproject.toml', 'helpers', 'notebooks', 'ros2'),
-    *('tools/environment.mk', 'tools/set_up.sh', 'tools/uv.sh', 'tools/pip.py', 'tools/jupyter'),
-    *('tools/lab.py', 'tools/lab.css', LOCK, 'tools/locks/requirements-uv.lock'),
-    *('tools/locks/files.sh'),
+    *('tools/environment.mk', 'tools/set_up.sh', 'tools/troubles.sh', 'tools/uv.sh'),
+    *('tools/pip.py', 'tools/jupyter', 'tools/lab.py', 'tools/lab.css'),
+    *(LOCK, 'tools/locks/requirements-uv.lock', 'tools/locks/files.sh'),
     *('classroom/__init__.py', 'classroom/update.py'),
 )
 LEFT_OUT = ('ros2/tests',)

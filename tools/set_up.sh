@@ -12,17 +12,13 @@ if [ "${1-}" = --python ]; then
     shift 2
 fi
 
-say() { printf '%s\n' "$*" >&2; }
-fail() {
-    say "$*"
-    exit 1
-}
-ours() { # PATH: another user may have made it, or the same user as root
-    [ -w "$1" ] || fail "$PWD/$1 is another user's: take it with \`sudo chown -R \"\$(id -u)\" \"$PWD\"\`, then try again."
-}
-[ -w . ] || [ -d .jupyter ] || fail "The folder $PWD cannot be written: copy it to one of your own, then try again."
-mkdir -p .jupyter # JupyterLab's state: see tools/environment.mk
-ours .jupyter
+. tools/troubles.sh
+trap 'trap - EXIT; say "Interrupted: what was there is as it was. Type the same again to go on."; exit 130' INT
+[ -w . ] || [ -d .jupyter ] || fail "$(cannot_be_written .)"
+# JupyterLab's state: see tools/environment.mk. That of a hub has many users.
+mkdir -p .jupyter || fail "$(no_room || cannot_be_written .)"
+fixed=$(find .jupyter -path .jupyter/hub -prune -o ! -writable -print 2> /dev/null | head -n 1)
+[ -z "$fixed" ] || fail "$(cannot_be_written "$fixed")"
 
 # On NFS only a file that is open for writing can be locked. Not this script: no second one could
 # start meanwhile.
@@ -51,9 +47,6 @@ stamp=.venv/set_up.stamp
 [ -d .venv ] || [ ! -d .venv.old ] || mv .venv.old .venv # ended between the two `mv` at the end
 have=$(wanted .venv)
 [ -z "$have" ] || [ "$have" != "$(cat $stamp 2> /dev/null)" ] || exit 0
-[ -w . ] || fail "The folder $PWD cannot be written: copy it to one of your own, then try again."
-[ ! -d .venv ] || ours .venv
-rm -rf .venv.new .venv.old
 
 case $(uname -sm)-$(getconf GNU_LIBC_VERSION 2> /dev/null) in
     'Linux x86_64-glibc 2.'[3-9][0-9]* | 'Linux x86_64-glibc 2.2'[89]*) ;;
@@ -77,19 +70,26 @@ case " $versions " in *" ${version:-none} "*) ;; *) kept= ;; esac
 
 asked=$*
 give_up() { # MESSAGE: a lesson can go on with what is there; a command that needs a group cannot
-    rm -rf .venv.new
+    rm -rf .venv.new 2> /dev/null || :
     if [ -z "$kept" ] || [ -n "$asked" ]; then fail "$1"; fi
+    trap - EXIT
     say "$1 Until then you have the packages of before."
     exit 0
 }
+[ -w . ] || give_up "$(cannot_be_written .)"
+fixed=$(find .venv .venv.new .venv.old .uv .uv.new -type d ! -writable 2> /dev/null | head -n 1)
+[ -z "$fixed" ] || give_up "$(cannot_be_written "$fixed")"
+
+# What fails without a sentence of its own, such as a copy on a full disk, gets one.
+trap 'give_up "The environment could not be made: $(no_room || echo "see above what has failed, then try again.")"' EXIT
+rm -rf .venv.new .venv.old
 . tools/uv.sh
 
 if [ -n "$kept" ]; then
     # The same files under second names: this takes a second, and no room.
-    cp -al .venv .venv.new 2> /dev/null || { rm -rf .venv.new && cp -a .venv .venv.new; } ||
-        give_up "The environment could not be copied: $(what_to_check UV_DEFAULT_INDEX)"
+    cp -al .venv .venv.new 2> /dev/null || { rm -rf .venv.new && cp -a .venv .venv.new; }
     # What uv installs for a folder of another name. An environment of version 0.3 does not say so.
-    { sed '/^relocatable/d' .venv/pyvenv.cfg && echo 'relocatable = true'; } > .venv.new/pyvenv.new
+    { sed '/^relocatable/d' .venv/pyvenv.cfg; echo 'relocatable = true'; } > .venv.new/pyvenv.new
     mv .venv.new/pyvenv.new .venv.new/pyvenv.cfg
     rm -f .venv.new/set_up.stamp
 else
@@ -100,9 +100,11 @@ else
         python=$(printf '%s\n' "$list" | sed -n "s/^cpython-$version\.[0-9]*-linux-x86_64-gnu  *//p" | sed 's/ -> .*//; q')
         [ -z "$python" ] || break
     done
-    say "Making .venv with ${python:=${versions%% *}}"
-    "$uv" venv --quiet --no-project --python "$python" --relocatable .venv.new ||
-        fail "No usable Python ${versions##* } to ${versions%% *} is on the PATH, and uv could not fetch one: install it, for example with \`sudo apt install python${versions##* }\`, or check the network, then try again."
+    say "Making .venv with ${python:-${versions%% *}}"
+    "$uv" venv --quiet --no-project --python "${python:-${versions%% *}}" --relocatable .venv.new || {
+        [ -z "$python" ] || exit 1
+        fail "No usable Python ${versions##* } to ${versions%% *} is on the PATH, and uv could not fetch one: install it, for example with \`sudo apt install python${versions##* }\`, or $(what_to_check UV_PYTHON_INSTALL_MIRROR)"
+    }
 fi
 
 # A ROS 2 wheel `ros-rclpy` also holds the metadata of an older format, of a package `rclpy`. uv would
@@ -143,4 +145,5 @@ wanted .venv.new > .venv.new/set_up.stamp
 
 [ ! -d .venv ] || mv .venv .venv.old
 mv .venv.new .venv
+trap - EXIT
 rm -rf .venv.old

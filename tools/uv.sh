@@ -5,22 +5,9 @@
 set -eu
 case $0 in */uv.sh) cd "$(dirname "$0")/.." ;; esac
 
-fail() {
-    printf '%s\n' "$*" >&2
-    exit 1
-}
+command -v what_to_check > /dev/null || . tools/troubles.sh
 # tools/set_up.sh may go on with what is there.
 command -v give_up > /dev/null || give_up() { fail "$1"; }
-
-what_to_check() { # VARIABLE: what to do if packages do not come; VARIABLE names their index
-    free=$(df -Pm . | sed -n '2s/^.* \([0-9][0-9]*\)  *[0-9][0-9]*%.*/\1/p')
-    proxy=${HTTPS_PROXY:-${https_proxy:-${ALL_PROXY:-${all_proxy:-}}}}
-    if [ "${free:-1000}" -lt 300 ]; then
-        echo "only $free MB are free in $PWD. Make room for 1 GB, then try again."
-    else
-        echo "check the network${proxy:+ and the proxy $proxy}, or name your package index with $1, then try again."
-    fi
-}
 
 # Only what says where packages come from is taken over from the environment. The rest (PIP_USER,
 # PIP_TARGET, UV_PYTHON, UV_CONSTRAINT, ...) would change what is installed, or where.
@@ -33,6 +20,10 @@ for name in $(env | sed -n 's/^\(PIP_[A-Z_]*\)=.*/\1/p; s/^\(UV_[A-Z_]*\)=.*/\1/
         *) unset "$name" ;;
     esac
 done
+# A home may be read-only, and a cache root's after `sudo make lab`: uv would end.
+if ! mkdir -p "$cache" 2> /dev/null || [ -n "$(find "$cache" -maxdepth 1 ! -writable 2> /dev/null)" ]; then
+    export UV_NO_CACHE=1
+fi
 # An archive of `make handout OFFLINE=yes` brings the packages along.
 if [ -f wheels/pythons ]; then
     unset UV_DEFAULT_INDEX UV_INDEX_URL UV_INDEX UV_EXTRA_INDEX_URL UV_FIND_LINKS
@@ -47,6 +38,14 @@ for name in python3 python3.14 python3.13 python3.12 python3.11 python; do
     ! "$name" -I -S -c '' 2> /dev/null || without_pip=${without_pip:-$name}
 done
 
+setting() { # NAME: the value in pip's variables or files; a list is separated by spaces
+    for section in :env: install global; do
+        value=$(printf '%s\n' "$pip_config" | sed -n "s/^$section\.$1=.\(.*\).\$/\1/p" | sed 's/\\n/ /g')
+        [ -z "$value" ] || break
+    done
+    printf '%s' "$value"
+}
+
 # --- uv ------------------------------------------------------------------------------------------
 
 uv_pin=$(sed -n 's/^uv==\([^ ]*\).*/\1/p' tools/locks/requirements-uv.lock)
@@ -58,9 +57,9 @@ else
         "uv $uv_pin" | "uv $uv_pin "*) ;;
         *)
             [ -n "$any_python" ] || [ -z "$without_pip" ] ||
-                fail "$without_pip has no pip and no venv: run \`sudo apt install python3-venv\`, then try again."
+                give_up "$without_pip has no pip and no venv: run \`sudo apt install python3-venv\`, then try again."
             [ -n "$any_python" ] ||
-                fail 'No Python is on the PATH: install one, for example with `sudo apt install python3 python3-venv`, then try again.'
+                give_up 'No Python is on the PATH: install one, for example with `sudo apt install python3 python3-venv`, then try again.'
             rm -rf .uv.new
             PIP_ROOT_USER_ACTION=ignore "$any_python" -I tools/pip.py install --quiet --disable-pip-version-check --no-user --no-deps --no-compile --target .uv.new \
                 --only-binary :all: --require-hashes --requirement tools/locks/requirements-uv.lock ||
@@ -73,13 +72,6 @@ fi
 
 # --- The package index ---------------------------------------------------------------------------
 
-setting() { # NAME: the value in pip's variables or files; a list is separated by spaces
-    for section in :env: install global; do
-        value=$(printf '%s\n' "$pip_config" | sed -n "s/^$section\.$1=.\(.*\).\$/\1/p" | sed 's/\\n/ /g')
-        [ -z "$value" ] || break
-    done
-    printf '%s' "$value"
-}
 take() { # VARIABLE VALUE: unless the variable is set, or there is no value
     eval "[ -n \"\${$1-}\" ]" || [ -z "$2" ] || export "$1=$2"
 }

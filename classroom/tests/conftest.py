@@ -5,6 +5,7 @@ import pytest
 import support.examples  # noqa: F401
 from support.browser import *  # noqa: F403
 from support.lab_server import NOTEBOOKS, server
+from support.small_checkout import wheels  # noqa: F401
 from support.waits import wait_for
 
 from classroom.tests.support.classes import running_class

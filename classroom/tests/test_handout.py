@@ -12,6 +12,7 @@ import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output, new_raw_cell
 from support.checkouts import git
+from support.small_checkout import ALL, Checkout
 
 from classroom import handout, update
 from helpers.lesson import PICTURES, ROOT, kept_solution, lessons
@@ -95,6 +96,13 @@ def test_its_documents_name_only_what_it_has(archive):
         commands = {*re.findall(r'`make ([a-z-]+)', text)}
         assert commands <= {'help', 'lab', 'update', 'set_up'}, name
     assert 'For instructors' not in (archive / 'notebooks/00_start_here.ipynb').read_text()
+
+
+def test_it_installs_itself(archive, wheels, tmp_path):
+    course = Checkout(tmp_path, wheels, archive)
+    answer = course.set_up()
+    assert answer.returncode == 0, answer.stderr
+    assert course.installed() == ALL
 
 
 def test_its_commands_work(archive):
