@@ -14,6 +14,7 @@ from jupyter_core.paths import jupyter_config_dir
 
 from classroom.deck.copies import FOLDER, Copies
 from helpers import lesson
+from helpers.machine import sentence_about
 from helpers.notebook import BEGIN_EMPTY
 from tools.lab import open_lab, parser
 
@@ -47,6 +48,9 @@ def main(arguments: list[str] | None = None) -> int:
         copies.make(wanted, options.new)
     except ValueError as error:
         print(error, file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(sentence_about(error, root), file=sys.stderr)
         return 1
     for path in wanted:
         used = copies.used(path.name)

@@ -8,10 +8,13 @@ import json
 import os
 import socket
 import sys
+import tempfile
 from pathlib import Path
 from typing import NoReturn
 
-from jupyter_core.paths import jupyter_config_dir
+from jupyter_core.paths import jupyter_config_dir, jupyter_data_dir, jupyter_runtime_dir
+
+from helpers.machine import sentence_about
 
 ROOT = Path(__file__).resolve().parents[1]
 PLAIN = 'jupyter_server.services.contents.largefilemanager.AsyncLargeFileManager'
@@ -46,20 +49,13 @@ def open_lab(
     those of JupyterLab's plugins, by names such as 'notebook-extension/tracker'; `more` are options
     of JupyterLab.
     """
+    _must_be_free(options.port)
     try:
-        socket.create_server(('localhost', int(options.port or 0))).close()
-    except OSError:
-        sys.exit(f'Port {options.port} is in use: give another one, such as PORT=8899.')
-    config = Path(jupyter_config_dir())
-    folder = config / 'lab' / f'{name}-settings'
-    for plugin, values in (settings or {}).items():
-        file = folder / '@jupyterlab' / f'{plugin}.jupyterlab-settings'
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text(json.dumps(values))
-    custom = config / 'custom' / 'custom.css'
-    custom.parent.mkdir(parents=True, exist_ok=True)
-    css = Path(__file__).with_name('lab.css').read_text()
-    custom.write_text(css.partition(NOTES)[0] if options.outputs else css)
+        folder = _write_settings(name, settings or {}, notes=options.outputs)
+        for state in (jupyter_config_dir(), jupyter_data_dir(), jupyter_runtime_dir()):
+            _must_take_files(Path(state))
+    except OSError as error:
+        sys.exit(sentence_about(error))
     os.environ['JUPYTERLAB_SETTINGS_DIR'] = str(folder)
     # A terminal finds `ros2`, `colcon` and this Python.
     os.environ['PATH'] = f'{sys.prefix}/bin{os.pathsep}{os.environ["PATH"]}'
@@ -82,6 +78,39 @@ def open_lab(
         command.append('--allow-root')
     print('Ctrl+C, twice, ends JupyterLab.', file=sys.stderr)
     os.execv(sys.executable, [*command, *options.more])
+
+
+def _must_be_free(port: str | None) -> None:
+    try:
+        socket.create_server(('localhost', int(port or 0))).close()
+    except (ValueError, OverflowError):
+        sys.exit(f'{port} is no port: give a number, such as PORT=8899.')
+    except PermissionError:
+        sys.exit(f'Only root may open port {port}: give another one, such as PORT=8899.')
+    except OSError:
+        sys.exit(f'Port {port} is in use: give another one, such as PORT=8899.')
+
+
+def _write_settings(name: str, settings: dict[str, dict], notes: bool) -> Path:
+    """Write how JupyterLab looks, with or without the `notes`; return the folder of `settings`."""
+    config = Path(jupyter_config_dir())
+    folder = config / 'lab' / f'{name}-settings'
+    for plugin, values in settings.items():
+        file = folder / '@jupyterlab' / f'{plugin}.jupyterlab-settings'
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(values))
+    custom = config / 'custom' / 'custom.css'
+    custom.parent.mkdir(parents=True, exist_ok=True)
+    css = Path(__file__).with_name('lab.css').read_text()
+    custom.write_text(css.partition(NOTES)[0] if notes else css)
+    return folder
+
+
+def _must_take_files(folder: Path) -> None:
+    """Raise OSError if JupyterLab, which would show a traceback, could not write its state."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder) as file:
+        file.write(bytes(1_000_000))
 
 
 if __name__ == '__main__':

@@ -1,4 +1,4 @@
-"""This machine: what it has, what is missing, the tools of a build, the folders of workspaces.
+"""This machine: what it has, lacks and refuses, the tools of a build, the folders of workspaces.
 
 `doctor` is a door of its own, `python -m helpers.machine.doctor`: it runs where nothing else does.
 """
@@ -15,6 +15,7 @@ from helpers.machine.folders import (
     name_beside,
     set_apart,
 )
+from helpers.machine.troubles import sentence_about
 
 __all__ = [
     'BUILT',
@@ -28,6 +29,7 @@ __all__ = [
     'give_new_names',
     'locks_of_workspaces',
     'name_beside',
+    'sentence_about',
     'set_apart',
     'tools_of_a_build',
 ]

@@ -12,7 +12,7 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
@@ -33,21 +33,19 @@ class Server(NamedTuple):
 
 
 @contextmanager
-def made(folder: Path, printed: str, *make: str) -> Iterator[tuple[subprocess.Popen, re.Match]]:
+def made(
+    folder: Path, printed: str, *make: str, inside: Sequence[str] = ()
+) -> Iterator[tuple[subprocess.Popen, re.Match]]:
     """Run a command of the Makefile beside the block, as a process group of its own.
 
-    It yields the process, and what it has printed by which one sees that it has started.
+    It yields the process, and what it has printed by which one sees that it has started. `inside`
+    is a command that runs others.
     """
-    # Two workers start servers at the same moment, and would both find the first free port. The
-    # system gives each a port of its own.
-    command = ['make', *make, 'PORT=0', 'BROWSER=no', f'ROOT={folder}']
-    state = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR')
-    command += [f'{name}={folder / name}' for name in state]
     log = folder / f'{make[0]}.log'
     with log.open('w') as file:
         process = subprocess.Popen(
             # If this test is killed, the server is told, and ends its kernels.
-            ['setpriv', '--pdeathsig', 'TERM', *command],
+            ['setpriv', '--pdeathsig', 'TERM', *inside, *command_of(folder, *make)],
             cwd=ROOT,
             stdin=subprocess.DEVNULL,
             stdout=file,
@@ -73,6 +71,15 @@ def made(folder: Path, printed: str, *make: str) -> Iterator[tuple[subprocess.Po
             # such as the last save of a page. Then the process waits for that thread for ever.
             if STOPS not in log.read_text():
                 raise
+
+
+def command_of(folder: Path, command: str, *options: str) -> list[str]:
+    """Return a command of the Makefile that keeps JupyterLab's state in a folder."""
+    # Two workers start servers at the same moment, and would both find the first free port. The
+    # system gives each a port of its own.
+    state = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR')
+    variables = [f'{name}={folder / name}' for name in state]
+    return ['make', command, 'PORT=0', 'BROWSER=no', f'ROOT={folder}', *variables, *options]
 
 
 @contextmanager
