@@ -16,6 +16,8 @@ one side of a conflict only (`git merge -Xours`), and needs git.
 """
 
 import argparse
+import errno
+import fcntl
 import os
 import re
 import shutil
@@ -24,7 +26,10 @@ import sys
 import tarfile
 import tempfile
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 from uuid import uuid4
 
 import nbformat
@@ -32,12 +37,13 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell, new_notebook
 
 from helpers.lesson import outline
-from helpers.machine import Renamed, give_new_names, set_apart
+from helpers.machine import Renamed, give_new_names, sentence_about, set_apart
 from helpers.notebook import MARK
 
 ROOT = Path(__file__).resolve().parents[1]
 BASE = '.handed_out'  # beside the lessons: what was handed out
-APART = (BASE, '.git', 'wheels')
+UNPACKED = '.unpacked'  # and what is in an archive, while it is brought
+APART = (BASE, '.git', 'wheels', UNPACKED)
 LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # wherever they are
 # What nbformat and this program raise for a file that is no notebook, or has no ids.
 UNREADABLE = (ValueError, LookupError, TypeError, AttributeError, nbformat.ValidationError)
@@ -106,34 +112,95 @@ def _changed(cell: NotebookNode, **changes: object) -> NotebookNode:
     return nbformat.from_dict({**cell, **changes})
 
 
+class Move(NamedTuple):
+    """A file that takes its place."""
+
+    staged: Path  # beside the place
+    target: Path
+    own: Path  # the student's, which may be called by another number
+    aside: Path | None  # where the student's goes
+    said: str  # of that
+
+
+class Changes(NamedTuple):
+    """What a merge changes in a folder, once all files that it writes are there."""
+
+    moves: list[Move]
+    gone: list[Path]
+
+    def make(self) -> list[str]:
+        """Let only names change, which takes no room and no time; return what was set aside."""
+        for move in self.moves:
+            if move.aside:
+                move.own.rename(move.aside)
+            move.staged.replace(move.target)
+            if move.own != move.target:
+                move.own.unlink(missing_ok=True)
+        for file in self.gone:
+            file.unlink(missing_ok=True)
+        return [move.said for move in self.moves if move.aside]
+
+
 def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
     """Change the files of `mine` as `newer` wants it; return a sentence for each one set aside.
 
     A file that only `mine` has stays. One that is no longer there in `newer` goes, if it was not
     changed.
     """
-    said = []
-    for file in files_of(newer):
-        target, own, old = mine / file, _found(mine / file), _found(base / file)
-        data, was, now = (newer / file).read_bytes(), _bytes(old), _bytes(own)
-        if data == was and own == target:
-            continue
-        if now not in (None, was, data):
-            try:
-                data = _merged(old, own, newer / file)
-            except ValueError:
-                aside = own.with_name(f'{own.name}.yours')
-                if aside.exists():  # what an earlier update has set aside stays
-                    aside = own.with_name(f'{own.name}.{uuid4().hex[:8]}.yours')
-                own.rename(aside)
-                said.append(f'Both have changed {file}: yours is now {aside.name}.')
-        _write(target, data, (newer / file).stat().st_mode)
-        if own not in (target, None):
-            own.unlink(missing_ok=True)
+    with changes(base, mine, newer) as found:
+        return found.make()
+
+
+@contextmanager
+def changes(base: Path, mine: Path, newer: Path) -> Iterator[Changes]:
+    """Yield what a merge changes in `mine`, with all files that it needs under other names.
+
+    Before, what ends it, such as a full disk or a folder of another user, has changed nothing.
+    """
+    moves = []
+    try:
+        for file in files_of(newer):
+            move, data = _change(file, base, mine, newer)
+            if move:
+                moves.append(move)
+                move.target.parent.mkdir(parents=True, exist_ok=True)
+                move.staged.write_bytes(data)
+                move.staged.chmod((newer / file).stat().st_mode)
+        yield Changes(moves, [*_gone(base, mine, newer)])
+    finally:
+        for move in moves:
+            move.staged.unlink(missing_ok=True)
+
+
+def _change(file: Path, base: Path, mine: Path, newer: Path) -> tuple[Move | None, bytes]:
+    """Return how a file changes, and its new text."""
+    target, own, old = mine / file, _found(mine / file), _found(base / file)
+    staged = target.with_name(f'.{target.name}.newer')
+    staged.unlink(missing_ok=True)  # of an update that was killed
+    data, was, now = (newer / file).read_bytes(), _bytes(old), _bytes(own)
+    if data == was and own == target:
+        return None, data
+    aside = None
+    if now not in (None, was, data):
+        try:
+            data = _merged(old, own, newer / file)
+        except ValueError:
+            aside = own.with_name(f'{own.name}.yours')
+            if aside.exists():  # what an earlier update has set aside stays
+                aside = own.with_name(f'{own.name}.{uuid4().hex[:8]}.yours')
+    said = f'Both have changed {file}: yours is now {aside.name}.' if aside else ''
+    return Move(staged, target, own, aside, said), data
+
+
+def _gone(base: Path, mine: Path, newer: Path) -> Iterator[Path]:
+    """Yield the files that are no longer there, and that nobody has changed."""
     for file in files_of(base):
-        if not (newer / file).exists() and _bytes(mine / file) == _bytes(base / file):
-            (mine / file).unlink(missing_ok=True)
-    return said
+        own = mine / file
+        if (newer / file).exists() or not own.is_file() or _bytes(own) != _bytes(base / file):
+            continue
+        if not os.access(own.parent, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(own))
+        yield own
 
 
 def renamed_workspaces(base: Path, newer: Path) -> list[Renamed]:
@@ -185,23 +252,13 @@ def _merged(base: Path, mine: Path, newer: Path) -> bytes:
         raise ValueError from problem
 
 
-def _write(path: Path, data: bytes, mode: int) -> None:
-    """Write a file at once: after an interruption there is the old one or the new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    new = path.with_name(f'{path.name}.new')
-    new.write_bytes(data)
-    new.chmod(mode)
-    new.replace(path)
-
-
 def update_from_folder(newer: Path, mine: Path, course: Path) -> list[str]:
     """Merge a folder into `mine`, and keep it there as what was handed out last.
 
     `course` is the checkout whose lessons are open: its workspaces follow. After an interruption
     the next update goes on: to merge once more changes nothing.
     """
-    said = set_apart(renamed_workspaces(mine / BASE, newer), course)
-    said += merge_folders(mine / BASE, mine, newer)
+    said = []
     if (mine / BASE).is_dir():
         before, after = with_solutions(mine / BASE), with_solutions(newer)
         for numbers, what in (
@@ -210,7 +267,10 @@ def update_from_folder(newer: Path, mine: Path, course: Path) -> list[str]:
         ):
             if numbers:
                 said.append(f'Lessons {", ".join(sorted(numbers))} {what}.')
-    merge_folders(mine / BASE, mine / BASE, newer)
+    base = mine / BASE
+    with changes(base, mine, newer) as of_lessons, changes(base, base, newer) as of_base:
+        said = set_apart(renamed_workspaces(base, newer), course) + said
+        said += of_lessons.make() + of_base.make()
     # Not before: if this were done twice, two workspaces that change names would change them back.
     return said + give_new_names(course)
 
@@ -223,12 +283,17 @@ def with_solutions(folder: Path) -> set[str]:
 
 def update_from_archive(archive: Path, mine: Path) -> list[str]:
     """Merge an archive of `make handout` into `mine`. Raises ValueError with one sentence."""
-    with tempfile.TemporaryDirectory(dir=mine) as folder:
+    folder = mine / UNPACKED
+    shutil.rmtree(folder, ignore_errors=True)  # of an update that was killed
+    folder.mkdir()
+    try:
         try:
-            _unpack(archive, Path(folder))
-        except (tarfile.TarError, OSError, EOFError, zlib.error):
+            _unpack(archive, folder)
+        except (tarfile.TarError, OSError, EOFError, zlib.error) as error:
+            if getattr(error, 'errno', None):  # of the disk
+                raise
             raise ValueError(f'{archive} cannot be read as an archive: get it again.') from None
-        newer = next((path.parent for path in Path(folder).glob(f'*/{BASE}')), None)
+        newer = next((path.parent for path in folder.glob(f'*/{BASE}')), None)
         if newer is None:
             raise ValueError(f'{archive} is no archive of `make handout`.')
         lock = _bytes(mine / 'tools/locks/requirements.lock')
@@ -238,6 +303,8 @@ def update_from_archive(archive: Path, mine: Path) -> list[str]:
             shutil.rmtree(mine / 'wheels', ignore_errors=True)  # they are those of the old lock
         if brought:
             (newer / 'wheels').rename(mine / 'wheels')
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
     return said
 
 
@@ -261,7 +328,7 @@ def update_from_git(mine: Path) -> list[str]:
     """Merge what the branch follows into a clone. Raises ValueError with one sentence."""
     if not (mine / '.git').exists():
         raise ValueError('Name the newer archive: make update FROM=/path/to/ros2_notebooks.tar.gz')
-    _git(mine, 'There is no network, or no place to fetch from', 'fetch')
+    _git(mine, 'Nothing could be fetched: check the network, and what git says', 'fetch')
     _git(
         mine,
         'This branch has commits of its own, which only you can merge: use git',
@@ -271,14 +338,18 @@ def update_from_git(mine: Path) -> list[str]:
         base, newer = (
             committed(mine, name, Path(folder, name[-4:])) for name in ('HEAD', '@{upstream}')
         )
-        said = set_apart(renamed_workspaces(base, newer), mine)
-        said += merge_folders(base, mine, newer)
+        with changes(base, mine, newer) as found:
+            said = set_apart(renamed_workspaces(base, newer), mine) + found.make()
         _git(mine, 'The lessons are new, but git could not note it', 'reset', '@{upstream}')
     return said + give_new_names(mine)
 
 
 def _git(folder: Path, trouble: str, *command: str) -> None:
-    done = subprocess.run(['git', *command], cwd=folder, capture_output=True, text=True)
+    _run(folder, trouble, 'git', *command)
+
+
+def _run(folder: Path, trouble: str, *command: str | Path) -> None:
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     if done.returncode:
         raise ValueError(' '.join(f'{trouble}. {done.stderr}'.split()))
 
@@ -288,8 +359,32 @@ def committed(folder: Path, name: str, output: Path) -> Path:
     output.mkdir()
     archive = output.with_suffix('.tar')
     _git(folder, f'{name} cannot be read', 'archive', f'--output={archive}', name)
-    subprocess.run(['tar', '--extract', '--file', archive, '--directory', output], check=True)
+    _run(output, f'{name} cannot be unpacked', 'tar', '--extract', '--file', archive)
     return output
+
+
+def bring(source: Path | None, mine: Path) -> list[str]:
+    """Merge what is newer in a source into `mine`. Raises ValueError with one sentence."""
+    if source is None:
+        return update_from_git(mine)
+    if source.is_dir():
+        return update_from_folder(source, mine, course=ROOT)
+    if source.is_file():
+        return update_from_archive(source.resolve(), mine)
+    raise ValueError(f'There is no file {source}.')
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Wait until no other update changes this folder, where its file system can tell."""
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        with suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(lock)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -300,17 +395,17 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     source, mine = options.source, options.to
     try:
-        if source is None:
-            said = update_from_git(mine)
-        elif source.is_dir():
-            said = update_from_folder(source, mine, course=ROOT)
-        elif source.is_file():
-            said = update_from_archive(source.resolve(), mine)
-        else:
-            raise ValueError(f'There is no file {source}.')
-    except (ValueError, OSError) as error:
+        with alone(mine):
+            said = bring(source, mine)
+    except ValueError as error:
         print(error, file=sys.stderr)
         return 1
+    except OSError as error:
+        print(sentence_about(error, mine), file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print('Interrupted: nothing is lost. Type the same again to go on.', file=sys.stderr)
+        return 130
     print(*said, 'The lessons are up to date. What you have written is where it was.', sep='\n')
     return 0
 
