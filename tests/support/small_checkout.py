@@ -52,6 +52,7 @@ class Checkout:
 
     def __init__(self, folder: Path, wheels: Path | None = None, course: Path = ROOT) -> None:
         self.wheels, self.bin = wheels or folder / 'wheels', folder / 'bin'
+        self.pythons = f'3.14 {HERE}'
         self.bin.mkdir()
         for command in COMMANDS:
             if where := shutil.which(command):
@@ -81,7 +82,7 @@ class Checkout:
     def lock(self, *names: str, group: str = '') -> None:
         """Write a lock of these packages, or of all."""
         file = self.root / LOCKS / f'requirements{group and f"-{group}"}.lock'
-        header = f'# Every wheel exists for Python 3.14 {HERE}\n'
+        header = f'# Every wheel exists for Python {self.pythons}\n'
         file.write_text(header + ''.join(self.pins[name] for name in names or self.pins))
 
     def start(
