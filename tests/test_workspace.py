@@ -29,7 +29,7 @@ from support.waits import wait_for
 from helpers.machine import folders
 from helpers.ros import ros_session
 from helpers.ros.domain import reserve_domain_id
-from helpers.workspace import Workspace, processes
+from helpers.workspace import Workspace, given, processes
 from helpers.workspace.build_output import lines_that_matter
 from helpers.workspace.processes import Process
 from helpers.workspace.wheels import fix_wheels
@@ -652,6 +652,23 @@ def test_a_checkout_with_spaces_and_accents(other, monkeypatch, tmp_path):
     workspace = Workspace('test_accents')
     assert re.fullmatch(r'[A-Za-z0-9_./-]+', str(workspace.path))
     assert list(checkout.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ('script', 'write', 'file'),
+    [
+        ('FLEET', given.write_fleet, 'src/fleet_pkg/package.xml'),
+        ('COLLEAGUE', given.play_colleague, 'server/brake.git/HEAD'),
+    ],
+)
+def test_files_of_somebody_else_come_from_such_a_checkout(
+    other, monkeypatch, tmp_path, script, write, file
+):
+    checkout = tmp_path / 'élève one'
+    checkout.mkdir()
+    monkeypatch.setattr(given, script, Path(shutil.copy(getattr(given, script), checkout)))
+    write(other)
+    assert (other.path / file).is_file()
 
 
 @pytest.mark.parametrize('name', ['', 'two words', '../up'])

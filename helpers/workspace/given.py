@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 from helpers.workspace.workspace import Workspace
 
@@ -13,12 +14,12 @@ TRY_NEAREST = Path(__file__).with_name('try_nearest.cpp')
 
 def play_colleague(workspace: Workspace) -> None:
     """Make a repository with three packages on the server, with the branches jazzy and humble."""
-    workspace.terminal(f'bash {COLLEAGUE}')
+    workspace.terminal(f'bash {quote(str(COLLEAGUE))}')
 
 
 def write_fleet(workspace: Workspace) -> None:
     """Write the package fleet_pkg anew: a driver that goes straight ahead until a wall is near."""
-    workspace.terminal(f'bash {FLEET}')
+    workspace.terminal(f'bash {quote(str(FLEET))}')
 
 
 def write_try_nearest(workspace: Workspace) -> None:
