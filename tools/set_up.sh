@@ -14,6 +14,7 @@ fi
 
 . tools/troubles.sh
 trap 'trap - EXIT; say "Interrupted: what was there is as it was. Type the same again to go on."; exit 130' INT
+case $PWD in *:*) fail "The folder $PWD has a colon in its name, which no PATH can hold: give it another name, then try again." ;; esac
 [ -w . ] || [ -d .jupyter ] || fail "$(cannot_be_written .)"
 # JupyterLab's state: see tools/environment.mk. That of a hub has many users.
 mkdir -p .jupyter || fail "$(no_room || cannot_be_written .)"
@@ -138,7 +139,9 @@ mkdir -p $settings $etc/jupyter $etc/ipython
 rm -f $settings/overrides.json $etc/jupyter/bashrc $etc/jupyter/jupyter_server_config.json $etc/ipython/ipython_config.json
 cp tools/jupyter/overrides.json $settings
 cp tools/jupyter/bashrc $etc/jupyter
-sed "s|VENV|$PWD/.venv|" tools/jupyter/jupyter_server_config.json > $etc/jupyter/jupyter_server_config.json
+# Not by sed: a folder may be called `Robots & I`.
+.venv.new/bin/python -I -S -c 'import json, sys; print(sys.stdin.read().replace("VENV", json.dumps(sys.argv[1])[1:-1]))' \
+    "$PWD/.venv" < tools/jupyter/jupyter_server_config.json > $etc/jupyter/jupyter_server_config.json
 cp tools/jupyter/ipython_config.json $etc/ipython
 for group in $with; do : > ".venv.new/with_$group"; done
 wanted .venv.new > .venv.new/set_up.stamp

@@ -5,10 +5,12 @@ import shutil
 import signal
 import socket
 import subprocess
+import urllib.request
 
 import pexpect
 import pytest
 from support.lab_server import ROOT, START_LIMIT_S, command_of, made
+from support.processes import put
 from support.troubles import another_user, as_root, folder_of_all, full, read_only, small_disk
 
 from helpers.machine import sentence_about
@@ -78,6 +80,18 @@ def test_ctrl_c_twice_ends_it(tmp_path):
     lab.expect(pexpect.EOF)
     lab.close()
     assert 'Traceback' not in lab.before
+
+
+def test_nothing_is_written_into_the_home(tmp_path, monkeypatch):
+    home = tmp_path / 'home'
+    home.mkdir()
+    # As the npm of a machine does, which JupyterLab asks for language servers.
+    put(tmp_path, 'npm', 'mkdir -p ~/.npm/_logs')
+    monkeypatch.setenv('HOME', str(home))
+    monkeypatch.setenv('PATH', f'{tmp_path}:{os.environ["PATH"]}')
+    with made(tmp_path, ADDRESS, 'lab') as (_, found):
+        urllib.request.urlopen(found[0]).read()
+    assert not list(home.iterdir())
 
 
 @as_root

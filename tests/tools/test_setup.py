@@ -1,9 +1,11 @@
 """The set-up, on a lock of two packages that lie in a folder, and what the real locks must hold."""
 
+import json
 import os
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 from support.processes import put
@@ -86,6 +88,26 @@ def test_a_moved_checkout_is_made_anew(checkout):
         answer = checkout.set_up()
         assert answer.returncode == 0, answer.stderr
         assert answer.stderr.startswith('Making .venv')
+    finally:
+        checkout.root = checkout.root.rename(before)
+
+
+def test_a_folder_has_any_name_without_a_colon(checkout):
+    checkout.lock()
+    before = checkout.root
+    checkout.root = before.rename(before.with_name('R&D, "robots" | 100 % of a$b#c\\d'))
+    try:
+        answer = checkout.set_up()
+        assert answer.returncode == 0, answer.stderr
+        assert checkout.installed() == ALL
+        settings = checkout.root / '.venv/etc/jupyter/jupyter_server_config.json'
+        command = json.loads(settings.read_text())['ServerApp']['terminado_settings']
+        assert Path(command['shell_command'][-1]).is_file()
+        checkout.root = checkout.root.rename(before.with_name('a:b'))
+        assert checkout.set_up().stderr == (
+            f'The folder {checkout.root} has a colon in its name, which no PATH can hold: give it '
+            'another name, then try again.\n'
+        )
     finally:
         checkout.root = checkout.root.rename(before)
 
