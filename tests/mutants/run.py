@@ -135,9 +135,7 @@ def judge_part(name: str, mutants: dict[str, list[Mutant]]) -> list[Judged]:
             if of_task:
                 left = [one.mutant.id for one in judged if one.task == task and one.how in LEFT]
                 told = ' '.join([f'{len(left)} left', *left])
-                print(
-                    f'{name}, {task}: {len(of_task)} judged, {told}', file=sys.stderr, flush=True
-                )
+                print(f'{name}, {task}: {len(of_task)} judged, {told}', file=sys.stderr, flush=True)
     finally:
         judge.close()
     return judged
