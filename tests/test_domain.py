@@ -175,13 +175,13 @@ def test_a_session_announces_itself_often():
     Both send to the ports of participants that may be there: here to that of the twentieth.
     """
     announced = Counter()
-    with ros_session(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
+    with ros_session() as session, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as port:
         port.bind(('127.0.0.1', 7400 + 250 * domain_of_session() + 10 + 2 * 20))
         port.settimeout(LIMIT_S)
-        ours = sender_of(port)
+        node = Node('session')
+        ours = participant_of(session, node, 'session')
         with running(PLAIN, FASTRTPS_DEFAULT_PROFILES_FILE=None, **graph_environment()):
-            while (theirs := sender_of(port)) == ours:
-                pass
+            theirs = participant_of(session, node, 'plain')
             # It begins with five, 0.1 s apart, and answers at once what it discovers: some of its
             # first pauses are short. A session that spoke as seldom would never say so five times.
             most = pauses = 0
@@ -193,8 +193,24 @@ def test_a_session_announces_itself_often():
     assert most >= 5
 
 
+def participant_of(session, node, name):
+    """Return the prefix of the GUID of the participant in which a node is."""
+    found = []
+
+    def is_there():
+        found[:] = [
+            bytes(one.endpoint_gid[:12])
+            for one in node.get_publishers_info_by_topic('/rosout')
+            if one.node_name == name
+        ]
+        return found
+
+    session.wait_until(is_there, LIMIT_S)
+    return found[0]
+
+
 def sender_of(port):
-    """Return which participant sends the next RTPS message: the prefix of its GUID."""
+    """Return the prefix of the GUID of the participant that sends the next RTPS message."""
     return port.recv(65536)[8:20]
 
 
