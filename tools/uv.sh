@@ -49,7 +49,8 @@ setting() { # NAME: the value in pip's variables or files; a list is separated b
 # --- uv ------------------------------------------------------------------------------------------
 
 uv_pin=$(sed -n 's/^uv==\([^ ]*\).*/\1/p' tools/locks/requirements-uv.lock)
-if uv=$(command -v uv) && "$uv" python dir > /dev/null 2>&1; then # as [tool.uv] of pyproject.toml wants it
+# One that is too old does not understand [tool.uv] of pyproject.toml, and says so.
+if uv=$(command -v uv) && said=$("$uv" python dir 2>&1 > /dev/null) && [ -z "$said" ]; then
     :
 else
     uv=$PWD/.uv/bin/uv

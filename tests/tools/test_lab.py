@@ -1,5 +1,6 @@
 """`make lab`: whatever keeps JupyterLab from starting gets one sentence, and then it starts."""
 
+import json
 import os
 import shutil
 import signal
@@ -13,6 +14,7 @@ from support.lab_server import ROOT, START_LIMIT_S, command_of, made
 from support.processes import put
 from support.troubles import another_user, as_root, folder_of_all, full, read_only, small_disk
 
+from helpers.lesson import path_of
 from helpers.machine import sentence_about
 
 ADDRESS = r'http://localhost:(\d+)/lab/tree/notebooks/00_start_here.ipynb\?token=\w+'
@@ -92,6 +94,19 @@ def test_nothing_is_written_into_the_home(tmp_path, monkeypatch):
     with made(tmp_path, ADDRESS, 'lab') as (_, found):
         urllib.request.urlopen(found[0]).read()
     assert not list(home.iterdir())
+
+
+@pytest.mark.parametrize('outputs', ['no', 'yes'])
+def test_saved_outputs_are_shown_to_those_who_ask_for_them(tmp_path, outputs):
+    lesson = path_of('publish_and_subscribe')
+    (tmp_path / 'notebooks').mkdir()
+    shutil.copy(lesson, tmp_path / 'notebooks')
+    with made(tmp_path, ADDRESS, 'lab', f'OUTPUTS={outputs}') as (_, found):
+        address = found[0].replace('lab/tree/notebooks/00_start_here.ipynb', '')
+        server, token = address.split('?')
+        file = f'{server}api/contents/notebooks/{lesson.name}?{token}'
+        cells = json.load(urllib.request.urlopen(file))['content']['cells']
+    assert any(cell.get('outputs') for cell in cells) == (outputs == 'yes')
 
 
 @as_root

@@ -112,6 +112,20 @@ def test_a_folder_has_any_name_without_a_colon(checkout):
         checkout.root = checkout.root.rename(before)
 
 
+@pytest.mark.parametrize('warns', [False, True])
+def test_a_uv_on_the_path_is_used_unless_it_is_too_old(tmp_path, installed, warns):
+    """One that does not understand pyproject.toml warns, and forgets all of its settings."""
+    course = Checkout(tmp_path, installed.wheels)
+    warning = 'echo "warning: unknown field" >&2; ' if warns else ''
+    used = tmp_path / 'used'
+    uv = installed.root / '.uv/bin/uv'
+    put(course.bin, 'uv', f'{warning}echo "$1" >> "{used}"; exec "{uv}" "$@"')
+    answer = course.set_up()
+    assert answer.returncode == 0, answer.stderr
+    assert (course.root / '.uv').exists() == warns
+    assert ('pip' in used.read_text().split()) != warns
+
+
 def test_packages_that_came_along_are_enough(tmp_path, wheels):
     offline = Checkout(tmp_path)
     shutil.copytree(wheels, offline.root / 'wheels', ignore=lambda *_: ['cache'])

@@ -168,3 +168,16 @@ def test_a_network_without_multicast():
         assert heard_by(told) == ['robot']
         # Nodes announce themselves every 3 s.
         assert select.select([lost.stdout], [], [], 4) == ([], [], [])
+
+
+def test_a_static_peer_is_heard_whatever_the_range_and_localhost_only_is_not():
+    """What environment.md says of machines that hear each other, or do not."""
+    own = {'ROS_DOMAIN_ID': str(DOMAIN), 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+    with (
+        firewalls('accept', 'ct state invalid accept'),
+        running(TWO, LISTENER, DOMAIN, 'SUBNET', 'told') as listener,
+        running(ONE, TALKER, 'alone', **ROBOT, ROS_LOCALHOST_ONLY='1'),
+    ):
+        assert listener.stdout.readline() == 'open\n'
+        with running(ONE, TALKER, 'told', **own, ROS_STATIC_PEERS=MACHINES[TWO]):
+            assert heard_by(listener) == ['told']
