@@ -5,7 +5,10 @@ import os
 import re
 import shutil
 import subprocess
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from threading import Thread
 
 import pytest
 from support.processes import put
@@ -110,6 +113,41 @@ def test_a_folder_has_any_name_without_a_colon(checkout):
         )
     finally:
         checkout.root = checkout.root.rename(before)
+
+
+@pytest.fixture(scope='module')
+def index(wheels, tmp_path_factory):
+    """Yield the address of a package index of one's own."""
+    folder = tmp_path_factory.mktemp('index')
+    for wheel in wheels.glob('*.whl'):
+        place = folder / 'simple' / wheel.name.partition('-')[0]
+        place.mkdir(parents=True)
+        shutil.copy(wheel, place)
+    pages = partial(SimpleHTTPRequestHandler, directory=folder)
+    with ThreadingHTTPServer(('127.0.0.1', 0), pages) as server:
+        Thread(target=server.serve_forever, daemon=True).start()
+        yield f'http://127.0.0.1:{server.server_port}/simple/'
+        server.shutdown()
+
+
+@pytest.mark.parametrize('where', ['PIP_INDEX_URL', 'UV_DEFAULT_INDEX', 'pip.conf', 'uv.toml'])
+def test_an_index_of_ones_own_is_used(tmp_path, wheels, installed, index, where):
+    course = Checkout(tmp_path, wheels)
+    own = {'PIP_NO_INDEX': '', 'PIP_FIND_LINKS': '', 'UV_CACHE_DIR': str(tmp_path / 'cache')}
+    if where in ('UV_DEFAULT_INDEX', 'uv.toml'):  # not of pip, which fetches uv
+        shutil.copytree(installed.root / '.uv', course.root / '.uv')
+    if where == 'pip.conf':
+        (tmp_path / 'pip.conf').write_text(f'[global]\nindex-url = {index}\n')
+        own['PIP_CONFIG_FILE'] = str(tmp_path / 'pip.conf')
+    elif where == 'uv.toml':
+        (tmp_path / 'uv').mkdir()
+        (tmp_path / 'uv/uv.toml').write_text(f'[[index]]\nurl = "{index}"\ndefault = true\n')
+        own['XDG_CONFIG_HOME'] = str(tmp_path)
+    else:
+        own[where] = index
+    answer = course.set_up(**own)
+    assert answer.returncode == 0, answer.stderr
+    assert course.installed() == ALL
 
 
 @pytest.mark.parametrize('warns', [False, True])
