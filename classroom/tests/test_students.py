@@ -1,5 +1,8 @@
 """What a lesson sends to the class that its student has joined."""
 
+import sqlite3
+from contextlib import closing
+
 import pytest
 from support.processes import running
 from support.students import BEGIN, GUESSES, VALUES, in_kernel, kernel, student
@@ -65,6 +68,16 @@ def test_membership_lasts_until_the_student_leaves(opened, tmp_path):
         opened.wait_for(lambda view: view['guesses'][0]['answered'])
     assert [value for _, _, value in opened.events()] == [1]
     assert in_kernel(tmp_path, 'leave_class()').endswith('What you sent is deleted.')
+    in_kernel(tmp_path, f'guess({QUESTION!r}, 3)')
+    assert opened.events() == []
+    assert in_kernel(tmp_path, 'leave_class()') == classroom.NOT_JOINED
+
+
+def test_membership_ends_after_twelve_hours(opened, tmp_path):
+    in_kernel(tmp_path, join(opened))
+    with closing(sqlite3.connect(tmp_path / 'ros2_notebooks_class.sqlite')) as kept, kept:
+        [(until_s,)] = kept.execute('SELECT until_s FROM class')
+        kept.execute('UPDATE class SET until_s = ?', (until_s - 12 * 3600,))
     in_kernel(tmp_path, f'guess({QUESTION!r}, 3)')
     assert opened.events() == []
     assert in_kernel(tmp_path, 'leave_class()') == classroom.NOT_JOINED
