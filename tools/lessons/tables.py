@@ -43,6 +43,7 @@ NOT_OURS = {
     '.venv',
     '.jupyter',
     '.handed_out',
+    '.site',
     'node_modules',
     'presentation',
     'scratch',
