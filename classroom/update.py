@@ -258,15 +258,7 @@ def update_from_folder(newer: Path, mine: Path, course: Path) -> list[str]:
     `course` is the checkout whose lessons are open: its workspaces follow. After an interruption
     the next update goes on: to merge once more changes nothing.
     """
-    said = []
-    if (mine / BASE).is_dir():
-        before, after = with_solutions(mine / BASE), with_solutions(newer)
-        for numbers, what in (
-            (after - before, 'now have their solutions'),
-            (before - after, 'no longer have their solutions, as this archive has none of them'),
-        ):
-            if numbers:
-                said.append(f'Lessons {", ".join(sorted(numbers))} {what}.')
+    said = _about_solutions(mine / BASE, newer)
     base = mine / BASE
     with changes(base, mine, newer) as of_lessons, changes(base, base, newer) as of_base:
         said = set_apart(renamed_workspaces(base, newer), course) + said
@@ -275,10 +267,22 @@ def update_from_folder(newer: Path, mine: Path, course: Path) -> list[str]:
     return said + give_new_names(course)
 
 
-def with_solutions(folder: Path) -> set[str]:
-    """Return the numbers of the lessons of a folder that have a solution."""
-    lessons = map(outline, folder.rglob('[0-9][0-9]_*.ipynb'))
-    return {lesson.number for lesson in lessons if lesson.has_solutions}
+def _about_solutions(base: Path, newer: Path) -> list[str]:
+    """Return sentences about the lessons of both whose solutions came or went."""
+    old, new = (
+        [outline(folder / file) for file in files_of(folder) if file.suffix == '.ipynb']
+        for folder in (base, newer)
+    )
+    had = {lesson.name: lesson.has_solutions for lesson in old}
+    said = []
+    for has, what in (
+        (True, 'now have their solutions'),
+        (False, 'no longer have their solutions, as this archive has none of them'),
+    ):
+        changed = [x.number for x in new if x.has_solutions == has and had.get(x.name, has) != has]
+        if changed:
+            said.append(f'Lessons {", ".join(sorted(changed))} {what}.')
+    return said
 
 
 def update_from_archive(archive: Path, mine: Path) -> list[str]:

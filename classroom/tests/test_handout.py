@@ -148,6 +148,18 @@ def test_solutions_may_come_later(checkout, tmp_path, capsys):
     assert 'Lessons 01 now have their solutions.' in capsys.readouterr().out
 
 
+def test_a_lesson_that_is_new_is_none_whose_solutions_came(checkout, tmp_path, capsys):
+    course = unpack(checkout, tmp_path / 'home')
+    shutil.copy(checkout / 'notebooks/01_publish.ipynb', checkout / 'notebooks/02_lose.ipynb')
+    git(checkout, 'add', '.')
+    git(checkout, 'commit', '-m', 'another')
+    unpack(checkout, tmp_path / 'later')
+    capsys.readouterr()
+    archive = checkout / 'handout/ros2_notebooks.tar.gz'
+    assert update.main([str(archive), '--to', str(course)]) == 0
+    assert 'solutions' not in capsys.readouterr().out
+
+
 def test_solutions_of_the_weeks_before(checkout, tmp_path):
     second = checkout / 'notebooks/02_lose.ipynb'
     shutil.copy(checkout / 'notebooks/01_publish.ipynb', second)

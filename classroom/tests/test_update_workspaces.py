@@ -10,10 +10,11 @@ from pathlib import Path
 
 import nbformat
 import pytest
-from nbformat.v4 import new_code_cell, new_notebook
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from support.checkouts import git
 
 from classroom import update
+from helpers.checks import progress
 from helpers.machine import OWNED
 
 LAUNCH, LIBRARY = 'launch_a_system', 'share_code_in_a_cpp_library'
@@ -234,3 +235,63 @@ def test_bad_notebooks_have_no_workspace(tmp_path, mine):
         bad.write_text(text)
         [one] = update.renamed_workspaces(mine / update.BASE, newer)
         assert (one.old, one.new, one.packages) == ('lesson_14', LIBRARY, {'scan_tools'})
+
+
+# --- Version 0.3 with all that a student has ------------------------------------------------------
+
+
+def lesson(workspace, *tasks):
+    """Return a lesson. A task is its title, the id of its cells, and how its check is called."""
+    cells = [new_code_cell(f"workspace = Workspace('{workspace}')", id='open')]
+    for number, (title, id_, check) in enumerate(tasks, 1):
+        cells += [
+            new_markdown_cell(f'### ✎ Task {number}: {title}\n\nDo it.', id=f'{id_}-text'),
+            new_code_cell('answer = 0', id=id_, metadata={'tags': ['exercise']}),
+            new_code_cell(
+                f'check({check}, answer)', id=f'{id_}-check', metadata={'tags': ['check']}
+            ),
+        ]
+    return new_notebook(cells=cells)
+
+
+OF_0_3 = lesson('lesson_02', ('Be the queue', 'queue', 4), ('Two executors', 'thread', 3))
+SINCE = lesson(
+    'lose_messages',
+    ('Two executors', 'thread', "'two_executors'"),
+    ('A new one', 'new', "'count_them'"),
+    ('Be the queue', 'queue', "'be_the_queue'"),
+)
+
+
+@pytest.fixture
+def solved(tmp_path):
+    """Return an edition of version 0.3 whose two tasks a student has solved."""
+    for folder in (tmp_path / 'mine', tmp_path / 'mine' / update.BASE):
+        (folder / 'notebooks').mkdir(parents=True)
+        nbformat.write(OF_0_3, folder / 'notebooks/02_lose_messages.ipynb')
+    file = tmp_path / 'mine/notebooks/02_lose_messages.ipynb'
+    file.write_text(file.read_text().replace('answer = 0', 'answer = 99'))
+    write(tmp_path / 'mine/scratch', 'lesson_02/first.py')
+    (tmp_path / 'progress.txt').write_text('lose_messages 3\nlose_messages 4\n')
+    return tmp_path / 'mine'
+
+
+def test_an_edition_of_version_0_3_loses_nothing(tmp_path, solved, monkeypatch, capsys):
+    """Its lesson has another number, its tasks changed places, and one was put between them."""
+    newer = tmp_path / 'newer'
+    (newer / 'notebooks').mkdir(parents=True)
+    nbformat.write(new_notebook(), newer / 'notebooks/00_start_here.ipynb')
+    nbformat.write(SINCE, newer / 'notebooks/05_lose_messages.ipynb')
+    assert update.main([str(archive_of(newer)), '--to', str(solved)]) == 0
+    lesson = nbformat.read(solved / 'notebooks/05_lose_messages.ipynb', as_version=4)
+    assert [cell.source for cell in lesson.cells if cell.cell_type == 'code'][1:] == [
+        *('answer = 99', "check('two_executors', answer)"),
+        *('answer = 0', "check('count_them', answer)"),
+        *('answer = 99', "check('be_the_queue', answer)"),
+    ]
+    assert written(solved / 'scratch') == {'lose_messages/first.py': 'lesson_02/first.py'}
+    monkeypatch.setenv(progress.FILE_VARIABLE, str(tmp_path / 'progress.txt'))
+    monkeypatch.chdir(solved / 'notebooks')
+    capsys.readouterr()
+    progress.show()
+    assert ' 2 of 3  task 2\n' in capsys.readouterr().out
