@@ -4,7 +4,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import tarfile
 
 import nbformat
 import pytest
@@ -13,6 +12,7 @@ from support.checkouts import git
 from support.troubles import another_user, as_root, folder_of_all, full, read_only, small_disk, take
 
 from classroom import handout, update
+from classroom.tests.support.editions import archive_of
 from helpers.lesson import ROOT
 from helpers.machine import OWNED
 
@@ -36,14 +36,6 @@ def edition(folder, lesson, workspace, helper):
     (folder / 'helper.py').write_text(helper)
     (folder / 'large.txt').write_text(helper * 10_000)
     return folder
-
-
-def archive_of(folder):
-    """Pack a course as `make handout` does."""
-    with tarfile.open(folder.with_suffix('.tar.gz'), 'w:gz') as archive:
-        archive.add(folder, 'course')
-        archive.add(folder, f'course/{update.BASE}')
-    return folder.with_suffix('.tar.gz')
 
 
 def write(mine):

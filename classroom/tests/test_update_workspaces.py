@@ -4,7 +4,6 @@ import fcntl
 import json
 import os
 import shutil
-import tarfile
 import tempfile
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from support.checkouts import git
 
 from classroom import update
+from classroom.tests.support.editions import archive_of
 from helpers.checks import progress
 from helpers.machine import OWNED
 
@@ -36,14 +36,6 @@ def course(folder, edition):
         ]
         nbformat.write(new_notebook(cells=cells), folder / f'notebooks/{number}_{name}.ipynb')
     return folder
-
-
-def archive_of(folder):
-    """Pack a folder as `make handout` does."""
-    with tarfile.open(folder.with_suffix('.tar.gz'), 'w:gz') as archive:
-        archive.add(folder, 'course')
-        archive.add(folder, f'course/{update.BASE}')
-    return folder.with_suffix('.tar.gz')
 
 
 def write(scratch, *names):

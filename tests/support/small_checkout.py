@@ -17,21 +17,8 @@ BASE_PYTHON = Path(sys._base_executable)
 HERE = f'{sys.version_info.major}.{sys.version_info.minor}'
 COMMANDS = (
     *('cat', 'cksum', 'cp', 'df', 'dirname', 'env', 'fallocate', 'find', 'flock', 'getconf'),
-    *(
-        'grep',
-        'head',
-        'id',
-        'mkdir',
-        'mktemp',
-        'mv',
-        'rm',
-        'sed',
-        'sh',
-        'sort',
-        'tr',
-        'uname',
-        'wc',
-    ),
+    *('grep', 'head', 'id', 'mkdir', 'mktemp', 'mv', 'rm', 'sed', 'sh', 'sort', 'tr', 'uname'),
+    'wc',
 )
 # What an environment of these locks has.
 ONE = ['iniconfig', 'ros2-command', 'ros2-notebooks']

@@ -56,13 +56,13 @@ def config_of(sample: str, **more: dict) -> str:
 
 
 def open_home(hub: Hub, browser: requests.Session) -> str:
-    """Return the page that a hub shows to who has logged in, or nothing."""
+    """Return the page that a hub shows to somebody who has logged in, or nothing."""
     page = browser.get(f'{hub.url}/hub/home', allow_redirects=False)
     return page.text if page.status_code == 200 else ''
 
 
 def name_in(home: str) -> str:
-    """Return the name that a hub gives to who opened its page, or nothing."""
+    """Return the name that a hub gives to the person who opened its page, or nothing."""
     found = re.search(r'user: "(.*?)"', home)
     return found[1] if found else ''
 
