@@ -393,6 +393,11 @@ def must_be_called(node: Node, name: str) -> None:
         raise Failed(found, hint=f"super().__init__('{name}') in its __init__.")
 
 
+def periods_of(node: Node) -> list[float]:
+    """Return the periods of the timers of a node (s)."""
+    return [timer.timer_period_ns / 1e9 for timer in node.timers]
+
+
 def override(written: type | Callable, **constants: object) -> None:
     """Give constants that the student's code reads another value.
 

@@ -11,7 +11,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
-from helpers.checks.bench import Bench, must_be_called, must_define, must_have
+from helpers.checks.bench import Bench, must_be_called, must_define, must_have, periods_of
 from helpers.checks.points import all_of, expect, rows
 from helpers.checks.tasks import Tasks
 from helpers.recording import explain, predict
@@ -184,7 +184,7 @@ def publish_numbers(NumberPublisher):
             topic = node.publisher.topic_name
             if topic != '/number':
                 return f'it publishes on {topic}, not on /number'
-            periods = [timer.timer_period_ns / 1e9 for timer in node.timers]
+            periods = periods_of(node)
             if not periods:
                 return 'it has no timer'
             bench.spin(node)

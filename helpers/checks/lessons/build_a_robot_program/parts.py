@@ -10,7 +10,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import BatteryState
 
-from helpers.checks.bench import Bench, must_define
+from helpers.checks.bench import Bench, must_define, periods_of
 from helpers.checks.builds import builds
 from helpers.checks.lessons.build_a_robot_program.shared import NOT_BUILT, tasks
 from helpers.checks.points import cached, expect, needs
@@ -248,7 +248,7 @@ def the_watchdog(workspace):
         with Bench():
             node = Node('tested')
             made(node, list)
-            periods_s = [timer.timer_period_ns / 1e9 for timer in node.timers]
+            periods_s = periods_of(node)
         return expect(periods_s, [0.05], 'the periods of its timers (s) are')
 
     def between(dog):
@@ -265,11 +265,11 @@ def the_watchdog(workspace):
                 return 'now_s() is the time of day: whoever sets it sets your watchdog'
             if not bench.wait(lambda: dog.now_s() != begin):
                 return 'now_s() stands still: no /clock comes'
-            before = between(dog)
+            earlier, began_s, later = between(dog)
             if bench.wait(lambda: stops, 0.5):
                 return 'it stops before the first seen()'
-            after = between(dog)
-            waited_s, least_s, most_s = (after[i] - before[j] for i, j in ((1, 1), (0, 2), (2, 0)))
+            at_least, ended_s, at_most = between(dog)
+            waited_s, least_s, most_s = ended_s - began_s, at_least - later, at_most - earlier
             if not 0.99 * least_s <= waited_s <= 1.01 * most_s:
                 return f'in {least_s:.1f} s its now_s() grows by {waited_s:.2g}'
             dog.seen()

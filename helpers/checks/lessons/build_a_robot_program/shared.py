@@ -27,6 +27,13 @@ def one_command_a_scan(robot):
     return scans - 2 <= commands <= scans or f'{commands} commands for {scans} scans'
 
 
+def has_a_timer(periods_s, period_s):
+    """Return whether one of the timers has this period (s), or else which they have."""
+    return period_s in periods_s or (
+        f'the periods of its timers are {periods_s} s, and none is {period_s}'
+    )
+
+
 def comes_to_each_place(robot):
     """Return whether a robot has come to each place of its floor, or else which ones it missed."""
     x0, y0, _ = robot.floor.start

@@ -273,7 +273,7 @@ def where_am_i(workspace):
 
     def skips_what_is_no_number():
         def of_length(length):
-            """Return what an IMU says whose quaternion is so long, and not 1."""
+            """Return what an IMU says whose quaternion, of this length, points ahead."""
             imu = looking(0, 7.3)
             imu.orientation.z, imu.orientation.w = 0.0 * length, length
             return imu

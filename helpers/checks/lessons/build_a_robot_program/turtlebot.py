@@ -11,14 +11,15 @@ from rcl_interfaces.srv import GetParameters
 from rclpy.clock import ClockType
 from rclpy.time import Time
 
-from helpers.checks.bench import Bench, must_have
+from helpers.checks.bench import Bench, must_have, periods_of
 from helpers.checks.builds import build
 from helpers.checks.lessons.build_a_robot_program.shared import (
     DRIVES,
+    has_a_timer,
     is_driven_at_most,
     tasks,
 )
-from helpers.checks.points import expect
+from helpers.checks.points import all_of, expect
 from helpers.checks.programs import Program
 from helpers.patrol import LAUNCH, SIM, launched, module, printed
 from helpers.robot import TURTLEBOT3, Floor
@@ -114,12 +115,13 @@ def the_guard(workspace):
 
     def counts_alone():
         with Bench():
-            timers = [*module(workspace, 'guard').Guard().timers]
-            periods_s = [timer.timer_period_ns / 1e9 for timer in timers]
-            kinds = {timer.clock.clock_type for timer in timers}
-        if 0.1 not in periods_s:
-            return f'the periods of its timers are {periods_s} s, and none is 0.1'
-        return kinds == {ClockType.STEADY_TIME} or 'a timer of it has no steady clock'
+            guard = module(workspace, 'guard').Guard()
+            periods_s = periods_of(guard)
+            kinds = {timer.clock.clock_type for timer in guard.timers}
+        return all_of(
+            has_a_timer(periods_s, 0.1),
+            kinds == {ClockType.STEADY_TIME} or 'a timer of it has no steady clock',
+        )
 
     def can_be_run():
         guard = module(workspace, 'guard')

@@ -9,9 +9,11 @@ from rclpy.parameter import Parameter
 from rclpy.time import Time
 from sensor_msgs.msg import Imu, LaserScan
 
+from helpers.checks.bench import periods_of
 from helpers.checks.lessons.build_a_robot_program.shared import (
     comes_to_each_place,
     commands_of,
+    has_a_timer,
     is_driven_at_most,
     one_command_a_scan,
     tasks,
@@ -31,10 +33,37 @@ def the_whole_node(workspace):
 
         return test
 
-    def has_parts(tour):
+    @cached
+    def made():
+        """Return which parts a node lacks, the periods of its timers, and how it hears scans."""
         parts = 'where', 'battery', 'frozen', 'job', 'told'
-        missing = [name for name in parts if not hasattr(tour.node, name)]
+        with ros_session():
+            node = Tour(workspace).node
+            missing = [name for name in parts if not hasattr(node, name)]
+            scans = [one for one in node.subscriptions if one.msg_type is LaserScan]
+            kinds = [one.qos_profile.reliability.name for one in scans]
+            return missing, periods_of(node), kinds
+
+    def has_parts():
+        missing, _, _ = made()
         return not missing or f'it has no attribute {" and no ".join(missing)}'
+
+    def asks_for_the_place():
+        _, periods_s, _ = made()
+        return has_a_timer(periods_s, 0.1)
+
+    def hears_any_laser():
+        _, _, kinds = made()
+        return expect(kinds, ['BEST_EFFORT'], 'its subscription of scans is')
+
+    def arrives(tour, places, seconds):
+        """Send a goal. Return whether its job succeeds in this time, or where the robot is then."""
+        tour.send(places)
+        tour.run(seconds, until=lambda: tour.ended() or tour.robot.bumps)
+        x, y, _ = tour.robot.pose
+        return (tour.status() == 'SUCCEEDED' and not tour.robot.bumps) or (
+            f'{tour.status()} at {x:.1f}, {y:.1f}, bumps: {tour.robot.bumps}'
+        )
 
     def stands(tour):
         wrong = sorted({*tour.speeds(0.2)} - {(0.0, 0.0)})
@@ -44,11 +73,10 @@ def the_whole_node(workspace):
 
     def two_places(tour):
         came = commands_at_arrivals(tour)
-        tour.send(2)
-        tour.run(25, until=lambda: tour.ended() or tour.robot.bumps)
+        arrived = arrives(tour, 2, 25)
+        if arrived is not True:
+            return arrived
         x, y, _ = tour.robot.pose
-        if tour.robot.bumps or tour.status() != 'SUCCEEDED':
-            return f'{tour.status()} at {x:.1f}, {y:.1f}, bumps: {tour.robot.bumps}'
         tour.run(1)
         away_m = math.dist((x, y), ROOMS.places['C'])
         last = commands_of(tour.robot)[came[-1] :][:1] if came else []
@@ -64,22 +92,11 @@ def the_whole_node(workspace):
     def turns_to_a_place():
         with ros_session():
             tour = Tour(workspace, route=BESIDE)
-            tour.send(1)
-            tour.run(20, until=lambda: tour.ended() or tour.robot.bumps)
-            x, y, _ = tour.robot.pose
-            if tour.robot.bumps or tour.status() != 'SUCCEEDED':
-                return f'{tour.status()} at {x:.1f}, {y:.1f}, bumps: {tour.robot.bumps}'
+            arrived = arrives(tour, 1, 20)
+            if arrived is not True:
+                return arrived
             away_m = math.dist((tour.node.where.x, tour.node.where.y), BESIDE)
         return 0.12 < away_m < 0.2 or f'it has arrived when it was {away_m:.2f} m away, not 0.2 m'
-
-    def asks_for_the_place(tour):
-        periods_s = [timer.timer_period_ns / 1e9 for timer in tour.node.timers]
-        return 0.1 in periods_s or f'the periods of its timers are {periods_s} s, and none is 0.1'
-
-    def hears_any_laser(tour):
-        scans = [one for one in tour.node.subscriptions if one.msg_type is LaserScan]
-        kinds = [one.qos_profile.reliability.name for one in scans]
-        return expect(kinds, ['BEST_EFFORT'], 'its subscription of scans is')
 
     def cancel(tour):
         tour.send(2)
@@ -208,7 +225,7 @@ def the_whole_node(workspace):
                 tour.run(0.3)
                 if not tour.robot.stopped:
                     return f'{hangs}, the job is ABORTED, and it drives on'
-                if not tour.wait(lambda: tour.ear.heard.count(said) >= count, 2):  # noqa: B023
+                if not tour.wait(lambda count=count: tour.ear.heard.count(said) >= count, 2):
                     return f'{hangs}, and it does not log: {said[1]}'
         return True
 
@@ -246,12 +263,12 @@ def the_whole_node(workspace):
     first = 'First the callback, then declare_parameter.'
     return [
         (at_once, toured(stands), zeros),
-        ('its parts', toured(has_parts), parts),
-        ('the scans of a BEST_EFFORT laser', toured(hears_any_laser), laser),
+        ('its parts', has_parts, parts),
+        ('the scans of a BEST_EFFORT laser', hears_any_laser, laser),
         ('it visits two places', toured(two_places), steered),
         ('it turns to a place beside its path', turns_to_a_place, steered),
         ('a cancel stops it', toured(cancel), none),
-        ('ten times a second it asks for the place', toured(asks_for_the_place), timer),
+        ('ten times a second it asks for the place', asks_for_the_place, timer),
         (also_without, toured(cancel_without_scans), timer),
         ('its speed is a parameter', toured(speed), rule),
         ('also at the start', wrong_at_the_start, first),

@@ -13,7 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_polic
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Int32
 
-from helpers.checks.bench import Bench, scan
+from helpers.checks.bench import Bench, periods_of, scan
 from helpers.checks.errors import Failed
 from helpers.checks.lessons.keep_what_is_fresh.brakes import number_of, speeds_after
 from helpers.checks.lessons.keep_what_is_fresh.shared import tasks
@@ -36,7 +36,7 @@ def a_watchdog(WatchfulBrake):
         with Bench() as bench:
             stops, begun_s = hear_stops(bench), time.monotonic()
             brake = bench.spin(make(long_s))
-            periods_s = [timer.timer_period_ns / 1e9 for timer in brake.timers]
+            periods_s = periods_of(brake)
             bench.wait(lambda: stops, long_s + LATE_S)
             without = [at_s - begun_s for at_s in stops]
             again = bench.wait(lambda: len(stops) >= 3, LATE_S) if stops else False
