@@ -94,7 +94,7 @@ def _link(lesson: str) -> str:
     if not lesson:
         return ''
     path = path_of(lesson)
-    return f' ([lesson {path.name[:2]}]({path.name}) shows the way out)'
+    return f' ([the way out]({path.name}))'
 
 
 def out_of_date(lesson: Lesson, known: Known) -> list[str]:
