@@ -163,8 +163,8 @@ def judge_all(
                 if outcome.why not in ('', 'not answered', result.trouble) and told:
                     work.row.said.append(f'task {lesson.tasks[task].number}: {outcome.why}')
                 if outcome.did:
-                    number, did = lesson.tasks[task].number, ', '.join(outcome.did)
-                    work.row.said.append(f'task {number}: {DID} {did}. Read the answers')
+                    place, did = lesson.tasks[task].number, ', '.join(outcome.did)
+                    work.row.said.append(f'task {place}: {DID} {did}. Read the answers')
             marking = options.marking
             work.row.points = round(work.row.points + marking.points(lesson, result), 2)
             lines.append(f'lesson {number}: {marking.said(lesson, result)}{again}')

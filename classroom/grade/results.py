@@ -21,7 +21,7 @@ from helpers.lesson import ROOT, Task, tags
 from tools.lessons.clean import text_of
 
 TAKES_STARTER = 'its check also takes the starter: what judges was changed. Read the answers'
-FORM = 5  # of the files
+FORM = 6  # of the files
 # What the system says of a limit, in words: judge.py and container/run.sh have the numbers.
 LIMITS = {
     f'used more than {MEMORY_GB} GB of memory': re.compile(r'^MemoryError|Cannot allocate memory'),

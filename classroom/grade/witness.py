@@ -191,6 +191,8 @@ def point(arguments, frame):
     what, ok = arguments
     points = frame.f_locals.get('points') if frame.f_code is REAL_POINTS else None
     inside = type(points) is FunctionType and points.__code__
+    if inside and any(inside is one for one in REAL_SOLUTION.co_consts):
+        return  # a solution of the lesson: it counts for nobody
     if not inside or not any(inside is one for one in REAL_CHECK.co_consts):
         told_once('did', 'a point in the place of its check')
         return
@@ -251,4 +253,5 @@ from helpers.checks.tasks import Tasks
 
 REAL_POINTS: CodeType = judge_points.__code__
 REAL_CHECK: CodeType = Tasks.check.__code__
+REAL_SOLUTION: CodeType = Tasks.run_solution.__code__
 sys.addaudithook(hook)

@@ -21,13 +21,15 @@ from classroom.grade.submissions import submissions_of, workspace_files
 from classroom.grade.uses import digest_of_uses, files_used
 from classroom.update import YOURS
 from helpers.checks.verdict import KEY
-from helpers.lesson import ROOT, cells_of, path_of, tags
+from helpers.lesson import ROOT, cells_of, code_of_solution, path_of, tags
 from helpers.lesson import lessons as lessons_of_course
 
 RIGHT, WRONG = 'speed = 1.75 / 3.5\nshow(speed)', 'speed = 1.75\nshow(speed)'
 STARTER = 'task-00-1-starter'
 NUMBER = {lesson.name: lesson.number for lesson in lessons_of_course()}
 OF = len(lessons_of_course()[0].tasks)  # of lesson 00
+_second = lessons_of_course()[0].tasks[1]
+SECOND = {_second.exercises[0].id: code_of_solution(_second.solutions[0].source)}
 
 
 @pytest.fixture(scope='module')
@@ -849,6 +851,15 @@ def test_each_limit_has_its_own_sentence(lessons, output, why):
     assert f'its cell {why}' in result.tasks['through_the_door'].why
 
 
+def test_what_an_answer_did_is_said_of_its_task_and_lesson(submit, capsys):
+    did = "print(json.dumps({'did': 'a_first_node', 'what': 'os.kill'}))\n"
+    folder = submit(**moodle_class(1))
+    assert main([str(folder)], Stand(Stand.script.replace('print(', did + 'print(', 1))) == 0
+    [line] = capsys.readouterr().out.splitlines()[:1]
+    assert ': lesson 00: ' in line
+    assert 'task 2: its code did what no answer needs: os.kill' in line
+
+
 def test_the_number_of_a_lesson_that_draws_its_task(lessons):
     lesson = lessons['lose_messages']
     first = lesson.tasks['publish_numbers'].exercises[0].id
@@ -875,14 +886,19 @@ os._exit(3)
 
 
 def test_real_checks_judge_and_survive(submit, capsys):
-    """A right answer, a wrong one, and one that ends the kernel: each gets its line."""
+    """A right answer, a wrong one, and one that ends the kernel: each gets its line.
+
+    Who has solved another task only is not accused of what the lesson's own solution does.
+    """
     files = {'Ada/a.ipynb': with_answer(RIGHT), 'Bob/b.ipynb': with_answer(WRONG)}
-    folder = submit(**files, **{'Cy/c.ipynb': with_answer(HOSTILE)})
+    other = json.dumps(notebook(**SECOND)).encode()
+    folder = submit(**files, **{'Cy/c.ipynb': with_answer(HOSTILE), 'Di/d.ipynb': other})
     assert main([str(folder), '--trust']) == 0
-    assert capsys.readouterr().out.splitlines()[:3] == [
+    assert capsys.readouterr().out.splitlines()[:4] == [
         f'Ada: lesson 00: 1 of {OF}',
         f'Bob: lesson 00: 0 of {OF}',
         f'Cy: lesson 00: 0 of {OF}; task 1: its code ended the kernel',
+        f'Di: lesson 00: 1 of {OF}',
     ]
 
 
