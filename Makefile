@@ -37,9 +37,9 @@ handout: set_up ## write a student's edition: SOLUTIONS=no (or "00 01"), BORROW=
 	@$(PYTHON) -m classroom.handout $(if $(SOLUTIONS),--solutions "$(SOLUTIONS)") $(if $(BORROW),--borrow "$(BORROW)") \
 		$(if $(filter yes,$(OFFLINE)),--wheels $(or $(PYTHONS),$(this_python)))
 
-grade: set_up ## judge what students hand in: FOLDER=submissions, LESSON=02, JOBS=2, STARS=no; see teaching.md
+grade: set_up ## judge what students hand in: FOLDER=submissions, LESSON=02, JOBS=2, CPUS=2, STARS=no; see teaching.md
 	@$(PYTHON) -m classroom.grade "$(or $(FOLDER),submissions)" --lesson "$(LESSON)" --seed "$(SEED)" --assignment "$(ASSIGNMENT)" \
-		$(if $(filter no,$(STARS)),--no-stars) $(if $(TASKS),--tasks "$(TASKS)") $(if $(JOBS),--jobs "$(JOBS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust) \
+		$(if $(filter no,$(STARS)),--no-stars) $(if $(TASKS),--tasks "$(TASKS)") $(if $(JOBS),--jobs "$(JOBS)") $(if $(CPUS),--cpus "$(CPUS)") $(if $(LIMIT),--limit "$(LIMIT)") $(if $(filter yes,$(TRUST)),--trust) \
 		$(if $(filter yes,$(PARTIAL)),--partial) $(if $(WEIGHTS),--weights "$(WEIGHTS)") $(if $(RETRY),--retry "$(RETRY)")
 
 collect: set_up ## copy a lesson from the homes of a hub, for make grade: FROM=/home LESSON=02 TO=submissions_02

@@ -6,6 +6,7 @@
     submissions   whose file is it? From the names that Moodle and Canvas give
     answers       which lesson is it, and what has the student written? As text: nothing runs
     judge         runs the lesson with the answers, in the container: the only part that does
+    limits        what the code of a student may use, and what is said of code that used more
     runner        starts `judge`, reads what it says, and ends it
     results       what is judged, kept so that a second run goes on
     tables        grades.csv, and the files that Moodle and Canvas import

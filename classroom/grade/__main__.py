@@ -14,6 +14,7 @@ from pathlib import Path
 from classroom.grade import alike, tables
 from classroom.grade.answers import Answers, Handed, answers_of, handed_out, lesson_of
 from classroom.grade.feedback import feedback
+from classroom.grade.limits import CPUS
 from classroom.grade.marking import Marking
 from classroom.grade.results import Kept, Result, digest_of, job_of, result_of
 from classroom.grade.runner import Container, Said, Trusted, Where, run
@@ -284,6 +285,7 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
     parser.add_argument('--jobs', type=int, default=1, help='how many are judged at once')
     parser.add_argument('--trust', action='store_true', help='without a container, as you')
     parser.add_argument('--limit', type=float, default=LIMIT_MIN, help='minutes for a lesson')
+    parser.add_argument('--cpus', type=float, default=CPUS, help='cores for one that is judged')
     parser.add_argument('--seed', default='', help='of a lesson that has one, for all students')
     parser.add_argument('--tasks', default='', help='only these give points: "a_driver 4"')
     parser.add_argument('--no-stars', action='store_true', help='tasks with ★ give no points')
@@ -296,6 +298,8 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
     try:
         if options.jobs < 1 or not (options.seed or '0').isdecimal():
             raise ValueError('JOBS= is a number from 1 on, and SEED= is a number.')
+        if not options.cpus > 0:
+            raise ValueError('CPUS= is a number above 0, such as 2 or 0.5.')
         students, files = submissions_of(options.folder)
         if not students:
             raise ValueError(f'Nobody has handed in anything in {options.folder}.')
@@ -325,7 +329,7 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
             raise ValueError('All tasks that count have the weight 0: look at WEIGHTS=.')
         if options.retry and not any(is_named(one, options.retry) for one in students):
             raise ValueError(f'No student is called {options.retry}: look at RETRY=.')
-        where = where or (Trusted() if options.trust else Container())
+        where = where or (Trusted if options.trust else Container)(options.cpus)
         if why := where.ready():
             raise ValueError(
                 f'{why.rstrip(".")}; or TRUST=yes, which runs the code of students as you.'

@@ -30,12 +30,15 @@ from __future__ import annotations
 
 import ast
 import base64
+import contextlib
 import ctypes
 import hmac
 import json
 import os
 import queue
 import secrets
+import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -48,19 +51,22 @@ import psutil
 from jupyter_client.manager import KernelManager
 from nbformat.v4 import output_from_msg
 
+from classroom.grade import limits
 from helpers.checks.progress import IS_GRADED
 from helpers.checks.verdict import KEY
 
-PR_SET_DUMPABLE = 4  # linux/prctl.h
+PR_SET_DUMPABLE, PR_SET_CHILD_SUBREAPER = 4, 36  # linux/prctl.h
 INTERRUPT_S = 5  # for a cell to end after an interrupt
+END_S = 20  # for all that a kernel has started to end
 START_S = 120
 CHECK_TIMES = 3  # as long as another cell
 POLL_S = 0.5
-MEMORY_GB = 2  # that the kernel may take more than it has when it begins
 MOST_PRINTED = 2_000_000  # letters of a cell
 ENDLESS = 'Interrupted: it printed without end.'
+LIMIT_MET = 'Noticed: it {}.'  # while a cell ran
 MOST_OUTPUTS = 50  # of a cell
 LONGEST = 100_000  # letters of an output
+IS_ALONE = __name__ == '__main__' and os.getpid() == 1  # but for students' programs: a container
 WITNESS = Path(__file__).with_name('witness.py')
 # What no answer has to open. The helpers themselves read the lesson that lies beside the kernel.
 SECRET_FILES = ('.ipynb', '/tests/answers', '/tests/mutants', '/proc/self/mem', '/proc/self/fd')
@@ -86,7 +92,6 @@ class Kernel:
             # As the saved outputs were made: ipykernel leaves alone what C writes.
             'PYTEST_CURRENT_TEST': 'classroom/grade/judge.py',
         }
-        self._killed = _killed_for_memory()
         self._others = _children()
         self._manager = KernelManager(kernel_name='python3')
         quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
@@ -98,21 +103,17 @@ class Kernel:
         Path(self._manager.connection_file).unlink(missing_ok=True)
 
     def close(self) -> None:
-        children = _children() - self._others
+        # First, because a container that is full of programs has no room for a thread of ours.
+        _end_programs(self._others)
         self._client.stop_channels()
         self._manager.shutdown_kernel(now=True)
-        for child in children:
-            try:
-                child.kill()
-            except psutil.NoSuchProcess:
-                continue
 
     def run(self, source: str, limit_s: float, silent: bool = False) -> list[dict]:
         """Run a cell, and return its outputs. Raises HungError."""
         asked = self._client.execute(source, silent, allow_stdin=False, stop_on_error=False)
         outputs: list[dict] = []
         end = time.monotonic() + limit_s
-        interrupted, printed = '', 0
+        interrupted, printed, before = '', 0, limits.counts()
         while True:
             if not interrupted and (time.monotonic() > end or printed > MOST_PRINTED):
                 interrupted = f'Interrupted after {limit_s:.0f} s.'
@@ -125,39 +126,47 @@ class Kernel:
                 what = 'printed without end'
                 if interrupted != ENDLESS:
                     what = f'did not end in {limit_s:.0f} s'
-                raise HungError(f'its code {what}, nor by an interrupt')
+                met = self._met(before)
+                raise HungError(f'its code {met or f"{what}, nor by an interrupt"}')
             try:
                 message = self._client.get_iopub_msg(timeout=POLL_S)
             except queue.Empty:
                 if not self._manager.is_alive():
-                    raise HungError(self._why_it_ended()) from None
+                    met = self._met(before)
+                    raise HungError(f'its code {met or "ended the kernel"}') from None
                 continue
             if message['parent_header'].get('msg_id') != asked:
                 continue
             kind, content = message['msg_type'], message['content']
             if kind == 'status' and content['execution_state'] == 'idle':
+                if met := self._met(before):
+                    outputs.insert(0, _stream(f'{LIMIT_MET.format(met)}\n'))
                 return outputs
             if kind in ('stream', 'display_data', 'execute_result', 'error'):
                 printed += len(str(content.get('text', content.get('data', ''))))
                 _add(outputs, dict(output_from_msg(message)))
 
-    def _why_it_ended(self) -> str:
-        if _killed_for_memory() > self._killed:
-            return 'it used more memory than the container has'
-        return 'its code ended the kernel'
+    def _met(self, before: dict[str, int]) -> str:
+        """Return the limit that was met since then, or nothing."""
+        full = limits.is_full(self._manager.provisioner.pid)
+        return limits.met_since(before) or (limits.MUCH_MEMORY if full else '')
 
 
 def _children() -> set[psutil.Process]:
     return {*psutil.Process().children(recursive=True)}
 
 
-def _killed_for_memory() -> int:
-    """Return how many programs of this container were ended, because they took too much."""
-    try:
-        text = Path('/sys/fs/cgroup/memory.events').read_text()
-        return int(dict(line.split() for line in text.splitlines()).get('oom_kill', 0))
-    except (OSError, ValueError):
-        return 0
+def _end_programs(others: set[psutil.Process]) -> None:
+    """End all programs but these, and wait for them: one that nobody has waited for counts, too."""
+    if IS_ALONE:  # all at once, for programs may start more of them meanwhile
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(-1, signal.SIGKILL)
+    end = time.monotonic() + END_S
+    while (left := _children() - others) and time.monotonic() < end:
+        for child in left:
+            with contextlib.suppress(psutil.NoSuchProcess):
+                child.kill()
+        psutil.wait_procs(left, timeout=1)
 
 
 def _stream(text: str) -> dict:
@@ -197,13 +206,19 @@ class Witness:
             'LESSON': module,
         }
         source = (
-            f'import helpers.checks.lessons.{module}, ctypes, resource\n'
+            f'import helpers.checks.lessons.{module}, ctypes, resource, threading\n'
+            # If memory is short, the system ends it, and not what judges.
+            'with open("/proc/self/oom_score_adj", "w") as file: file.write("1000")\n'
             # No program of the same user may look into its memory: linux/prctl.h.
             f'ctypes.CDLL(None).prctl({PR_SET_DUMPABLE}, 0, 0, 0, 0)\n'
             'data = open("/proc/self/status").read().partition("VmData:")[2].split()[0]\n'
-            f'limit = (int(data) << 10) + ({MEMORY_GB} << 30)\n'
+            f'limit = (int(data) << 10) + ({limits.MEMORY_GB} << 30)\n'
             'resource.setrlimit(resource.RLIMIT_DATA, (limit, limit))\n'
-            'del data, limit, ctypes, resource, helpers\n'
+            # With stacks of 8 MB, as they are otherwise, 250 threads would take all of it.
+            'threading.stack_size(2 << 20)\n'
+            f'limit = {limits.FILES_GB} << 30\n'
+            'resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))\n'
+            'del data, file, limit, ctypes, resource, threading, helpers\n'
             f'exec(compile(open({str(WITNESS)!r}).read(), "<witness>", "exec"), '
             f'{{"__builtins__": dict(vars(__import__("builtins"))), **{names!r}}})'
         )
@@ -346,6 +361,7 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
         finally:
             kernel.close()
             witness.close()
+            shutil.rmtree(here, ignore_errors=True)  # it may have filled the disk
 
 
 def _deeds(witness: Witness, task: str) -> Iterator[dict]:
@@ -390,8 +406,6 @@ OVERLAY = "__import__('classroom.grade.judge', fromlist=['_']).overlay"
 
 def overlay(files: str) -> None:
     """Copy the student's files over those of the workspace that is open."""
-    import shutil
-
     from IPython import get_ipython
 
     from helpers.workspace import Workspace
@@ -409,6 +423,9 @@ def main() -> int:
     said = os.fdopen(os.dup(1), 'w', encoding='utf-8')
     os.dup2(2, 1)
     ctypes.CDLL(None).prctl(PR_SET_DUMPABLE, 0, 0, 0, 0)
+    # What a student's program has started comes to this one when that program ends.
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    signal.signal(signal.SIGINT, lambda *_: None)  # an answer may send it; the runner kills
     job = json.load(sys.stdin)
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         for event in judge(job, Path(folder)):

@@ -10,8 +10,9 @@ from copy import deepcopy
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from classroom.grade import limits
 from classroom.grade.answers import SEED, Answers, Handed
-from classroom.grade.judge import ENDLESS, MEMORY_GB
+from classroom.grade.judge import ENDLESS, LIMIT_MET
 from classroom.grade.runner import LATE, Said
 from classroom.grade.source import code_only
 from classroom.grade.uses import digest_of_uses
@@ -22,14 +23,6 @@ from tools.lessons.clean import text_of
 
 TAKES_STARTER = 'its check also takes the starter: what judges was changed. Read the answers'
 FORM = 6  # of the files
-# What the system says of a limit, in words: judge.py and container/run.sh have the numbers.
-LIMITS = {
-    f'used more than {MEMORY_GB} GB of memory': re.compile(r'^MemoryError|Cannot allocate memory'),
-    'started more than 400 programs and threads': re.compile(
-        r"can't start new thread|Resource temporarily unavailable"
-    ),
-    'wrote more than 1 GB of files': re.compile(r'No space left on device'),
-}
 INTERRUPTED = re.compile(r'Interrupted after (\d+) s\.')  # as judge.py says it
 UNKNOWN = re.compile(r"NameError: name '(\w+)' is not defined")
 FILE = re.compile(r'\((\d+\.py|<tokenize>), line')  # a cell of a kernel is no file for a reader
@@ -183,16 +176,20 @@ def _error(task: Task, outputs: dict[str, list[dict]]) -> str:
     for cell in (*task.exercises, *task.checks):
         whose = 'its check' if cell in task.checks else 'its cell'
         for output in outputs.get(cell.id, []):
-            if ENDLESS in str(output.get('text', '')):
+            text = str(output.get('text', ''))
+            for limit in limits.NOTICED:
+                if LIMIT_MET.format(limit) in text:
+                    return f'{whose} {limit}'
+            if ENDLESS in text:
                 return f'{whose} printed without end'
-            if late := INTERRUPTED.search(str(output.get('text', ''))):
+            if late := INTERRUPTED.search(text):
                 return f'{whose} did not end in {late[1]} s'
             if output.get('output_type') == 'error':
                 said = f'{output.get("ename")}: {output.get("evalue")}'.strip(': ').splitlines()[0]
                 unknown = UNKNOWN.match(said)
                 if unknown and cell in task.checks:
                     return f'its cell defines no {unknown[1]}'
-                for limit, pattern in LIMITS.items():
+                for limit, pattern in limits.ERRORS.items():
                     if pattern.search(said):
                         return f'{whose} {limit}'
                 return f'{whose} ended with {FILE.sub("(line", said)[:200]}'

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -16,6 +18,7 @@ from uuid import uuid4
 
 import psutil
 
+from classroom.grade import limits
 from helpers.lesson import ROOT
 
 SCRIPT = ROOT / 'classroom/container/run.sh'
@@ -23,6 +26,7 @@ MOST_SAID = 30_000_000  # bytes that are read of what it says
 NOT_STARTED = 'it could not be judged: '
 LATE = 'it was ended after'
 INTERRUPTED = 'it was interrupted'
+KILLED = 137  # the exit status of a container that had no memory left
 
 
 @dataclass
@@ -42,9 +46,10 @@ class Said:
 
 
 class Where:
-    """Where jobs run. What runs is known, so that it can be ended."""
+    """Where jobs run, each with some cores. What runs is known, so that it can be ended."""
 
-    def __init__(self) -> None:
+    def __init__(self, cpus: float = limits.CPUS) -> None:
+        self.cpus = cpus
         self.stopped = False
         self.ends: set[Callable] = set()
 
@@ -72,8 +77,9 @@ class Container(Where):
 
     def start(self, **pipes: object) -> tuple[subprocess.Popen, Callable]:
         name = f'ros2_notebooks_grade_{uuid4().hex[:12]}'
+        command, environment = [SCRIPT, 'judge', name], os.environ | {'CPUS': f'{self.cpus:g}'}
         # Ctrl+C is for this program, which then ends it.
-        process = subprocess.Popen([SCRIPT, 'judge', name], start_new_session=True, **pipes)
+        process = subprocess.Popen(command, env=environment, start_new_session=True, **pipes)
 
         def end() -> None:
             subprocess.run([SCRIPT, 'end', name], capture_output=True)
@@ -83,12 +89,17 @@ class Container(Where):
 
 
 class Trusted(Where):
-    """Runs a job on this machine, as you, with a limit of time only."""
+    """Runs a job on this machine, as you: it may use less, and reach what you reach."""
+
+    def __init__(self, cpus: float = limits.CPUS) -> None:
+        super().__init__(cpus)
+        self._started = itertools.count()
 
     def start(self, **pipes: object) -> tuple[subprocess.Popen, Callable]:
         environment = os.environ | {'PYTHONPATH': str(ROOT)}
         command = [sys.executable, '-m', 'classroom.grade.judge']
         process = subprocess.Popen(command, env=environment, start_new_session=True, **pipes)
+        self._limit(process.pid)
 
         def end() -> None:
             with contextlib.suppress(psutil.NoSuchProcess):
@@ -98,6 +109,19 @@ class Trusted(Where):
             process.kill()
 
         return process, end
+
+    def _limit(self, pid: int) -> None:
+        """Give a job its cores, and no more programs than a container has. Root may start any."""
+        cores = sorted(os.sched_getaffinity(0))
+        count = min(len(cores), max(1, round(self.cpus)))
+        first = next(self._started) * count
+        os.sched_setaffinity(pid, {cores[(first + n) % len(cores)] for n in range(count)})
+        mine = (one.info for one in psutil.process_iter(['uids', 'num_threads']))
+        threads = sum(one['num_threads'] for one in mine if one['uids'].real == os.getuid())
+        most = threads + limits.PROGRAMS
+        _, hard = resource.getrlimit(resource.RLIMIT_NPROC)
+        if hard == resource.RLIM_INFINITY or most < hard:
+            resource.prlimit(pid, resource.RLIMIT_NPROC, (most, most))
 
 
 def run(job: dict, where: Where, limit_s: float) -> Said:
@@ -144,6 +168,8 @@ def run(job: dict, where: Where, limit_s: float) -> Said:
             errors.seek(0)
             lines = errors.read()[-10_000:].decode(errors='replace').strip().splitlines()
             reason = lines[-1][:200] if lines else f'exit status {process.returncode}'
+            if said.begun and process.returncode == KILLED:
+                reason = f'its code {limits.ALL_MEMORY}'
             said.is_ours = not said.begun
             said.trouble = f'{NOT_STARTED if said.is_ours else "it was ended: "}{reason}'
     return said

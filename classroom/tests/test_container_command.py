@@ -6,6 +6,7 @@ import subprocess
 import pytest
 from support.processes import put
 
+from classroom.grade import limits
 from helpers.lesson import ROOT
 
 USED = ('chown', 'cksum', 'cut', 'dirname', 'find', 'id', 'mkdir', 'sh', 'sort', 'tr', 'uname')
@@ -24,7 +25,7 @@ def run(tmp_path):
             put(path, 'podman', f'case $1 in version | --version) ;; {podman} esac')
         environment = {'PATH': str(path), 'LESSONS': str(tmp_path / 'lessons')} | variables
         return subprocess.run(
-            [ROOT / 'classroom/container/run.sh', what],
+            [ROOT / 'classroom/container/run.sh', *what.split()],
             env=environment,
             capture_output=True,
             text=True,
@@ -54,3 +55,31 @@ def test_no_image_of_these_lessons(run, answer, problem):
     done = run('lab', f'image) {answer} ;;')
     said = f'{problem}: run `make image`, then try again.\n'
     assert (done.returncode, done.stderr) == (1, said)
+
+
+@pytest.mark.parametrize('cpus', ['', '0.5'])
+def test_the_limits_are_those_of_which_the_table_speaks(run, cpus):
+    said = run('judge a_name', 'run) echo "$@" ;;', CPUS=cpus).stdout
+    for limit in (
+        f'--cpus {cpus or int(limits.CPUS)} ',
+        f'--memory {limits.ALL_GB}g --memory-swap {limits.ALL_GB}g',
+        f'--pids-limit {limits.PROGRAMS}',
+        f'--tmpfs /tmp:rw,exec,nosuid,nodev,size={limits.FILES_GB}g,',
+        f'--shm-size={limits.SHM_MB}m',
+    ):
+        assert limit in said
+
+
+@pytest.mark.parametrize(
+    ('answer', 'is_limited'),
+    [
+        ('false [cpu memory pids]', True),
+        ('true [cpu memory pids]', True),
+        ('true [memory pids]', False),  # systemd does not let it
+        ('', True),  # docker has no such answer
+    ],
+)
+def test_podman_without_root_limits_the_cores_if_it_may(run, answer, is_limited):
+    said = run('judge a_name', f'info) echo "{answer}" ;; run) echo "$@" ;;').stdout
+    assert ('--cpus' in said) == is_limited
+    assert '--memory' in said

@@ -3,17 +3,20 @@
 import csv
 import io
 import json
+import os
 import subprocess
 import sys
 import tarfile
 import zipfile
 
 import nbformat
+import psutil
 import pytest
 
-from classroom.grade import alike, runner, tables
+from classroom.grade import alike, limits, runner, tables
 from classroom.grade.__main__ import main
 from classroom.grade.answers import answers_of, handed_out, lesson_of
+from classroom.grade.judge import LIMIT_MET
 from classroom.grade.marking import Marking
 from classroom.grade.results import Kept, Outcome, Result, digest_of, job_of, result_of
 from classroom.grade.source import code_only
@@ -825,23 +828,22 @@ def test_all_counts_agree_if_some_tasks_give_no_point(submit):
     assert '| 1 | ✔ | 1 of 1 | no points for it |' in found.cells[0].source
 
 
+def error(name, text=''):
+    return {'output_type': 'error', 'ename': name, 'evalue': text}
+
+
 @pytest.mark.parametrize(
     ('output', 'why'),
     [
-        ({'output_type': 'error', 'ename': 'MemoryError', 'evalue': ''}, 'used more than 2 GB'),
+        (error('MemoryError'), 'used more than 2 GB of memory'),
+        ({'text': LIMIT_MET.format(limits.MUCH_MEMORY)}, 'used more than 2 GB of memory'),
+        ({'text': LIMIT_MET.format(limits.ALL_MEMORY)}, 'used more than 3 GB of memory, with all'),
         ({'text': 'Interrupted: it printed without end.\n'}, 'printed without end'),
-        (
-            {'output_type': 'error', 'ename': 'RuntimeError', 'evalue': "can't start new thread"},
-            'started more than 400 programs and threads',
-        ),
-        (
-            {'output_type': 'error', 'ename': 'OSError', 'evalue': '[Errno 28] No space left on'},
-            'ended with OSError',
-        ),
-        (
-            {'output_type': 'error', 'ename': 'OSError', 'evalue': 'No space left on device'},
-            'wrote more than 1 GB',
-        ),
+        (error('RuntimeError', "can't start new thread"), 'started more than 400 programs and'),
+        ({'text': LIMIT_MET.format(limits.MANY_PROGRAMS)}, 'started more than 400 programs and'),
+        (error('OSError', '[Errno 28] No space left on'), 'ended with OSError'),
+        (error('OSError', 'No space left on device'), 'wrote more than 1 GB to /tmp, or more than'),
+        (error('OSError', '[Errno 27] File too large'), 'wrote a file of more than 1 GB'),
     ],
 )
 def test_each_limit_has_its_own_sentence(lessons, output, why):
@@ -849,6 +851,49 @@ def test_each_limit_has_its_own_sentence(lessons, output, why):
     said = runner.Said({STARTER: [output]}, begun=True, ended=True)
     result = result_of(lessons['start_here'], answers, {}, said, '')
     assert f'its cell {why}' in result.tasks['through_the_door'].why
+
+
+@pytest.mark.parametrize(
+    ('place', 'text', 'limit'),
+    [
+        ('pids.events', 'max {}', limits.MANY_PROGRAMS),
+        ('pids/pids.events', 'max {}', limits.MANY_PROGRAMS),
+        ('memory.events', 'low 0\noom 9\noom_kill {}\n', limits.ALL_MEMORY),
+        ('memory/memory.oom_control', 'under_oom 0\noom_kill {}\n', limits.ALL_MEMORY),
+    ],
+)
+def test_what_a_container_counts_is_read(tmp_path, place, text, limit):
+    """Control groups have two versions, and a machine without a container has neither file."""
+    assert limits.met_since(limits.counts(tmp_path), tmp_path) == ''
+    file = tmp_path / place
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(text.format(1))
+    before = limits.counts(tmp_path)
+    assert limits.met_since(before, tmp_path) == ''
+    file.write_text(text.format(2))
+    assert limits.met_since(before, tmp_path) == limit
+
+
+def test_a_kernel_without_memory_is_known_from_outside():
+    hold = 'held = bytearray({}); print(flush=True); input()'
+    for size, is_full in ((2_147_000_000, True), (1_900_000_000, False)):
+        command = [sys.executable, '-c', hold.format(size)]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+            process.stdout.readline()
+            assert limits.is_full(process.pid) == is_full
+            process.kill()
+    assert not limits.is_full(process.pid)
+
+
+def test_a_container_that_the_system_killed_has_its_sentence():
+    """Its exit status is 137. If that was before any code of a student, it is to be tried again."""
+    killed = 'import sys; sys.stdin.read(); print({!r}, flush=True); sys.exit(137)'
+    said = runner.run({}, Stand(killed.format('{"begin": true}')), 60)
+    assert said.trouble == f'it was ended: its code {limits.ALL_MEMORY}'
+    assert not said.is_ours
+    said = runner.run({}, Stand(killed.format('')), 60)
+    assert said.trouble == 'it could not be judged: exit status 137'
+    assert said.is_ours
 
 
 def test_what_an_answer_did_is_said_of_its_task_and_lesson(submit, capsys):
@@ -928,6 +973,10 @@ LIMITED = {
         'used more than 2 GB',
     ),
     'Bob': ('while True:\n    print("x" * 1000)', 'printed without end'),
+    'Cy': (
+        'with open("large", "wb") as file:\n    while True:\n        file.write(bytes(2**20))',
+        'wrote a file of more than 1 GB',
+    ),
 }
 
 
@@ -938,6 +987,76 @@ def test_a_cell_meets_its_limits_in_a_real_kernel(submit, capsys):
     for line, (name, (_, why)) in zip(lines, LIMITED.items(), strict=False):
         assert line.startswith(f'{name}: lesson 00: 0 of {OF}')
         assert f'task 1: its cell {why}' in line
+
+
+STUBBORN = """
+import time
+
+while True:
+    try:
+        time.sleep(1)
+    except KeyboardInterrupt:
+        pass
+"""
+
+
+@pytest.mark.parametrize(
+    ('source', 'why'),
+    [
+        ('while True:\n    pass', 'its cell did not end in 10 s'),
+        (STUBBORN, 'its code did not end in 10 s, nor by an interrupt'),
+    ],
+)
+def test_a_cell_has_so_much_time(lessons, source, why):
+    _, answers = read(notebook(**{STARTER: source}), lessons)
+    job = job_of(lessons['start_here'], answers, {}, cell_s=10)
+    said = runner.run(job, runner.Trusted(), 300)
+    result = result_of(lessons['start_here'], answers, {}, said, '')
+    assert result.tasks['through_the_door'].why == why
+
+
+def test_an_answer_has_so_many_cores_without_a_container(submit, capsys):
+    cores = 'import os\nspeed = 0.5 / len(os.sched_getaffinity(0))'
+    folder = submit(**{'Ada/a.ipynb': with_answer(cores)})
+    assert main([str(folder), '--trust', '--cpus', '1']) == 0
+    assert capsys.readouterr().out.startswith(f'Ada: lesson 00: 1 of {OF}')
+    assert main([str(folder), '--trust', '--cpus', '0']) == 1
+    assert 'CPUS= is a number above 0' in capsys.readouterr().err
+
+
+PROGRAMS = """
+import os
+import subprocess
+
+if os.fork() == 0:  # what it has started belongs to nobody when it has ended
+    for _ in range(200):
+        subprocess.Popen(['sleep', '1000'])
+    os._exit(0)
+os.wait()
+for _ in range(300):
+    subprocess.Popen(['sleep', '1000'])
+"""
+SOMEBODY = 12345  # root may start any number of programs; who is not root is that user
+
+
+def test_an_answer_starts_so_many_programs_and_leaves_none(submit, tmp_path):
+    folder = submit(**{'Ada/a.ipynb': with_answer(PROGRAMS)})
+    user, become = os.getuid(), []
+    if not user:
+        user = SOMEBODY
+        os.chown(tmp_path, user, user)
+        become = ['setpriv', f'--reuid={user}', f'--regid={user}', '--clear-groups']
+        # It may read this checkout and its Python, wherever they are, and nothing else.
+        become += ['--inh-caps=+dac_read_search', '--ambient-caps=+dac_read_search']
+    command = [sys.executable, '-m', 'classroom.grade', folder, '--trust']
+    home = {'HOME': str(tmp_path), 'TMPDIR': str(tmp_path), 'PYTHONPATH': str(ROOT)}
+    done = subprocess.run(
+        [*become, *command], cwd=tmp_path, env=os.environ | home, capture_output=True, text=True
+    )
+    assert 'task 1: its cell started more than 400 programs and threads' in done.stdout, done
+    sleeping = psutil.process_iter(['uids', 'cmdline'])
+    left = [one.pid for one in sleeping if one.info['cmdline'] == ['sleep', '1000']]
+    assert left == []
 
 
 ONCE = """
