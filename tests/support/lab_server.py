@@ -7,6 +7,7 @@ into the checkout but what lessons build in `scratch`.
 from __future__ import annotations
 
 import os
+import random
 import re
 import shutil
 import signal
@@ -76,10 +77,12 @@ def made(
 def command_of(folder: Path, command: str, *options: str) -> list[str]:
     """Return a command of the Makefile that keeps JupyterLab's state in a folder."""
     # Two workers start servers at the same moment, and would both find the first free port. The
-    # system gives each a port of its own.
+    # system's own choice is no way out: JupyterLab lets it go again until it has started, and then
+    # any connection may have it. No connection gets a port below 32768.
+    port = random.randrange(20_000, 30_000)
     state = ('JUPYTER_CONFIG_DIR', 'JUPYTER_DATA_DIR', 'JUPYTER_RUNTIME_DIR')
     variables = [f'{name}={folder / name}' for name in state]
-    return ['make', command, 'PORT=0', 'BROWSER=no', f'ROOT={folder}', *variables, *options]
+    return ['make', command, f'PORT={port}', 'BROWSER=no', f'ROOT={folder}', *variables, *options]
 
 
 @contextmanager
