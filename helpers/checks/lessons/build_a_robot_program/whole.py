@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections import Counter
 
 from rclpy.duration import Duration
 from rclpy.exceptions import InvalidParameterValueException
@@ -171,9 +172,9 @@ def the_whole_node(workspace):
         ):
             # Only those of the scans: wheels and IMU are right, so the node knows where it is.
             tour.cables['scan'].change = lambda scan: scan
-            tour.run(1)
+            tour.run(0.5)
             tour.cables['scan'].change, now_s = with_stamp(ahead_s), tour.robot.t_s
-            tour.run(1)
+            tour.run(0.6)
             when = f'{ahead_s:g} s in the future' if ahead_s > 0 else f'{-ahead_s:g} s old'
             drives = any(v or w for v, w in tour.speeds(now_s + 0.2))
             if drives and not may_drive:
@@ -196,11 +197,12 @@ def the_whole_node(workspace):
         for topic in ('odom', 'imu/data'):
             cable = tour.cables[topic]
             for name, change in TROUBLES.items():
-                tour.run(0.7)
+                tour.run(0.7, until=lambda: not tour.robot.stopped)
                 if tour.robot.stopped:
                     return f'all sensors speak, and it stands: {tour.status()}'
                 cable.plugged, cable.change = change is not None, change or cable.change
-                tour.run(1.0)
+                tour.run(0.8, until=lambda: tour.robot.stopped)
+                tour.run(0.2)
                 goes_on = not tour.robot.stopped
                 cable.plugged, cable.change = True, lambda message: message
                 if goes_on:
@@ -208,33 +210,36 @@ def the_whole_node(workspace):
         tour.run(0.7)
         return not tour.robot.stopped or 'all sensors speak again, and it stands'
 
-    def notices_what_hangs(topic, limit_s, place, times=1):
+    def notices_what_hangs(place, *hang):
+        """Let one sensor hang after the other, for so many seconds at most."""
         with ros_session():
-            tour = Tour(workspace, route=place)
-            said = 'error', f'{topic.partition("/")[0]} does not change: I stop'
-            for count in range(1, times + 1):
-                hangs = f'{topic} hangs' + (' once more' if count > 1 else '')
-                tour.cables[topic].change = Hangs()
+            tour, told = Tour(workspace, route=place), Counter()
+            for topic, limit_s in hang:
+                said = 'error', f'{topic.partition("/")[0]} does not change: I stop'
+                told[said] += 1
+                hangs = f'{topic} hangs' + (' once more' if told[said] > 1 else '')
+                cable = tour.cables[topic]
+                cable.change = Hangs()
                 tour.run(0.5)
                 tour.send(1)
                 tour.run(0.5)
-                tour.cables[topic].change.begins()
+                cable.change.begins()
                 tour.run(limit_s, until=tour.ended)
                 if tour.status() != 'ABORTED':
                     return f'{hangs} for {limit_s} s, and the job is {tour.status()}'
                 tour.run(0.3)
                 if not tour.robot.stopped:
                     return f'{hangs}, the job is ABORTED, and it drives on'
-                if not tour.wait(lambda count=count: tour.ear.heard.count(said) >= count, 2):
+                if not tour.wait(lambda said=said: tour.ear.heard.count(said) >= told[said], 2):
                     return f'{hangs}, and it does not log: {said[1]}'
+                cable.change = lambda message: message
         return True
 
     def each_that_hangs():
         ahead, beside = (6.5, 0.0), (3.0, 3.0)  # to the second it turns first
         return all_of(
-            notices_what_hangs('scan', 1.5, ahead, times=2),
-            notices_what_hangs('odom', 3.5, ahead),
-            notices_what_hangs('imu/data', 3.5, beside),
+            notices_what_hangs(ahead, ('scan', 1.5), ('odom', 3.5), ('scan', 1.5)),
+            notices_what_hangs(beside, ('imu/data', 3.5)),
         )
 
     def wrong_at_the_start():
