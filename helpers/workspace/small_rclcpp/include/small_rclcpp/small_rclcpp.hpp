@@ -1,7 +1,9 @@
-// A very small rclcpp for the lessons: nodes with publishers and subscriptions, over the same rcl.
+// A very small rclcpp for the lessons: nodes with publishers, subscriptions and timers, over the same
+// rcl.
 // What is here has the names and the arguments of rclcpp in Jazzy. What is not here: all the rest.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdint>
@@ -12,6 +14,7 @@
 #include <thread>
 #include <vector>
 
+#include <builtin_interfaces/msg/time.hpp>
 #include <rcl/error_handling.h>
 #include <rcl/rcl.h>
 #include <rosidl_typesupport_cpp/message_type_support.hpp>
@@ -155,6 +158,62 @@ private:
   Callback callback_;
 };
 
+class Duration
+{
+public:
+  explicit Duration(std::int64_t nanoseconds)
+  : nanoseconds_(nanoseconds) {}
+
+  std::int64_t nanoseconds() const {return nanoseconds_;}
+  double seconds() const {return 1e-9 * nanoseconds_;}
+
+private:
+  std::int64_t nanoseconds_;
+};
+
+// A time of the clock that stamps have.
+class Time
+{
+public:
+  explicit Time(std::int64_t nanoseconds)
+  : nanoseconds_(nanoseconds) {}
+  Time(const builtin_interfaces::msg::Time & stamp)  // NOLINT: a stamp may stand for a Time
+  : nanoseconds_(1'000'000'000LL * stamp.sec + stamp.nanosec) {}
+
+  Duration operator-(const Time & other) const
+  {
+    return Duration(nanoseconds_ - other.nanoseconds_);
+  }
+  std::int64_t nanoseconds() const {return nanoseconds_;}
+  double seconds() const {return 1e-9 * nanoseconds_;}
+
+private:
+  std::int64_t nanoseconds_;
+};
+
+class TimerBase
+{
+public:
+  using SharedPtr = std::shared_ptr<TimerBase>;
+  using Clock = std::chrono::steady_clock;
+
+  TimerBase(std::chrono::nanoseconds period, std::function<void ()> callback)
+  : period_(period), callback_(std::move(callback)), due_(Clock::now() + period) {}
+
+  std::chrono::nanoseconds time_until_trigger() const {return due_ - Clock::now();}
+
+  void execute_callback()
+  {
+    due_ = std::max(due_ + period_, Clock::now());  // what was missed is not made up for
+    callback_();
+  }
+
+private:
+  std::chrono::nanoseconds period_;
+  std::function<void ()> callback_;
+  Clock::time_point due_;
+};
+
 class Node
 {
 public:
@@ -187,15 +246,31 @@ public:
     return made;
   }
 
-  // Waits until a subscription has a message, 0.1 s at most. Returns those that have one.
-  // (In rclcpp this is the work of a WaitSet.)
+  auto create_wall_timer(std::chrono::nanoseconds period, std::function<void ()> callback)
+  {
+    auto made = std::make_shared<TimerBase>(period, callback);
+    timers_.push_back(made);
+    return made;
+  }
+
+  // The system's clock: there is no use_sim_time here.
+  Time now() const
+  {
+    const auto now = std::chrono::system_clock::now().time_since_epoch();
+    return Time(std::chrono::nanoseconds(now).count());
+  }
+
+  // Waits until a subscription has a message or a timer is due, 0.1 s at most. Calls the timers that
+  // are due, and returns the subscriptions that have a message.
+  // (In rclcpp a WaitSet waits, and the executor calls both.)
   std::vector<SubscriptionBase::SharedPtr> wait()
   {
-    constexpr std::chrono::milliseconds limit{100};
-    std::vector<SubscriptionBase::SharedPtr> subscriptions;  // those that somebody still holds
-    for (const auto & each : subscriptions_) {
-      if (auto subscription = each.lock()) {subscriptions.push_back(subscription);}
+    std::chrono::nanoseconds limit = std::chrono::milliseconds(100);
+    for (const auto & timer : held(timers_)) {
+      if (timer->time_until_trigger().count() <= 0) {timer->execute_callback();}
+      limit = std::clamp(timer->time_until_trigger(), std::chrono::nanoseconds(0), limit);
     }
+    const auto subscriptions = held(subscriptions_);
     if (subscriptions.empty()) {  // rcl_wait refuses to wait for nothing
       std::this_thread::sleep_for(limit);
       return {};
@@ -206,7 +281,7 @@ public:
     for (const auto & subscription : subscriptions) {
       check(rcl_wait_set_add_subscription(&wait_set, &subscription->subscription_, nullptr));
     }
-    const auto result = rcl_wait(&wait_set, RCL_MS_TO_NS(limit.count()));
+    const auto result = rcl_wait(&wait_set, limit.count());
     std::vector<SubscriptionBase::SharedPtr> ready;
     if (result == RCL_RET_TIMEOUT) {
       rcl_reset_error();
@@ -221,8 +296,20 @@ public:
   }
 
 private:
+  // Returns those that somebody still holds: as in rclcpp, the node keeps none.
+  template<class Part>
+  static std::vector<std::shared_ptr<Part>> held(const std::vector<std::weak_ptr<Part>> & parts)
+  {
+    std::vector<std::shared_ptr<Part>> found;
+    for (const auto & each : parts) {
+      if (auto part = each.lock()) {found.push_back(part);}
+    }
+    return found;
+  }
+
   Handle handle_;
-  std::vector<std::weak_ptr<SubscriptionBase>> subscriptions_;  // as in rclcpp: it keeps none
+  std::vector<std::weak_ptr<SubscriptionBase>> subscriptions_;
+  std::vector<std::weak_ptr<TimerBase>> timers_;
 };
 
 // Waits, takes, calls, until Ctrl+C.
