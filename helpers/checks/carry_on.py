@@ -160,8 +160,8 @@ def _write(workspace: Workspace, parts: list[Part], kept: set[str]) -> None:
 def _why_not_whole(workspace: Workspace, lesson: Lesson, packages: list[str], last: Task) -> str:
     """Return why the check of a task, which gets the workspace, does not take it; or nothing."""
     # Only here: each lesson imports helpers.checks, and these take a while.
-    from helpers.checks.points import judge_points
-    from helpers.checks.sandbox import Sandbox
+    from helpers.checks.tasks import try_points
+    from helpers.checks.verdict import Verdict
 
     result = workspace.build(*packages)
     if not result.ok:
@@ -173,18 +173,12 @@ def _why_not_whole(workspace: Workspace, lesson: Lesson, packages: list[str], la
         workspace.use()
         return judges[last.name].points([workspace])
 
-    sandbox = Sandbox(lambda send: judge_points(points, send), CPU_LIMIT_S, LIMIT_S)
-    tried = asked = 0
-    for kind, content in sandbox:
-        if kind == 'mistake':
-            return content
-        if kind == 'points':
-            asked = len(content)
-        elif not content[0]:
-            return f'{last.title}: {content[1]}'
-        else:
-            tried += 1
-    return '' if asked and tried == asked else f'{last.title}: it did not end'
+    verdict = Verdict(last.name, last.number)
+    try_points(verdict, points, CPU_LIMIT_S, LIMIT_S)
+    if verdict.note:
+        return verdict.note
+    wrong = next((point for point in verdict.points if not point.ok), None)
+    return f'{last.title}: {wrong.found or wrong.what}' if wrong else ''
 
 
 def _why(result: BuildResult) -> str:
