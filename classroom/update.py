@@ -6,8 +6,9 @@
 
 Three versions are compared: what was handed out, what the student has made of it, what is newer.
 JupyterLab keeps the id of a cell, and so do the lessons: a cell is found again by its id, and a
-lesson by its name without its number. A cell, or another file, that only one side has changed is
-taken from that side. Where both have changed it, both are there. If a newer lesson calls its
+lesson by its name without its number. If a cell has moved to another lesson, what a student has
+written goes with it. A cell, or another file, that only one side has changed is taken from that
+side. Where both have changed it, both are there. If a newer lesson calls its
 workspace by another name, the files that a student has in `scratch` come along.
 
 Why no kept tool: of 200 histories drawn as in classroom/tests/test_update.py, nbdime 4.0.4 left
@@ -28,6 +29,7 @@ import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 from uuid import uuid4
@@ -64,6 +66,17 @@ OF_0_3 = {
     'record_a_bag': 'lesson_18',
     'find_the_fault': 'lesson_19',
     'build_a_robot_program': 'lesson_20',
+}
+# The lessons that it had. It leaves what a student has written for cells that have moved to newer
+# lessons where they were: the next update finds these cells by their ids.
+LESSONS_OF_0_3 = frozenset(OF_0_3) | {
+    'start_here',
+    'run_callbacks_in_parallel',
+    'choose_the_number_of_threads',
+    'keep_what_is_fresh',
+    'call_a_service_from_a_callback',
+    'run_a_long_job',
+    'fuse_odometry_imu_and_gps',
 }
 YOURS = '*Your version of the cell above, from before the update:*'
 
@@ -112,6 +125,94 @@ def _changed(cell: NotebookNode, **changes: object) -> NotebookNode:
     return nbformat.from_dict({**cell, **changes})
 
 
+@dataclass
+class Moved:
+    """The cells that are in another lesson than before, between three versions of a course.
+
+    `coming` says for each newer file from which files its cells come, and their ids.
+    """
+
+    base: Path
+    mine: Path
+    coming: dict[Path, dict[Path, set[str]]]
+
+    @classmethod
+    def between(cls, base: Path, mine: Path, newer: Path) -> 'Moved':
+        """Find them. A cell moves if it is gone from a lesson that stays, and new in another."""
+        files = [file for file in files_of(newer) if file.suffix == '.ipynb']
+        new, old, own = (
+            {file: {cell.id for cell in outline(found(folder / file)).cells} for file in files}
+            for folder, found in ((newer, Path), (base, _found), (mine, _found))
+        )
+        coming: dict[Path, dict[Path, set[str]]] = {}
+        for file in files:
+            came = new[file] - old[file]
+            for source in files:
+                ids = came & old[source] - new[source]
+                if _is_new_since_0_3(file) and not _is_new_since_0_3(source):
+                    ids |= new[file] & own[source] - old[source] - new[source]
+                if ids := ids - {''}:
+                    coming.setdefault(file, {})[source] = ids
+        return cls(base, mine, coming)
+
+    def taken(self, file: Path) -> list[NotebookNode]:
+        """Return what a student has in other lessons of the cells that come into a file."""
+        return [c for source, ids in self._sources(file) for c in self._of(self.mine, source, ids)]
+
+    def handed_out(self, file: Path) -> list[NotebookNode]:
+        """Return these cells as they were handed out."""
+        return [c for source, ids in self._sources(file) for c in self._of(self.base, source, ids)]
+
+    def left(self, file: Path) -> set[str]:
+        """Return the ids of the cells that leave a file, with those that a student put below."""
+        ids = set().union(*(of[file] for of in self.coming.values() if file in of))
+        return ids | {cell.id for cell in self._of(self.mine, file, ids)}
+
+    def is_written(self, file: Path) -> bool:
+        """Return whether a student has written in cells that come into a file, or leave it."""
+        try:
+            return any(
+                self._sources_of(self.taken(target)) != self._sources_of(self.handed_out(target))
+                for target, of in self.coming.items()
+                if target == file or file in of
+            )
+        except UNREADABLE:  # it is set aside as a whole
+            return False
+
+    def said(self) -> list[str]:
+        """Return a sentence for each lesson into which something comes that a student wrote."""
+        return [
+            f'What you have written for some tasks of {source.stem} is in {file.stem} now, as they '
+            'are.'
+            for file, of in self.coming.items()
+            for source in of
+            if self.is_written(file)
+        ]
+
+    def _sources(self, file: Path) -> list[tuple[Path, set[str]]]:
+        return sorted(self.coming.get(file, {}).items())
+
+    @staticmethod
+    def _sources_of(cells: list[NotebookNode]) -> dict[str, str]:
+        return {cell.id: cell.source for cell in cells}
+
+    def _of(self, folder: Path, file: Path, ids: set[str]) -> list[NotebookNode]:
+        """Return these cells of a lesson, each with the cells that a student has put below it."""
+        path, taken, below = _found(folder / file), [], False
+        if not ids or not path.is_file():
+            return []
+        known = {cell.id for cell in outline(_found(self.base / file)).cells}
+        for cell in nbformat.read(path, as_version=4).cells:
+            below = cell.id in ids or (below and cell.id not in known)
+            if below:
+                taken.append(cell)
+        return taken
+
+
+def _is_new_since_0_3(file: Path) -> bool:
+    return file.stem[3:] not in LESSONS_OF_0_3
+
+
 class Move(NamedTuple):
     """A file that takes its place."""
 
@@ -127,6 +228,7 @@ class Changes(NamedTuple):
 
     moves: list[Move]
     gone: list[Path]
+    said: list[str]
 
     def make(self) -> list[str]:
         """Let only names change, which takes no room and no time; return what was set aside."""
@@ -138,7 +240,7 @@ class Changes(NamedTuple):
                 move.own.unlink(missing_ok=True)
         for file in self.gone:
             file.unlink(missing_ok=True)
-        return [move.said for move in self.moves if move.aside]
+        return self.said + [move.said for move in self.moves if move.aside]
 
 
 def merge_folders(base: Path, mine: Path, newer: Path) -> list[str]:
@@ -157,37 +259,42 @@ def changes(base: Path, mine: Path, newer: Path) -> Iterator[Changes]:
 
     Before, what ends it, such as a full disk or a folder of another user, has changed nothing.
     """
-    moves = []
+    moves, moved = [], Moved.between(base, mine, newer)
     try:
-        for file in files_of(newer):
-            move, data = _change(file, base, mine, newer)
+        # First those into which something comes: it leaves the others when it is there.
+        for file in sorted(files_of(newer), key=lambda file: file not in moved.coming):
+            move, data = _change(file, base, mine, newer, moved)
             if move:
                 moves.append(move)
                 move.target.parent.mkdir(parents=True, exist_ok=True)
                 move.staged.write_bytes(data)
                 move.staged.chmod((newer / file).stat().st_mode)
-        yield Changes(moves, [*_gone(base, mine, newer)])
+        yield Changes(moves, [*_gone(base, mine, newer)], moved.said())
     finally:
         for move in moves:
             move.staged.unlink(missing_ok=True)
 
 
-def _change(file: Path, base: Path, mine: Path, newer: Path) -> tuple[Move | None, bytes]:
+def _change(
+    file: Path, base: Path, mine: Path, newer: Path, moved: Moved
+) -> tuple[Move | None, bytes]:
     """Return how a file changes, and its new text."""
     target, own, old = mine / file, _found(mine / file), _found(base / file)
     staged = target.with_name(f'.{target.name}.newer')
     staged.unlink(missing_ok=True)  # of an update that was killed
     data, was, now = (newer / file).read_bytes(), _bytes(old), _bytes(own)
-    if data == was and own == target:
+    moves = moved.is_written(file)
+    if data == was and own == target and not moves:
         return None, data
-    aside = None
-    if now not in (None, was, data):
+    aside, differs = None, now not in (None, was, data)
+    if differs or moves:
         try:
-            data = _merged(old, own, newer / file)
+            data = _merged(file, old, own, newer / file, moved)
         except ValueError:
-            aside = own.with_name(f'{own.name}.yours')
-            if aside.exists():  # what an earlier update has set aside stays
-                aside = own.with_name(f'{own.name}.{uuid4().hex[:8]}.yours')
+            if differs:
+                aside = own.with_name(f'{own.name}.yours')
+                if aside.exists():  # what an earlier update has set aside stays
+                    aside = own.with_name(f'{own.name}.{uuid4().hex[:8]}.yours')
     said = f'Both have changed {file}: yours is now {aside.name}.' if aside else ''
     return Move(staged, target, own, aside, said), data
 
@@ -240,16 +347,49 @@ def _bytes(path: Path) -> bytes | None:
     return path.read_bytes() if path.is_file() else None
 
 
-def _merged(base: Path, mine: Path, newer: Path) -> bytes:
+def _merged(file: Path, base: Path, mine: Path, newer: Path, moved: Moved) -> bytes:
     """Return the text of a merged notebook. Raises ValueError for what is none, or has no ids."""
     if newer.suffix != '.ipynb':
         raise ValueError
     try:
-        old = nbformat.read(base, as_version=4) if base.is_file() else new_notebook()
-        notebooks = (nbformat.read(path, as_version=4) for path in (mine, newer))
-        return (nbformat.writes(merge(old, *notebooks)) + '\n').encode()
+        old, own = (
+            nbformat.read(path, as_version=4) if path.is_file() else new_notebook()
+            for path in (base, mine)
+        )
+        left = moved.left(file)
+        for notebook in (old, own):
+            notebook.cells = [cell for cell in notebook.cells if cell.id not in left]
+        known = {cell.id for cell in old.cells}
+        old.cells += [cell for cell in moved.handed_out(file) if cell.id not in known]
+        own.cells = _with_taken(own.cells, moved.taken(file), old)
+        merged = merge(old, own, nbformat.read(newer, as_version=4))
+        return (nbformat.writes(merged) + '\n').encode()
     except UNREADABLE as problem:
         raise ValueError from problem
+
+
+def _with_taken(
+    cells: list[NotebookNode], taken: list[NotebookNode], base: NotebookNode
+) -> list[NotebookNode]:
+    """Return a student's cells with those that come from another lesson.
+
+    If a student has written in both, both are there.
+    """
+    handed_out = {cell.id: cell.source for cell in base.cells}
+    cells = list(cells)
+    at = len(cells)
+    for cell in taken:
+        here = next((i for i, one in enumerate(cells) if one.id == cell.id), None)
+        if here is None:
+            cells.insert(at, cell)
+            at += 1
+        elif cells[here].source == handed_out.get(cell.id):
+            cells[here], at = cell, here + 1
+        elif cells[here].source != cell.source:
+            yours = _changed(cell, id=uuid4().hex[:8])
+            cells[here + 1 : here + 1] = [new_markdown_cell(YOURS), yours]
+            at = here + 3
+    return cells
 
 
 def update_from_folder(newer: Path, mine: Path, course: Path) -> list[str]:

@@ -17,7 +17,7 @@ it. A package imports only from those that stand above it in this list:
     workspace   a colcon workspace for a notebook, and processes that end
     fusion      one pose from several imperfect sensors; its nodes also run as programs
     faults      somebody else's robots, each with a fault that one finds and mends
-    patrol      robots that are driven by the program that a learner writes in the last lesson
+    patrol      robots that are driven by the program that a learner writes in the last lessons
     trials      what code of a learner does where a lesson puts it: at a gate, at a stop
     checks      guesses and tasks: what is right, what the student's code did, and a hint
     kernel      what each kernel of this environment gets when it starts

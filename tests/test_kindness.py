@@ -1,7 +1,7 @@
 """The project's solution drives robots that are less kind than the one it was written with.
 
 It hits nothing, it arrives, and it stands if the laser is blind: whatever the drivers do. A person
-who takes the program of lesson 20 to another robot relies on that.
+who takes the program of the last lessons to another robot relies on that.
 """
 
 import math

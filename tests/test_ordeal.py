@@ -60,11 +60,16 @@ def test_a_seed_draws_the_same_troubles_again():
     assert len({one.name for one in first}) == len(first)
 
 
+def lessons_of(program):
+    """Return the names of the lessons that write a program: its own, and the one before it."""
+    return {program['lesson'], program.get('goes_on_from', program)['lesson']}
+
+
 def test_every_program_that_drives_is_in_the_ordeal():
     missing = []
     for path in paths():
         name = path.stem[3:]
-        tried = [one for one in declared().values() if one['lesson'] == name]
+        tried = [one for one in declared().values() if name in lessons_of(one)]
         nodes = {call.split('(')[0] for one in tried for call in nodes_of(one)}
         classes = re.findall(r'^class (\w+)', module_of(lesson(name), nodes), re.MULTILINE)
         writes = any(one['writes'] for one in tried)
@@ -79,6 +84,9 @@ def test_what_builds_a_program_is_in_its_lesson():
     for name, one in declared().items():
         cells = {cell.id for cell in lesson(one['lesson']).cells}
         assert {*one['also']} <= cells, name
+        if earlier := one.get('goes_on_from'):
+            cells = {cell.id for cell in lesson(earlier['lesson']).cells}
+            assert {*earlier['also']} <= cells, name
 
 
 def test_what_does_not_stand_is_of_the_programs():

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from classroom.class_page import events
 from classroom.class_page.lessons import Guess, Known
-from helpers.lesson import earlier_name
+from helpers.lesson import earlier_name, home_of_cell, home_of_guess, home_of_task
 
 WORDS = Path(__file__).with_name('words.txt').read_text().split()
 CODE_WORDS = 3  # of 256: 24 bits
@@ -60,6 +60,11 @@ ORDER BY what, seat
 """
 
 
+# What an event is about, by its kind, and who knows the lesson of that.
+FIELDS = {'guess': 'question', 'outcome': 'question', 'task': 'task', 'cell': 'cell'}
+HOMES = {'question': home_of_guess, 'task': home_of_task, 'cell': home_of_cell}
+
+
 class ClassStore:
     """The events of one class. If the file has some already, the class goes on."""
 
@@ -74,6 +79,7 @@ class ClassStore:
             with self._db:
                 self._db.execute('INSERT INTO class VALUES (?, ?)', (code, secrets.token_hex(8)))
         self._name_tasks()
+        self._move_events()
         self.code, self.secret = self._db.execute('SELECT code, secret FROM class').fetchone()
         self.went_on = self._db.execute('SELECT 1 FROM events').fetchone() is not None
         self.shown: set[tuple[str, str]] = set()  # lesson and question
@@ -91,6 +97,24 @@ class ClassStore:
         ]
         with self._db:
             self._db.executemany('UPDATE events SET what = ? WHERE n = ?', names)
+
+    def _move_events(self) -> None:
+        """Let a class that was broken off know tasks and guesses in the lessons of today."""
+        places = [
+            (self._home(lesson, FIELDS.get(kind, ''), what), lesson, kind, what)
+            for lesson, kind, what in self._db.execute(
+                'SELECT DISTINCT lesson, kind, what FROM events'
+            )
+        ]
+        change = 'UPDATE events SET lesson = ? WHERE lesson = ? AND kind = ? AND what = ?'
+        with self._db:
+            self._db.executemany(change, [place for place in places if place[0] != place[1]])
+
+    def _home(self, lesson: str, field: str, what: object) -> str:
+        """Return the lesson that has a task, a guess or a cell today."""
+        if field not in HOMES:
+            return lesson
+        return HOMES[field](lesson, what, [known.lesson for known in self.lessons.values()])
 
     # Seats
 
@@ -157,7 +181,7 @@ class ClassStore:
         """Keep the events of a seat. Return why some were refused, in one sentence, or nothing."""
         refused = ''
         rows = []
-        for event in map(_with_name, messages):
+        for event in map(self._of_today, messages):
             problem = self._problem(event)
             refused = refused or problem
             if not problem:
@@ -165,6 +189,14 @@ class ClassStore:
         with self._db:
             self._db.executemany(INSERT, rows)
         return refused
+
+    def _of_today(self, event: object) -> object:
+        """Return an event of a student with older lessons as one with today's would send it."""
+        event = _with_name(event)
+        if not events.is_event(event) or event['kind'] not in FIELDS:
+            return event
+        field = FIELDS[event['kind']]
+        return event | {'lesson': self._home(event['lesson'], field, event[field])}
 
     def remove(self, lesson: str, question: str, answer: str) -> None:
         """Take an answer that the page shows out of sight, of all students who gave it."""

@@ -131,6 +131,31 @@ def test_a_task_of_version_0_3_is_known_by_its_number(tmp_path):
     store.close()
 
 
+def test_a_task_that_has_moved_is_one_of_its_lesson_of_today(tmp_path):
+    """Of a student with older lessons, and of a class that was broken off before they moved."""
+    names = ('build_a_robot_program', 'put_a_program_on_a_robot')
+    before, now = (outline(path_of(name)) for name in names)
+    file, question = tmp_path / 'class.sqlite', now.guesses[0].question
+    known = [Known(before), Known(now)]
+    store = ClassStore(file, known)
+    tokens = {name: store.join(name, '') for name in ('ada', 'bo')}
+    told = [
+        event('task', 1, task='the_guard', solved=True) | {'lesson': before.name},
+        event('guess', 2, question=question, value=1.0) | {'lesson': before.name},
+        event('cell', 3, cell='guard-check') | {'lesson': before.name},
+    ]
+    assert store.take(tokens['ada'], told) == ''
+    assert store.take(tokens['bo'], [one | {'lesson': now.name} for one in told]) == ''
+    assert {lesson for _, lesson, _ in store._latest('task')} == {now.name}
+    with store._db as db:
+        db.execute('UPDATE events SET lesson = ?', (before.name,))
+    store.close()
+    store = ClassStore(file, known)
+    for kind in ('task', 'guess'):
+        assert [lesson for _, lesson, _ in store._latest(kind)] == [now.name] * 2
+    store.close()
+
+
 def test_a_guess_is_shown_until_it_is_compared(opened):
     opened.tell(opened.join(), event(value=41), event('outcome', 1, question=QUESTION, value=14))
     for step, questions in enumerate([[], [QUESTION, OTHER], [QUESTION]]):

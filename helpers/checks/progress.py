@@ -3,7 +3,8 @@
 `checks.check` records each task that passes, and `show` prints the table. The file has one line for
 each task, such as `lose_messages be_the_queue`: the names of the lesson and of the task, and no
 numbers, which change when a lesson or a task is added before them. Lines of version 0.3 had a
-number, and are read as the task that had it then. What `checks.remember` keeps are lines that begin
+number, and are read as the task that had it then; a task that has moved to another lesson is read
+as one of that. What `checks.remember` keeps are lines that begin
 with `memory`; `borrowed lose_messages be_the_queue` is a task that a student has gone on without,
 which is not solved by that. Lines that begin with `gap` are those of `checks.portrait`. Lines are
 only ever added, so kernels that write at once lose nothing.
@@ -11,6 +12,7 @@ only ever added, so kernels that write at once lose nothing.
 
 from __future__ import annotations
 
+import json
 import os
 import re
 from collections.abc import Collection, Iterable
@@ -22,8 +24,16 @@ from IPython.display import display
 from jupyter_core.paths import jupyter_data_dir
 
 from helpers import notebook as text
-from helpers.checks.portrait import portrait
-from helpers.lesson import FOLDER, Lesson, earlier_name, outlines, paths
+from helpers.checks.portrait import KEPT, portrait
+from helpers.lesson import (
+    FOLDER,
+    Lesson,
+    earlier_name,
+    home_of_guess,
+    home_of_task,
+    outlines,
+    paths,
+)
 
 BORROWED = 'borrowed'  # begins the line of a task that a student has gone on without
 IS_GRADED = 'ROS2_NOTEBOOKS_GRADED'  # a variable of the environment: nothing can be borrowed
@@ -98,6 +108,24 @@ def lines_of(first_word: str) -> list[str]:
     return []
 
 
+def solved_of(lesson: Lesson) -> set[str]:
+    """Return the names of the tasks of a lesson that are solved."""
+    return _names_of(lesson, f'{lesson.name} ')
+
+
+def borrowed_of(lesson: Lesson) -> set[str]:
+    """Return the names of the tasks of a lesson that a student has once gone on without."""
+    return _names_of(lesson, f'{BORROWED} {lesson.name} ')
+
+
+def _names_of(lesson: Lesson, begin: str) -> set[str]:
+    path, lines = file(), []
+    if path is not None:
+        with suppress(OSError):
+            lines = in_their_lessons(_lines(path), with_tasks())
+    return {task.name for task in lesson.tasks if f'{begin}{task.name}' in lines}
+
+
 def number_of(lesson: str) -> str:
     """Return the number of a lesson by its name, such as '02'; empty if there is no notebook."""
     return next((path.name[:2] for path in paths(folder()) if path.stem[3:] == lesson), '')
@@ -124,7 +152,7 @@ def show() -> None:
     path, lines, known = file(), [], with_tasks()
     if path is not None:
         try:
-            lines = _lines(path)
+            lines = in_their_lessons(_lines(path), known)
         except OSError as error:
             why = f'Your progress is not kept, because {path} cannot be used: {error.strerror}.'
             print(*text.wrap(why), sep='\n')
@@ -138,9 +166,11 @@ def total() -> str:
     path = file()
     if path is None or not this_lesson():
         return ''
-    known = {line for lesson in with_tasks() for line in _lines_of(lesson)}
+    lessons = with_tasks()
+    known = {line for lesson in lessons for line in _lines_of(lesson)}
     with suppress(OSError):
-        return f'{len(known.intersection(_lines(path)))} of {len(known)} tasks'
+        lines = in_their_lessons(_lines(path), lessons)
+        return f'{len(known.intersection(lines))} of {len(known)} tasks'
     return ''
 
 
@@ -205,6 +235,25 @@ def _lines(path: Path) -> list[str]:
     with path.open('a+b') as lines:
         lines.seek(0)
         return [_with_name(line) for line in lines.read().decode(errors='replace').splitlines()]
+
+
+def in_their_lessons(lines: Iterable[str], known: Iterable[Lesson]) -> list[str]:
+    """Return lines of the file as they would be written today.
+
+    A task or a guess may have moved to another lesson: it is found by its name, or its question.
+    """
+    known, found = [*known], []
+    for line in lines:
+        words = line.split(' ', 2)
+        with suppress(ValueError, IndexError, KeyError, TypeError):
+            if words[0] == KEPT:
+                words[1] = home_of_guess(words[1], json.loads(words[2])['asked'], known)
+            elif words[0] == BORROWED:
+                words[1] = home_of_task(words[1], words[2], known)
+            else:
+                words[0] = home_of_task(words[0], words[1], known)
+        found.append(' '.join(words))
+    return found
 
 
 def _with_name(line: str) -> str:

@@ -162,7 +162,7 @@ class Tasks:
         verdict.note = _reason_not_to_judge(attempt, arguments, answer) or self._needed(task)
         if not verdict.note:
             attempt.arguments = arguments
-            hints = _judge(verdict, lambda: judge.points(answer), judge.cpu_s, judge.limit_s)
+            hints = try_points(verdict, lambda: judge.points(answer), judge.cpu_s, judge.limit_s)
             open_files = self._open(self.needs.files_before(task)) if self.needs else []
             if open_files and verdict.points and not verdict.solved:
                 # What it has found may come from the files of these tasks: that is no try.
@@ -210,7 +210,7 @@ class Tasks:
             return
         answer = [eval(argument, names) for argument in attempt.arguments]
         verdict = Verdict(task, judge.number, of='solution')
-        _judge(verdict, lambda: judge.points(answer), judge.cpu_s, judge.limit_s)
+        try_points(verdict, lambda: judge.points(answer), judge.cpu_s, judge.limit_s)
         show(verdict)
 
     def borrow(self, task: str) -> None:
@@ -408,7 +408,7 @@ def borrow(line: str) -> None:
 # --- Judging --------------------------------------------------------------------------------------
 
 
-def _judge(
+def try_points(
     verdict: Verdict, points: Callable[[], Sequence[Test]], cpu_s: float, limit_s: float
 ) -> list[str]:
     """Fill the verdict with the points of a task, judged in a sandbox; return their hints."""

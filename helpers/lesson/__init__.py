@@ -28,6 +28,7 @@ The grammar of a lesson:
     files      the notebooks of a folder, and those that somebody names
     mentions   how texts mention lessons and tasks
     messages   the messages of errors that a lesson makes or names
+    moved      tasks and guesses that have moved to another lesson
     earlier    the names of tasks that version 0.3 knew by their numbers
 """
 
@@ -93,6 +94,7 @@ from helpers.lesson.mentions import (
     write_numbers,
 )
 from helpers.lesson.messages import Message, messages
+from helpers.lesson.moved import home_of_cell, home_of_guess, home_of_task
 
 __all__ = [
     'CHECK_BEGINS',
@@ -125,6 +127,9 @@ __all__ = [
     'first_heading',
     'guess_of',
     'has_heading',
+    'home_of_cell',
+    'home_of_guess',
+    'home_of_task',
     'name_of_solution',
     'is_check',
     'is_for_instructors',

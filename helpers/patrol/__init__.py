@@ -1,6 +1,6 @@
-"""Robots that are driven by the program that a learner writes in the last lesson, `patrol_pkg`.
+"""Robots that are driven by the program that a learner writes in the last lessons, `patrol_pkg`.
 
-The lesson shows these drives, and its tasks are judged by them. Something can go wrong on the way:
+These lessons show the drives, and judge their tasks by them. Something can go wrong on the way:
 a cable is unplugged, the laser is blind, a program is ended.
 
     program   its folder, its modules as they are now, its action, its route
@@ -23,8 +23,17 @@ from helpers.patrol.drives import (
     round_tour,
     steered,
 )
-from helpers.patrol.floors import CELLAR, LAST, ON_THE_WAY, write_route_of_cellar
-from helpers.patrol.launches import ALL_END, ENDS, LAUNCH, driven_live, ended_by, launched, printed
+from helpers.patrol.floors import CELLAR, CLOSE, LAST, ON_THE_WAY, write_route_of_cellar
+from helpers.patrol.launches import (
+    ALL_END,
+    ENDS,
+    LAUNCH,
+    driven_live,
+    ended_by,
+    killed_alone,
+    launched,
+    printed,
+)
 from helpers.patrol.program import PACKAGE, SIM, action, module, route_of
 
 __all__ = [
@@ -32,6 +41,7 @@ __all__ = [
     'CABLES',
     'CELLAR',
     'CIRCLE',
+    'CLOSE',
     'CUT',
     'DEGREES',
     'ENDS',
@@ -49,6 +59,7 @@ __all__ = [
     'driven_live',
     'ended_by',
     'estimated',
+    'killed_alone',
     'launched',
     'module',
     'printed',

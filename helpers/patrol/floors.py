@@ -14,6 +14,16 @@ LAST = Floor.from_text(
 """,
     name='two boxes',
 )
+CLOSE = Floor.from_text(
+    """
+#######
+#     #
+# >   #
+#     #
+#######
+""",
+    name='close to a wall',
+)
 CELLAR = Floor.from_text(
     """
 ###########################

@@ -7,12 +7,14 @@ import math
 import os
 import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from rclpy.action import ActionClient
 from rclpy.node import Node
 
+from helpers.guesses import Guess
+from helpers.patrol.floors import CLOSE
 from helpers.patrol.program import PACKAGE, action, route_of
 from helpers.robot import CORRIDOR, KIND, RATE_HZ, TURTLEBOT3, Driver, Floor, Robot
 from helpers.robot_view import watch
@@ -37,10 +39,11 @@ SIGNALS = {
     'patrol freezes': signal.SIGSTOP,
 }
 QUIET = ['--ros-args', '--disable-rosout-logs']  # which line comes first is an accident
-ON_A_TURTLEBOT = [
-    *(*QUIET, '-r', 'imu/data:=imu', '-r', 'cmd_vel:=cmd_vel_wanted'),
+ALONE = [
+    *(*QUIET, '-r', 'imu/data:=imu'),
     *('-p', 'route:=[3.0, 0.0]', '-p', 'speed:=0.2', '-p', 'full_battery:=100.0'),
 ]
+ON_A_TURTLEBOT = [*ALONE, '-r', 'cmd_vel:=cmd_vel_wanted']
 LIMIT_S = 20.0
 
 
@@ -186,21 +189,9 @@ def ended_by(workspace: Workspace, end: str, halt: bool = False) -> Ended:
         }
 
         def is_there():  # `halt` must hear the guard before that one ends
-            speak = client.count_publishers('cmd_vel') == 1 + halt
-            return speak and server.server_is_ready()
+            return client.count_publishers('cmd_vel') == 1 + halt
 
-        def drives():
-            if is_there() and robot.pose.x == CORRIDOR.start.x:
-                send_goal(session, server, 1)  # refused, as long as its sensors have not spoken
-            return robot.record.poses[-1].v > 0.15
-
-        limit_s = robot.t_s + LIMIT_S
-        while not drives():
-            if robot.t_s > limit_s or not all(program.running for program in programs.values()):
-                lines = [line for program in programs.values() for line in program.lines]
-                last = [*lines, 'nothing'][-1]
-                raise RuntimeError(f'The robot does not drive. The programs printed: {last}')
-            robot.run(0.2)
+        _begin_to_drive(session, robot, server, [*programs.values()], is_there)
         since_s = robot.t_s
         if end in SIGNALS:
             os.kill(programs['patrol'].pid, SIGNALS[end])
@@ -218,6 +209,49 @@ def ended_by(workspace: Workspace, end: str, halt: bool = False) -> Ended:
         if end == 'patrol freezes':
             os.kill(programs['patrol'].pid, signal.SIGCONT)  # or it could not end
     return Ended(robot, stands, sum(step.v for step in moves) / RATE_HZ, len(moves) / RATE_HZ)
+
+
+def killed_alone(workspace: Workspace, guess: Guess | None = None) -> Robot:
+    """Drive a TurtleBot 3 with patrol alone, kill it, and return the robot when it stands.
+
+    This base hears `Twist`, so that no other program speaks to it. The robot is shown, with a guess
+    of where it ends. Raises RuntimeError if the robot does not come to drive.
+    """
+    with ros_session() as session:
+        robot = Robot(CLOSE, driver=TURTLEBOT3.but(stamped_commands=False))
+        client = Node('client')
+        server = ActionClient(client, action(), 'patrol')
+        session.spin(spun(client))
+        watch(robot, guess=guess)
+        with workspace.run('patrol_pkg', 'patrol', *ALONE) as patrol:
+            _begin_to_drive(session, robot, server, [patrol])
+            os.kill(patrol.pid, signal.SIGKILL)
+            robot.run(LIMIT_S, until=lambda: robot.stopped or robot.bumps)
+            robot.run(0.5)
+    return robot
+
+
+def _begin_to_drive(
+    session: Session,
+    robot: Robot,
+    server: ActionClient,
+    programs: Sequence[Process],
+    is_there: Callable[[], bool] = lambda: True,
+) -> None:
+    """Send goals until the robot drives. Raises RuntimeError with the last line if it does not."""
+    start = robot.pose
+
+    def drives():
+        if is_there() and server.server_is_ready() and robot.pose.x == start.x:
+            send_goal(session, server, 1)  # refused, as long as its sensors have not spoken
+        return robot.record.poses[-1].v > 0.15
+
+    limit_s = robot.t_s + LIMIT_S
+    while not drives():
+        if robot.t_s > limit_s or not all(program.running for program in programs):
+            last = [*(line for program in programs for line in program.lines), 'nothing'][-1]
+            raise RuntimeError(f'The robot does not drive. The programs printed: {last}')
+        robot.run(0.2)
 
 
 def driven_live(workspace: Workspace, file: str) -> Robot:

@@ -203,6 +203,8 @@ class Prepared:
         if 'package' in say:
             shutil.copytree(ROOT / say['package'], self.workspace.file(f'src/{say["as"]}'))
         elif say['writes']:
+            if earlier := say.get('goes_on_from'):
+                fill(lesson(earlier['lesson']), self.workspace, earlier['also'])
             fill(self.lesson, self.workspace, say['also'])
         for path, text in say['files'].items():
             self.workspace.write(path, text)

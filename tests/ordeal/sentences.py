@@ -39,10 +39,12 @@ OTHERS = {
     'is cut': 'the network between it and the robot is cut',
 }
 # The lesson that takes a trouble away. Where none is named, no program of the course stands it.
-FRESH, PROJECT = 'keep_what_is_fresh', 'build_a_robot_program'
+FRESH, WHOLE = 'keep_what_is_fresh', 'build_a_robot_program'
+GUARDED = 'put_a_program_on_a_robot'
 TAKEN_AWAY = {
     **dict.fromkeys(['silent from the start', 'silent', 'old', 'jumps'], FRESH),
-    **dict.fromkeys(['frozen', 'SIGKILL', 'SIGSTOP', 'is cut'], PROJECT),
+    'frozen': WHOLE,
+    **dict.fromkeys(['SIGKILL', 'SIGSTOP', 'is cut'], GUARDED),
 }
 
 

@@ -40,6 +40,7 @@ LESSONS = [
     'write_a_node_in_cpp',
     'put_the_sensors_on_the_robot',
     'build_a_robot_program',
+    'put_a_program_on_a_robot',
 ]
 # What is in a workspace and is no package of the learner: why it is not tried.
 LEFT_OUT = {

@@ -101,6 +101,7 @@ FIRST = {
         cells={'ada': 'drive-ada', 'bo': 'take-bo', 'cleo': 'take-cleo', 'dan': 'take-dan'},
     ),
     'build_a_robot_program': partial(drive_picture, cell_id='project-082'),
+    'put_a_program_on_a_robot': partial(drive_picture, cell_id='crash-run', share=0.4),
 }
 
 

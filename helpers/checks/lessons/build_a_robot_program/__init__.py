@@ -4,11 +4,7 @@ driving    a node that drives and stops, and its program
 steering   what the laser says, where the robot is, and which way is free
 parts      its action, job, battery and watchdog
 whole      the whole node, and its route
-starting   what is installed, and what starts it
-testing    the student's tests, which test right programs and wrong ones
-turtlebot  a TurtleBot 3
-own_floor  a floor of the student's own
-shared     what several of these look at
+shared     the tasks that all add to
 """
 
 from importlib import import_module
@@ -17,9 +13,7 @@ from helpers.checks.lessons.build_a_robot_program.shared import tasks
 
 __all__ = ['check', 'tasks']
 
-MODULES = 'driving steering parts whole starting testing turtlebot own_floor'
-
 # Each adds its tasks, in the order of the lesson.
-for module in MODULES.split():
+for module in ('driving', 'steering', 'parts', 'whole'):
     import_module(f'{__name__}.{module}')
 check = tasks.check

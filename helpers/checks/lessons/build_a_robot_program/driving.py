@@ -1,14 +1,11 @@
-"""Of the project: a node that drives and stops, and its program."""
+"""A node that drives and stops, and its program."""
 
 import contextlib
 import signal
 import time
 
-from helpers.checks.lessons.build_a_robot_program.shared import (
-    commands_of,
-    one_command_a_scan,
-    tasks,
-)
+from helpers.checks.lessons.build_a_robot_program.shared import tasks
+from helpers.checks.patrols import commands_of, one_command_a_scan
 from helpers.checks.points import all_of, cached, expect, needs
 from helpers.checks.programs import Program
 from helpers.patrol import SIM, drive, module

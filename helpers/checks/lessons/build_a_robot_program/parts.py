@@ -1,4 +1,4 @@
-"""Of the project: the action, the job, the battery, the watchdog."""
+"""The action, the job, the battery, the watchdog."""
 
 import math
 import re
@@ -12,7 +12,8 @@ from sensor_msgs.msg import BatteryState
 
 from helpers.checks.bench import Bench, must_define, periods_of
 from helpers.checks.builds import builds
-from helpers.checks.lessons.build_a_robot_program.shared import NOT_BUILT, tasks
+from helpers.checks.lessons.build_a_robot_program.shared import tasks
+from helpers.checks.patrols import NOT_BUILT
 from helpers.checks.points import cached, expect, needs
 from helpers.patrol import SIM, Ear, action, module
 from helpers.robot import EMPTY, Robot

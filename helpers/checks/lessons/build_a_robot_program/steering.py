@@ -1,4 +1,4 @@
-"""Of the project: what the laser says, where the robot is, and which way is free."""
+"""What the laser says, where the robot is, and which way is free."""
 
 import math
 
@@ -11,11 +11,8 @@ from rclpy.time import Time
 from sensor_msgs.msg import Imu
 
 from helpers.checks.bench import Bench
-from helpers.checks.lessons.build_a_robot_program.shared import (
-    is_driven_at_most,
-    one_command_a_scan,
-    tasks,
-)
+from helpers.checks.lessons.build_a_robot_program.shared import tasks
+from helpers.checks.patrols import is_driven_at_most, one_command_a_scan
 from helpers.checks.points import all_of, expect
 from helpers.patrol import CIRCLE, DEGREES, LAST, SIM, SNAKE, drive, estimated, module, steered
 from helpers.robot import CORRIDOR, KIND, ROOMS, Floor, Pose

@@ -1,4 +1,4 @@
-"""Of the project: the whole node, and its route."""
+"""The whole node, and its route."""
 
 import math
 import time
@@ -11,13 +11,13 @@ from rclpy.time import Time
 from sensor_msgs.msg import Imu, LaserScan
 
 from helpers.checks.bench import periods_of
-from helpers.checks.lessons.build_a_robot_program.shared import (
+from helpers.checks.lessons.build_a_robot_program.shared import tasks
+from helpers.checks.patrols import (
     comes_to_each_place,
     commands_of,
     has_a_timer,
     is_driven_at_most,
     one_command_a_scan,
-    tasks,
 )
 from helpers.checks.points import all_of, cached, expect
 from helpers.patrol import PACKAGE, Tour, round_tour, route_of

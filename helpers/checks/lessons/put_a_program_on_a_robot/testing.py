@@ -1,8 +1,8 @@
-"""Of the project: the student's tests, which test right programs and wrong ones."""
+"""The student's tests, which test right programs and wrong ones."""
 
 from functools import partial
 
-from helpers.checks.lessons.build_a_robot_program.shared import tasks
+from helpers.checks.lessons.put_a_program_on_a_robot.shared import tasks
 from helpers.checks.points import cached, needs
 from helpers.patrol import PACKAGE
 from helpers.trials import planted, run_tests
@@ -215,10 +215,17 @@ WHAT_TO_TEST = {
 @tasks.add(limit_s=90)
 def test_the_logic(workspace, tests):
     return judged_tests(
-        workspace, tests, 'logic', LOGIC, WRONG_LOGICS, 'Is each line what tasks 3 and 6 say?'
+        workspace,
+        tests,
+        'logic',
+        LOGIC,
+        WRONG_LOGICS,
+        'Is each line what the tasks of reach and of free_heading say?',
     )
 
 
 @tasks.add(limit_s=90)
 def test_the_node(workspace, tests):
-    return judged_tests(workspace, tests, 'patrol', NODE, WRONG_NODES, 'What does task 12 say?')
+    return judged_tests(
+        workspace, tests, 'patrol', NODE, WRONG_NODES, 'What does the task of the whole node say?'
+    )

@@ -1,6 +1,7 @@
-"""Of the project: a floor of the student's own."""
+"""A floor of the student's own."""
 
-from helpers.checks.lessons.build_a_robot_program.shared import comes_to_each_place, tasks
+from helpers.checks.lessons.put_a_program_on_a_robot.shared import tasks
+from helpers.checks.patrols import comes_to_each_place
 from helpers.checks.points import cached
 from helpers.patrol import PACKAGE, Tour, round_tour, route_of
 from helpers.robot import Floor

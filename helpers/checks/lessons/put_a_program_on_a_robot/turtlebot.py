@@ -1,4 +1,4 @@
-"""Of the project: a TurtleBot 3."""
+"""A TurtleBot 3."""
 
 import os
 import re
@@ -13,12 +13,8 @@ from rclpy.time import Time
 
 from helpers.checks.bench import Bench, must_have, periods_of
 from helpers.checks.builds import build
-from helpers.checks.lessons.build_a_robot_program.shared import (
-    DRIVES,
-    has_a_timer,
-    is_driven_at_most,
-    tasks,
-)
+from helpers.checks.lessons.put_a_program_on_a_robot.shared import tasks
+from helpers.checks.patrols import DRIVES, has_a_timer, is_driven_at_most
 from helpers.checks.points import all_of, expect
 from helpers.checks.programs import Program
 from helpers.patrol import LAUNCH, SIM, launched, module, printed

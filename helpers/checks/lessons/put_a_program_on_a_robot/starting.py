@@ -1,10 +1,11 @@
-"""Of the project: what is installed, and what starts it."""
+"""What is installed, and what starts it."""
 
 from rcl_interfaces.srv import GetParameters
 
 from helpers.checks.bench import Bench
 from helpers.checks.builds import build, builds, setup_is_whole
-from helpers.checks.lessons.build_a_robot_program.shared import DRIVES, NOT_BUILT, tasks
+from helpers.checks.lessons.put_a_program_on_a_robot.shared import tasks
+from helpers.checks.patrols import DRIVES, NOT_BUILT
 from helpers.checks.points import all_of, cached, expect, needs
 from helpers.checks.programs import Program
 from helpers.patrol import LAUNCH, PACKAGE, launched, printed
