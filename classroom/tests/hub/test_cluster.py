@@ -2,8 +2,8 @@
 
 It needs a cluster that nobody else uses, such as that of `kind create cluster`, with the image of
 `make image` in it, and helm and kubectl. CHART is the chart, `jupyterhub` of its repository or a
-folder, and CLUSTER_IMAGE the name of the image. Without them it is left out. CLUSTER_VALUES is a file
-of values that only this cluster needs, such as a class of storage.
+folder, and CLUSTER_IMAGE the name of the image. Without them it is left out. CLUSTER_VALUES is a
+file of values that only this cluster needs, such as a class of storage.
 
 What is not as in values.yaml: no certificate, since Let's Encrypt must reach the address; and a
 service of the test, which may start servers.
@@ -41,28 +41,6 @@ NAMESPACE = 'ros2-notebooks-test'
 NAMES = ['ada', 'bob']
 FORWARDED = re.compile(r'Forwarding from 127\.0\.0\.1:(\d+)')
 FILL = 'hoard = []\nwhile True: hoard.append(bytearray(b"x") * 10**8)'
-# As root of a pod that mounts a claim, since the hub has stopped.
-KEEPER = {
-    'apiVersion': 'v1',
-    'kind': 'Pod',
-    'metadata': {'name': 'keeper'},
-    'spec': {
-        'securityContext': {'runAsUser': 0},
-        'terminationGracePeriodSeconds': 0,
-        'containers': [
-            {
-                'name': 'keeper',
-                'image': IMAGE,
-                'command': ['sleep', 'infinity'],
-                'volumeMounts': [{'name': 'claim', 'mountPath': '/claim'}],
-            }
-        ],
-        'volumes': [
-            {'name': 'claim', 'persistentVolumeClaim': {'claimName': 'hub-db-dir'}},
-        ],
-    },
-}
-
 pytestmark = pytest.mark.skipif(
     not (CHART and IMAGE and shutil.which('helm') and shutil.which('kubectl')),
     reason='LEFT OUT: a cluster. CHART and CLUSTER_IMAGE name the chart and the image, and helm '
@@ -87,15 +65,6 @@ class Cluster(Hub):
     def __init__(self, folder: Path) -> None:
         self.folder, self.token = folder, secrets.token_hex(16)
         self.url, self.forward = '', None
-        name, _, tag = IMAGE.rpartition(':')
-        values = (ROOT / 'classroom/hub/values.yaml').read_text()
-        for placeholder, mine in (
-            ('REGISTRY/ros2_notebooks', name),
-            ('tag: TAG', f'tag: "{tag}"'),
-            (':TAG', f':{tag}'),
-        ):
-            assert placeholder in values
-            values = values.replace(placeholder, mine)
         here = {
             'proxy': {'https': {'enabled': False}, 'service': {'type': 'ClusterIP'}},
             'hub': {
@@ -108,21 +77,40 @@ class Cluster(Hub):
                 },
             },
         }
-        (folder / 'values.yaml').write_text(values)
         (folder / 'here.yaml').write_text(yaml.safe_dump(here))
 
-    def install(self) -> None:
-        """Install the chart as HOSTING.md says, and wait until all of it is ready."""
+    def install(self, *more: str, **secret: str) -> None:
+        """Install the chart as HOSTING.md says, with more files of values, and wait for the hub."""
         version = ['--version', VERSION, '--repo', 'https://hub.jupyter.org/helm-chart/']
+        files = [self.values(name) for name in ('values.yaml', *more)]
+        files += [self.folder / 'here.yaml', *filter(None, [MORE_VALUES])]
         run(
-            *('helm', 'upgrade', '--install', 'class', CHART),
+            *('helm', 'upgrade', '--install', 'class', CHART, '--reset-values'),
             *([] if Path(CHART).is_dir() else version),
-            *('--namespace', NAMESPACE, '--create-namespace', '--wait', '--timeout', '10m'),
-            *('--values', str(self.folder / 'values.yaml')),
-            *('--values', str(self.folder / 'here.yaml')),
-            *(['--values', MORE_VALUES] if MORE_VALUES else []),
+            *('--namespace', NAMESPACE, '--create-namespace', '--timeout', '10m'),
+            *(word for file in files for word in ('--values', str(file))),
+            *(
+                word
+                for key, value in secret.items()
+                for word in ('--set', f'hub.config.{key}={value}')
+            ),
         )
+        for name in ('hub', 'proxy'):
+            kubectl('rollout', 'status', f'deploy/{name}', '--timeout', '5m')
         self.reach()
+
+    def values(self, name: str) -> Path:
+        """Return a file of values with the image in place of what is in capitals."""
+        image, _, tag = IMAGE.rpartition(':')
+        values = (ROOT / 'classroom/hub' / name).read_text()
+        for placeholder, mine in (
+            ('REGISTRY/ros2_notebooks', image),
+            (':TAG', f':{tag}'),
+            ('tag: TAG', f'tag: "{tag}"'),
+        ):
+            values = values.replace(placeholder, mine)
+        (self.folder / name).write_text(values)
+        return self.folder / name
 
     def reach(self) -> None:
         """Bring the hub to a port of this machine."""
@@ -170,9 +158,17 @@ class Cluster(Hub):
 
 @contextlib.contextmanager
 def keeper_of(claim: str):
-    """Hold a pod that mounts a claim, and yield what runs a command in it."""
-    KEEPER['spec']['volumes'][0]['persistentVolumeClaim']['claimName'] = claim
-    kubectl('apply', '--filename', '-', data=json.dumps(KEEPER).encode())
+    """Hold a pod that mounts a claim, and yield what runs a command in it as root."""
+    container = {'name': 'keeper', 'image': IMAGE, 'command': ['sleep', 'infinity']}
+    container['volumeMounts'] = [{'name': 'claim', 'mountPath': '/claim'}]
+    spec = {
+        'securityContext': {'runAsUser': 0},
+        'terminationGracePeriodSeconds': 0,
+        'containers': [container],
+        'volumes': [{'name': 'claim', 'persistentVolumeClaim': {'claimName': claim}}],
+    }
+    pod = {'apiVersion': 'v1', 'kind': 'Pod', 'metadata': {'name': 'keeper'}, 'spec': spec}
+    kubectl('apply', '--filename', '-', data=json.dumps(pod).encode())
     kubectl('wait', '--for', 'condition=Ready', 'pod/keeper', '--timeout', '2m')
     try:
         yield lambda *command, data=None: kubectl(
@@ -299,6 +295,83 @@ def test_accounts_and_homes_come_back_from_a_backup(cluster):
     assert names_of(cluster) >= {*NAMES}
     asyncio.run(logged_in(cluster))
     assert cluster.in_pod('ada', 'cat ros2_notebooks/mine.txt') == 'mine'
+
+
+@pytest.mark.parametrize(
+    ('name', 'secret', 'page', 'leads_to'),
+    [
+        (
+            'values-oidc.yaml',
+            {'GenericOAuthenticator.client_secret': 'of the test'},
+            '/hub/oauth_login',
+            'https://LOGIN.EXAMPLE.ORG/authorize?',
+        ),
+        ('values-lti.yaml', {}, '/hub/lti13/config', ''),
+    ],
+)
+def test_a_hub_has_the_login_of_its_university(cluster, name, secret, page, leads_to):
+    """test_logins.py logs in; here the hub of the chart has what that needs."""
+    cluster.install(name, **secret)
+    asyncio.run(cluster.until_ready())
+    answer = asyncio.run(cluster.answer(page, 'no token'))
+    assert (answer.code, answer.headers.get('Location', '').startswith(leads_to)) == (
+        302 if leads_to else 200,
+        True,
+    )
+
+
+# A folder of the only machine in the place of a share: its owner is root, as on a server of NFS.
+SHARE = """
+apiVersion: v1
+kind: PersistentVolume
+metadata: {{name: homes}}
+spec:
+  capacity: {{storage: 60Gi}}
+  accessModes: [ReadWriteMany]
+  storageClassName: ""
+  hostPath: {{path: {folder}, type: DirectoryOrCreate}}
+  claimRef: {{namespace: {namespace}, name: homes}}
+---
+apiVersion: v1
+kind: PersistentVolumeClaim
+metadata: {{name: homes}}
+spec:
+  accessModes: [ReadWriteMany]
+  storageClassName: ""
+  volumeName: homes
+  resources: {{requests: {{storage: 60Gi}}}}
+"""
+
+
+@pytest.fixture
+def share(cluster):
+    folder = f'/tmp/ros2_notebooks_homes_{secrets.token_hex(4)}'
+    yaml_ = SHARE.format(folder=folder, namespace=NAMESPACE)
+    kubectl('apply', '--filename', '-', data=yaml_.encode())
+    yield
+    with keeper_of('homes') as keeper:
+        keeper('sh', '-c', 'rm -rf /claim/*')
+    kubectl('delete', '--filename', '-', '--wait=false', data=yaml_.encode())
+
+
+def test_three_hundred_have_homes_on_a_share_and_room_before_placeholders(cluster, share):
+    cluster.install('values-300.yaml', 'values-nfs.yaml')
+
+    async def use() -> None:
+        cat = Student(cluster, 'cat')
+        await cluster.until_ready()
+        await cat.log_in()
+        kernel = await cat.open(LESSONS[0])
+        assert await kernel.text('print(6 * 7)') == '42\n'
+        await kernel.end()
+        await cat.log_out()
+
+    asyncio.run(use())
+    with keeper_of('homes') as keeper:
+        assert b'02_lose_messages.ipynb' in keeper('ls', '/claim/home/cat/ros2_notebooks')
+        assert keeper('stat', '--format', '%u', '/claim/home/cat').strip() == b'1000'
+    placeholders = kubectl('get', 'statefulset', 'user-placeholder', '--output', 'json')
+    assert json.loads(placeholders)['spec']['replicas'] == 30
 
 
 def names_of(cluster: Cluster) -> set[str]:
