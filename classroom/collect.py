@@ -167,7 +167,8 @@ def main(arguments: list[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 1
     print(*said, sep='\n', end='\n' if said else '')
-    print(f'{to}: {count} students. Next: make grade FOLDER={to} LESSON="{options.lesson}"')
+    students = f'{count} student{"s" * (count != 1)}'
+    print(f'{to}: {students}. Next: make grade FOLDER={to} LESSON="{options.lesson}"')
     return 0
 
 

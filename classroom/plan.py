@@ -9,11 +9,15 @@ from tools.lessons.timetables import Timetable, minutes_and_lesson, timetables
 
 
 class Row(NamedTuple):
-    """A row of a timetable. Without a file it is no lesson; without steps it is all of them."""
+    """A row of a timetable. Without a file it is no lesson; without steps it is all of them.
+
+    `write` has the names of the tasks that students write, none for all.
+    """
 
     minutes: int
     file: str
     steps: tuple[int, int] | None
+    write: tuple[str, ...] = ()
 
 
 class Plan(NamedTuple):
@@ -30,6 +34,10 @@ class Plan(NamedTuple):
             if row.file:  # a lesson may come again, with later steps
                 found[row.file] = row.steps and (found.get(row.file, row.steps)[0], row.steps[1])
         return found
+
+    def write(self, file: str) -> set[str]:
+        """Return the names of the tasks of a lesson that students write, none for all."""
+        return {name for row in self.rows if row.file == file for name in row.write}
 
     @property
     def from_first_lesson(self) -> list[Row]:
@@ -59,5 +67,5 @@ def _plan(timetable: Timetable) -> Plan:
     rows = []
     for row in timetable.rows:
         minutes, lesson = minutes_and_lesson(row, known)
-        rows.append(Row(minutes, lesson.file if lesson else '', row.steps))
+        rows.append(Row(minutes, lesson.file if lesson else '', row.steps, row.write))
     return Plan(timetable.title, rows)

@@ -64,35 +64,42 @@ run_lab() {
         --volume "$lessons:/home/student" ${RUN_ARGS-} "$image"
 }
 
-# The code of a student, for classroom/grade: the job comes on stdin, and what it says goes to stdout.
+# Run a command as the code of a student, for classroom/grade: with a name, or without one.
 # No network, no file of this machine, and nothing that can be written but /tmp, in memory. Of the
 # lessons, whose solutions are in the image, it sees nothing: the job brings the one that is judged.
-judge() {
-    set -- "$1" --cpus "${CPUS:-2}"
+as_student() {
+    name=$1 run=$2
+    set -- --cpus "${CPUS:-2}"
     # Podman without root limits the CPUs only if systemd lets it.
     case $($container info --format '{{.Host.Security.Rootless}} {{.Host.CgroupControllers}}' 2> /dev/null) in
         true*cpu\ * | true*cpu] | false*) ;;
-        true*) set -- "$1" ;;
+        true*) set -- ;;
     esac
-    name=$1
-    shift
+    [ -z "$name" ] || set -- "$@" --name "$name"
     # Podman would copy what the image has there, which is more than a file system of 1 MB takes.
     empty=ro,size=1m
     case $($container --version) in *podman*) empty=$empty,notmpcopyup ;; esac
-    exec $container run --rm --interactive --name "$name" "$@" --network none --read-only \
+    exec $container run --rm --interactive "$@" --network none --read-only \
         --tmpfs "/opt/ros2_notebooks/notebooks:$empty" --tmpfs "/home/student:$empty" \
         --tmpfs /tmp:rw,exec,nosuid,nodev,size=1g,mode=1777 --shm-size=256m \
         --memory 3g --memory-swap 3g --pids-limit 400 \
         --cap-drop ALL --security-opt no-new-privileges \
         --env HOME=/tmp --env TMPDIR=/tmp --workdir /tmp --no-healthcheck \
-        ${RUN_ARGS-} "$image" python -m classroom.grade.judge
+        ${RUN_ARGS-} "$image" $run
+}
+
+# Said once, before the first student is judged.
+try() {
+    said=$(as_student '' true 2>&1 < /dev/null) ||
+        fail "No container can run here ($(printf %s "$said" | tr '\n' ' ' | cut -c1-300)): RUN_ARGS= adds options."
 }
 
 case ${1-} in
     image) make_image ;;
     lab) run_lab ;;
-    ready) ready ;;
-    judge) judge "$2" ;;
+    ready) ready && try ;;
+    # The job comes on stdin, and what it says goes to stdout.
+    judge) as_student "$2" 'python -m classroom.grade.judge' ;;
     end) $container kill "$2" ;;
     *) fail 'usage: classroom/container/run.sh image|lab|label|ready|judge NAME|end NAME' ;;
 esac

@@ -25,6 +25,7 @@ from tools.lessons.clean import text_of, write
 
 FOLDER = 'presentation'
 KEY = 'deck'  # in the metadata of a copy
+WRITE, RUN = '**Today: write it.**', '**Today: run the solution.**'
 
 
 class Copies:
@@ -106,12 +107,21 @@ class Copies:
                 if lesson.has_heading(c, '## ')
             ]
             notebook.cells[0].source = '\n'.join([f'# {known.number} {known.title}', '', *shown])
+        self._advise(notebook, name)
         names = list(self.plan.steps)
         if name in names[:-1]:
             following = names[names.index(name) + 1]
             path = self.root / 'notebooks' / following
             link = lesson.read(path.read_text(encoding='utf-8'), following).next_link
             notebook.cells.append(new_markdown_cell(f'Next: {link}', id='next'))
+
+    def _advise(self, notebook: NotebookNode, name: str) -> None:
+        """Say at each task whether students write it today, if the timetable says so."""
+        if not (write_today := self.plan.write(name)):
+            return
+        for task in lesson.Lesson(name, notebook).tasks:
+            said = WRITE if task.name in write_today else RUN
+            task.heading.source = task.heading.source.replace('\n', f'\n\n{said}\n', 1)
 
 
 def _read(copy: Path) -> NotebookNode | None:

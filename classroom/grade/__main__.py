@@ -24,6 +24,24 @@ from helpers.lesson import FOLDER, Node, cells_of, chosen
 LIMIT_MIN = 20.0
 DID = 'its code did what no answer needs:'
 DIFFERED = 'it failed beside the other answers, and passed when it was judged alone: it counts'
+# What mod/assign/feedback/offline/locallib.php skips: grades that are newer in Moodle.
+TO_MOODLE = (
+    'Moodle: first moodle.csv (Upload grading worksheet), then feedback.zip. For a second '
+    'moodle.csv tick "Allow updating records that have been modified more recently in Moodle than '
+    'in the spreadsheet", or Moodle skips them.'
+)
+NO_WORKSHEET = (
+    'No grading worksheet of Moodle lies beside the submissions: moodle.csv counts to {most}, so '
+    'the maximum grade in Moodle must be {most}, too.'
+)
+HIDDEN = (
+    'Canvas takes no grades of anonymous students from a file: type those of grades.csv in '
+    'SpeedGrader, or post the grades, which shows the names, and download again. These are {names}.'
+)
+FOREIGN = (
+    '{name} is a grading worksheet in another language than English. Choose English in Moodle, and '
+    'download it again: Moodle takes it back in that language only.'
+)
 # A browser, or a system that hides endings, adds one.
 NOTEBOOKS = ('.ipynb', '.ipynb.txt', '.ipynb.json', '.json')
 
@@ -231,12 +249,17 @@ def write(
     sheets: list[tables.Sheet],
     title: str,
     marking: Marking,
-) -> list[str]:
-    """Write all tables and the feedback; return the files, and what could not be written."""
+) -> tuple[list[str], list[str]]:
+    """Write all tables and the feedback.
+
+    Return the files with what could not be written, and what you do with them.
+    """
     rows = [work.row for work in works]
     most = sum(map(marking.most, wanted))
     systems = {row.student.system for row in rows}
-    said = []
+    said, then = [], []
+    worksheet = next(filter(tables.is_moodle, sheets), None)
+    tables.note_late(rows, worksheet)
 
     def put(name: str, text: str) -> None:
         (output / name).write_text(text, encoding='utf-8')
@@ -244,12 +267,19 @@ def write(
 
     put('grades.csv', tables.grades(rows, wanted, marking))
     if 'moodle' in systems:
-        sheet = next(filter(tables.is_moodle, sheets), None)
-        text, absent = tables.moodle(rows, most, sheet)
+        text, absent = tables.moodle(rows, most, worksheet)
         put('moodle.csv', text)
         for name in absent:
-            print(f'{name} is not in {sheet.name}, by number and name: write the grade yourself.')
-    if 'canvas' in systems:
+            print(
+                f'{name} is not in {worksheet.name}, by number and name: write the grade yourself.'
+            )
+        then.append(TO_MOODLE)
+        if worksheet is None:
+            then.append(NO_WORKSHEET.format(most=f'{most:.10g}'))
+    hidden = [row.student.name for row in rows if row.student.anonymous and not row.student.number]
+    if hidden:
+        then.append(HIDDEN.format(names=', '.join(hidden)))
+    if any(row.student.system == 'canvas' and not row.student.anonymous for row in rows):
         sheet = next(filter(tables.is_canvas, sheets), None)
         try:
             put('canvas.csv', tables.canvas(rows, most, sheet, title))
@@ -273,7 +303,7 @@ def write(
             table.append((number, task, tables.harmless(names), one.how, one.statements))
             print(f'Alike: lesson {number}, task {task}: {names}: {one.how}')
     put('alike.csv', tables.text_of(table))
-    return said
+    return said, then
 
 
 def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
@@ -304,6 +334,9 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
         if not students:
             raise ValueError(f'Nobody has handed in anything in {options.folder}.')
         sheets = [tables.read_sheet(file.name, file.read()) for file in files]
+        for sheet in sheets:
+            if tables.is_foreign(sheet, students):
+                raise ValueError(FOREIGN.format(name=sheet.name))
         for is_sheet in (tables.is_moodle, tables.is_canvas):
             if len(same := [sheet.name for sheet in sheets if is_sheet(sheet)]) > 1:
                 raise ValueError(
@@ -358,8 +391,8 @@ def main(arguments: list[str] | None = None, where: Where | None = None) -> int:
         for work in works:
             if work.answers and not work.row.results and not work.row.said:
                 work.row.said.append('not judged yet')
-    said = write(output, works, wanted, sheets, title, options.marking)
-    print(f'{output}: {", ".join(said)}')
+    said, then = write(output, works, wanted, sheets, title, options.marking)
+    print(f'{output}: {", ".join(said)}', *then, sep='\n')
     return status
 
 

@@ -60,7 +60,9 @@ INTERRUPT_S = 5  # for a cell to end after an interrupt
 END_S = 20  # for all that a kernel has started to end
 START_S = 120
 CHECK_TIMES = 3  # as long as another cell
-POLL_S = 0.5
+POLL_S = 0.1
+FULL = 0.98  # of its memory: a kernel that has more may have no room to say so
+NEARLY_FULL = 0.9  # what a kernel once had that ended without a word
 MOST_PRINTED = 2_000_000  # letters of a cell
 ENDLESS = 'Interrupted: it printed without end.'
 LIMIT_MET = 'Noticed: it {}.'  # while a cell ran
@@ -93,6 +95,7 @@ class Kernel:
             'PYTEST_CURRENT_TEST': 'classroom/grade/judge.py',
         }
         self._others = _children()
+        self._most_taken, self._looked_s = 0.0, 0.0
         self._manager = KernelManager(kernel_name='python3')
         quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
         self._manager.start_kernel(cwd=str(folder), env=environment, **quiet)
@@ -114,7 +117,10 @@ class Kernel:
         outputs: list[dict] = []
         end = time.monotonic() + limit_s
         interrupted, printed, before = '', 0, limits.counts()
+        # One that is full already may end before it is looked at.
+        self._most_taken = limits.memory_taken(self._manager.provisioner.pid) or self._most_taken
         while True:
+            self._look()
             if not interrupted and (time.monotonic() > end or printed > MOST_PRINTED):
                 interrupted = f'Interrupted after {limit_s:.0f} s.'
                 if printed > MOST_PRINTED:
@@ -146,9 +152,17 @@ class Kernel:
                 printed += len(str(content.get('text', content.get('data', ''))))
                 _add(outputs, dict(output_from_msg(message)))
 
+    def _look(self) -> None:
+        """Look now and then how much memory a cell takes: a kernel that ended does not tell."""
+        if time.monotonic() - self._looked_s > POLL_S:
+            self._looked_s = time.monotonic()
+            taken = limits.memory_taken(self._manager.provisioner.pid)
+            self._most_taken = max(self._most_taken, taken)
+
     def _met(self, before: dict[str, int]) -> str:
         """Return the limit that was met since then, or nothing."""
-        full = limits.is_full(self._manager.provisioner.pid)
+        taken = limits.memory_taken(self._manager.provisioner.pid)
+        full = taken > FULL if taken else self._most_taken > NEARLY_FULL
         return limits.met_since(before) or (limits.MUCH_MEMORY if full else '')
 
 

@@ -58,10 +58,9 @@ def met_since(before: dict[str, int], group: Path = GROUP) -> str:
     return next((limit for limit in COUNTED if now[limit] > before[limit]), '')
 
 
-def is_full(pid: int) -> bool:
-    """Return whether a kernel has taken all its memory, and may have none left to say so."""
+def memory_taken(pid: int) -> float:
+    """Return which part of its memory a kernel has taken, 0 if it has ended. At 1 there is none."""
     with suppress(OSError, ValueError, IndexError):
         status = Path(f'/proc/{pid}/status').read_text()
-        taken_kb = int(status.partition('VmData:')[2].split()[0])
-        return taken_kb > 0.98 * (MEMORY_GB << 20)
-    return False
+        return int(status.partition('VmData:')[2].split()[0]) / (MEMORY_GB << 20)
+    return 0.0

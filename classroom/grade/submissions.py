@@ -3,6 +3,7 @@
 Moodle, `mod/assign/classes/downloader.php`: `Ada Lovelace_123_assignsubmission_file/02.ipynb`, with
 an underscore at the end of the folder before 4.1; without folders
 `Ada Lovelace_123_assignsubmission_file_02.ipynb`. The number is that of the grading worksheet.
+Where students are anonymous, all of them are called Participant, in the language of the teacher.
 
 Canvas, `lib/content_zipper.rb`: `lovelaceada_LATE_123_4567_02.ipynb`. The first number is the
 student's ID in the gradebook, the second that of the file. An anonymous student is
@@ -25,6 +26,7 @@ from pathlib import Path, PurePosixPath
 MOODLE = re.compile(r'(?P<name>[^/]*)_(?P<number>\d+)_assignsubmission_(?P<kind>[a-z]+)_?')
 CANVAS = re.compile(r'(?P<name>.+?)(?P<late>_LATE)?_(?P<number>\d+)_\d+_(?=.)')
 ANONYMOUS = re.compile(r'(?P<late>LATE_)?(?P<name>anon_[A-Za-z0-9]+)_\d+_(?=.)')
+PARTICIPANT = 'Participant'
 ARCHIVES = ('.zip', '.tar', '.tar.gz', '.tgz', '.tar.xz', '.tar.bz2')
 LARGEST = 50_000_000  # bytes of a file
 LARGEST_FILES = 20_000_000  # bytes of all files of a workspace, and
@@ -46,12 +48,16 @@ class File:
 
 @dataclass
 class Submission:
-    """What one student has handed in. `system` is 'moodle', 'canvas' or nothing."""
+    """What one student has handed in. `system` is 'moodle', 'canvas' or nothing.
+
+    `anonymous`: the system tells no name. In Moodle there is a number, in Canvas there is none.
+    """
 
     name: str
     number: str = ''
     system: str = ''
     late: bool = False
+    anonymous: bool = False
     files: list[File] = field(default_factory=list)
 
     @property
@@ -89,7 +95,16 @@ def submissions_of(folder: Path) -> tuple[list[Submission], list[File]]:
         same = found.setdefault((owner.system, owner.number or owner.name), owner)
         same.late |= owner.late
         same.files.append(File(path, name, read))
+    _number_the_anonymous([one for one in found.values() if one.system == 'moodle'])
     return sorted(found.values(), key=lambda one: (one.name.casefold(), one.number)), sheets
+
+
+def _number_the_anonymous(students: list[Submission]) -> None:
+    """Give students of Moodle who all have one name, such as Participant, their numbers in it."""
+    names = {one.name for one in students}
+    if len(names) == 1 and (len(students) > 1 or names == {PARTICIPANT}):
+        for one in students:
+            one.name, one.anonymous = f'{one.name} {one.number}', True
 
 
 def _owner(path: str) -> tuple[Submission | None, str]:
@@ -103,7 +118,7 @@ def _owner(path: str) -> tuple[Submission | None, str]:
         if below:
             continue
         if match := ANONYMOUS.match(part):
-            owner = Submission(match['name'], '', 'canvas', bool(match['late']))
+            owner = Submission(match['name'], '', 'canvas', bool(match['late']), anonymous=True)
             return owner, part[match.end() :]
         if match := CANVAS.match(part):
             owner = Submission(match['name'], match['number'], 'canvas', bool(match['late']))

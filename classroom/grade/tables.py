@@ -1,10 +1,10 @@
 """The tables: grades.csv for you, and the files that Moodle and Canvas import.
 
 Moodle takes its grading worksheet back: *Identifier*, *Grade* and *Last modified (grade)* must be
-there (`mod/assign/feedback/offline/importgradeslib.php`). Canvas takes its gradebook: *Student*,
-*ID*, perhaps the SIS columns, *Section*, then assignments (`lib/gradebook_importer.rb`). If their
-own file lies beside the submissions, it is filled in, and its maximum counts. Otherwise a file with
-the same columns is made.
+there (`mod/assign/feedback/offline/importgradeslib.php`), in the language of the teacher. Canvas
+takes its gradebook: *Student* or *LastName* and *FirstName*, *ID*, perhaps the SIS columns,
+*Section*, then assignments (`lib/gradebook_importer.rb`). If their own file lies beside the
+submissions, it is filled in, and its maximum counts. Otherwise one with the same columns is made.
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ MOODLE = (
     *('Grade can be changed', 'Last modified (submission)', 'Last modified (grade)'),
     'Feedback comments',
 )
+IDENTIFIER = re.compile(r'\D+(\d+)')  # `Participant 501`, in the language of the teacher
+# A part of a status, as `Submitted for grading - 2 days 3 hours late - Graded`: gradingtable.php.
+LATE = re.compile(r' late$')
 MOODLE_NEEDS = {'Identifier', 'Grade', 'Last modified (grade)'}
 CANVAS = ('Student', 'ID', 'SIS User ID', 'SIS Login ID', 'Section')
 POINTS_POSSIBLE = '    Points Possible'  # as Canvas writes it
@@ -70,9 +73,47 @@ def is_moodle(sheet: Sheet) -> bool:
     return bool(sheet.rows) and {*sheet.rows[0]} >= MOODLE_NEEDS
 
 
+def is_foreign(sheet: Sheet, students: list[Submission]) -> bool:
+    """Whether it is a worksheet of Moodle in another language: the students stand in it."""
+    first = [IDENTIFIER.fullmatch(line[0]) for line in sheet.rows[1:] if line]
+    numbers = {student.number for student in students if student.system == 'moodle'}
+    return not is_moodle(sheet) and all(first) and any(match[1] in numbers for match in first)
+
+
 def is_canvas(sheet: Sheet) -> bool:
     header = sheet.rows[0] if sheet.rows else []
-    return len(header) > 3 and header[:2] == ['Student', 'ID'] and 'Section' in header
+    names = ['Student'], ['LastName', 'FirstName']
+    begins = any(header[: len(name) + 1] == [*name, 'ID'] for name in names)
+    return len(header) > 3 and begins and 'Section' in header
+
+
+def note_late(rows: list[Row], sheet: Sheet | None) -> None:
+    """Mark the students who are late by their status in a worksheet."""
+    if sheet is None or 'Status' not in sheet.rows[0]:
+        return
+    at = sheet.rows[0].index('Status')
+    by_number = _by_number(rows)
+    for line in sheet.rows[1:]:
+        is_late = len(line) > at and any(map(LATE.search, line[at].split(' - ')))
+        if is_late and (row := _row_of(line, sheet.rows[0], by_number)):
+            row.student.late = True
+
+
+def _by_number(rows: list[Row]) -> dict[str, Row]:
+    return {row.student.number: row for row in rows if row.student.system == 'moodle'}
+
+
+def _row_of(line: list[str], header: list[str], by_number: dict[str, Row]) -> Row | None:
+    """Return the student of a line of a worksheet, by number and name.
+
+    If a group has handed in, its number may be that of somebody else: the name must be the same,
+    too. The anonymous have no other name than their number.
+    """
+    number = IDENTIFIER.fullmatch(line[header.index('Identifier')])
+    row = by_number.get(number[1]) if number else None
+    if row and not row.student.anonymous and 'Full name' in header:
+        return row if _is_same(line[header.index('Full name')], row.student.name) else None
+    return row
 
 
 def grades(rows: list[Row], lessons: list[Handed], marking: Marking) -> str:
@@ -105,10 +146,9 @@ def harmless(text: str) -> str:
 def moodle(rows: list[Row], most: float, sheet: Sheet | None) -> tuple[str, list[str]]:
     """Return a grading worksheet, and the names of students who are not in it.
 
-    Students of whom nothing was judged are left as they are. If a group has handed in, its number
-    may be that of somebody else: the name must be the same, too.
+    Students of whom nothing was judged are left as they are.
     """
-    by_number = {row.student.number: row for row in rows if row.student.system == 'moodle'}
+    by_number = _by_number(rows)
     if sheet is None:
         lines = [[*MOODLE]]
         for number, row in by_number.items():
@@ -125,10 +165,7 @@ def moodle(rows: list[Row], most: float, sheet: Sheet | None) -> tuple[str, list
     filled, absent = [header], {*by_number}
     for line in lines:
         line = [*line, *[''] * (len(header) - len(line))]
-        number = re.search(r'\d+$', line[at['Identifier']])
-        row = by_number.get(number[0]) if number else None
-        if row and 'Full name' in at and not _is_same(line[at['Full name']], row.student.name):
-            row = None
+        row = _row_of(line, header, by_number)
         if row:
             absent.discard(row.student.number)
         if row and row.results:
@@ -151,8 +188,8 @@ def _is_same(name: str, in_download: str) -> bool:
 
 def canvas(rows: list[Row], most: float, sheet: Sheet | None, title: str) -> str:
     """Return a gradebook with one assignment. Raises ValueError if the sheet has more that fit."""
-    by_number = {row.student.number: row for row in rows if row.student.system == 'canvas'}
-    by_number.pop('', None)  # the anonymous
+    known = [row for row in rows if row.student.system == 'canvas' and not row.student.anonymous]
+    by_number = {row.student.number: row for row in known}
     if sheet is None:
         lines = [[*CANVAS, title], [POINTS_POSSIBLE, *[''] * (len(CANVAS) - 1), f'{most:.10g}']]
         for number, row in by_number.items():
@@ -169,7 +206,7 @@ def canvas(rows: list[Row], most: float, sheet: Sheet | None, title: str) -> str
         raise ValueError(
             f'{sheet.name} has these assignments: {names}. Name yours with ASSIGNMENT= and its id.'
         )
-    column = fit[0]
+    column, number = fit[0], header.index('ID')
     maximum = None
     filled = [[*header[:info], header[column]]]
     for line in lines:
@@ -177,7 +214,7 @@ def canvas(rows: list[Row], most: float, sheet: Sheet | None, title: str) -> str
         score = line[column]
         if 'Points Possible' in line[0]:
             maximum = _number(line[column])
-        elif (row := by_number.get(line[1].strip())) and row.results:
+        elif (row := by_number.get(line[number].strip())) and row.results:
             score = f'{row.points * (maximum or most) / most:.2f}'
         filled.append([*line[:info], score])
     return text_of(filled, sheet.delimiter)

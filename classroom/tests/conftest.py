@@ -10,6 +10,7 @@ from support.waits import wait_for
 
 from classroom.tests.support.classes import running_class
 from classroom.tests.support.deck_page import DeckPage
+from classroom.tests.support.handed_in import submit  # noqa: F401
 
 
 @pytest.fixture

@@ -9,7 +9,20 @@ from support.processes import put
 from classroom.grade import limits
 from helpers.lesson import ROOT
 
-USED = ('chown', 'cksum', 'cut', 'dirname', 'find', 'id', 'mkdir', 'sh', 'sort', 'tr', 'uname')
+USED = (
+    'chown',
+    'cksum',
+    'cut',
+    'dirname',
+    'echo',
+    'find',
+    'id',
+    'mkdir',
+    'sh',
+    'sort',
+    'tr',
+    'uname',
+)
 
 
 @pytest.fixture
@@ -55,6 +68,17 @@ def test_no_image_of_these_lessons(run, answer, problem):
     done = run('lab', f'image) {answer} ;;')
     said = f'{problem}: run `make image`, then try again.\n'
     assert (done.returncode, done.stderr) == (1, said)
+
+
+def test_a_container_that_cannot_run_is_said_once_before_students_are_judged(run):
+    lessons = run('label').stdout.strip()
+    image = f'image) echo {lessons} ;;'
+    done = run('ready', f'{image} run) echo "error setting rlimit type 7" >&2; exit 126 ;;')
+    assert done.returncode == 1
+    said = 'No container can run here (error setting rlimit type 7): RUN_ARGS= adds options.'
+    assert done.stderr.strip() == said
+    done = run('ready', f'{image} run) case $* in *--network\\ none*true) ;; *) exit 9 ;; esac ;;')
+    assert (done.returncode, done.stderr) == (0, '')
 
 
 @pytest.mark.parametrize('cpus', ['', '0.5'])

@@ -9,7 +9,7 @@ from nbformat.v4 import new_code_cell, new_notebook, new_output
 from classroom.deck.copies import Copies
 from classroom.plan import plan_of
 from classroom.present import main
-from helpers.lesson import ROOT, lessons, minutes_of_note
+from helpers.lesson import ROOT, Lesson, lessons, minutes_of_note, path_of
 from tools import lab
 from tools.lessons.timetables import timetables
 
@@ -120,6 +120,25 @@ def test_a_timetable_has_its_steps_and_minutes_only(tmp_path, title):
     assert minutes == {name: known[name].minutes_of(steps) for name, steps in plan.steps.items()}
     for name, following in zip(plan.steps, [*plan.steps][1:], strict=False):
         assert f']({following})' in shown[name].cells[-1].source
+
+
+def test_a_slide_says_whether_students_write_its_task_today(tmp_path):
+    """As teaching.md says it of the 90 minutes: tasks 3 and 4 of lesson 02."""
+    (tmp_path / 'notebooks').symlink_to(ROOT / 'notebooks')
+    copies = Copies(tmp_path, '90 minutes')
+    copies.make([])
+    path = path_of('lose_messages')
+    says = {}
+    for task in Lesson(path.name, nbformat.read(copies.folder / path.name, as_version=4)).tasks:
+        first, empty, said, *rest = task.heading.source.splitlines()
+        assert first.startswith(f'### ✎ Task {task.number}')
+        assert (empty, rest[0]) == ('', '')
+        says[task.name] = said
+    run = dict.fromkeys(says, '**Today: run the solution.**')
+    write = dict.fromkeys(['two_executors', 'be_the_queue'], '**Today: write it.**')
+    assert says == run | write
+    other = nbformat.read(copies.folder / path_of('publish_and_subscribe').name, as_version=4)
+    assert not any('Today:' in cell.source for cell in other.cells)
 
 
 def test_a_timetable_is_named_by_a_word():

@@ -13,10 +13,11 @@ TEXTS = tables.texts_of()
 def test_a_timetable_is_read():
     text = (
         'A day:\n- {minutes: 8, text: Welcome}\n- {lesson: one_thing, steps: [2, 3]}\n'
-        '- {lesson: another_thing}\n'
+        '- {lesson: another_thing}\n- {lesson: last, steps: [1, 2], write: [one, two]}\n'
     )
     rows = Row(minutes=8, text='Welcome'), Row('one_thing', (2, 3)), Row('another_thing')
-    assert read(text) == [Timetable('A day', rows)]
+    last = Row('last', (1, 2), write=('one', 'two'))
+    assert read(text) == [Timetable('A day', (*rows, last))]
 
 
 @pytest.mark.parametrize(
@@ -32,6 +33,8 @@ def test_a_timetable_is_read():
         ('A day:\n- {lesson: one_thing, steps: [3, 2]}', "row 1 of 'A day'"),
         ('A day:\n- {lesson: one_thing, steps: 3}', "row 1 of 'A day'"),
         ('A day:\n- {lesson: one_thing, minutes: 3}', "row 1 of 'A day'"),
+        ('A day:\n- {lesson: one_thing, steps: [1, 2], read: [x]}', "row 1 of 'A day'"),
+        ('A day:\n- {lesson: one_thing, steps: [1, 2], write: x}', "row 1 of 'A day'"),
         ('A day:\n- {minutes: many, text: Break}', "row 1 of 'A day'"),
         ('A day:\n- {minutes: 0, text: Break}', "row 1 of 'A day'"),
     ],
@@ -48,6 +51,7 @@ def test_what_no_notebook_has_gives_one_sentence():
     for row, says in (
         (Row('lose_the_way'), 'names lose_the_way, which is no lesson'),
         (Row('lose_messages', (1, 40)), 'step 40 has no note'),
+        (Row('lose_messages', (1, 2), write=('fly',)), 'lose_messages has no task fly'),
     ):
         with pytest.raises(ValueError, match=says):
             minutes_and_lesson(row, known)

@@ -33,7 +33,7 @@ from helpers.lesson import (
 )
 from tools.lessons import timetables
 from tools.lessons.clean import clean, text_of
-from tools.lessons.timetables import Timetable, minutes_and_lesson
+from tools.lessons.timetables import Row, Timetable, minutes_and_lesson
 
 Rows = list[list[str]]  # of a table, the first is its head
 Texts = dict[str, str]  # by the path in the checkout, such as notebooks/02_lose_messages.ipynb
@@ -175,7 +175,7 @@ def _timetable(title: str, lessons: list[Lesson], known: list[Timetable]) -> Row
     at, table = 0, [['from', 'minutes', '']]
     for row in found[0].rows:
         minutes, lesson = minutes_and_lesson(row, lessons)
-        event = _link_to(lesson, row.steps) if lesson else row.text
+        event = _link_to(lesson, row.steps) + _to_write(lesson, row) if lesson else row.text
         table.append([_time(at), str(minutes), event])
         at += minutes
     return [*table, [_time(at), '', 'End']]
@@ -187,6 +187,16 @@ def _link_to(lesson: Lesson, steps: tuple[int, int] | None) -> str:
         return link
     first, last = steps
     return f'{link}, step {first}' if first == last else f'{link}, steps {first} to {last}'
+
+
+def _to_write(lesson: Lesson, row: Row) -> str:
+    """Return which tasks students write, if these are not all."""
+    tasks = [task for task in lesson.tasks if task.name in row.write]
+    if not tasks:
+        return ''
+    links = [f'[task {one.number}](notebooks/{lesson.file}{one.anchor})' for one in tasks]
+    which = ' and '.join(filter(None, [', '.join(links[:-1]), links[-1]]))
+    return f'. Students write {which} only, and run the solutions of the others'
 
 
 def _time(minutes: int) -> str:

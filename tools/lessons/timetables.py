@@ -4,9 +4,11 @@
     - {minutes: 8, text: Welcome}
     - {lesson: start_here, steps: [1, 2]}
     - {lesson: publish_and_subscribe}
+    - {lesson: lose_messages, steps: [1, 6], write: [two_executors, be_the_queue]}
 
 A title, and what happens, in its order: a lesson by its name, all of it or from one step to
-another; or a text, and its minutes. The minutes of a lesson follow from its notebook.
+another; or a text, and its minutes. The minutes of a lesson follow from its notebook. `write` has
+the tasks that students write, if these are not all: of the others they run the solutions.
 """
 
 from dataclasses import dataclass
@@ -27,6 +29,7 @@ class Row:
     steps: tuple[int, int] | None = None
     minutes: int = 0
     text: str = ''
+    write: tuple[str, ...] = ()  # names of tasks: none for all of them
 
 
 @dataclass(frozen=True)
@@ -58,12 +61,14 @@ def read(text: str) -> list[Timetable]:
 def minutes_and_lesson(row: Row, lessons: list[Lesson]) -> tuple[int, Lesson | None]:
     """Return the minutes of a row, and its lesson, None for another row.
 
-    Raises ValueError with one sentence if there is no such lesson, or no such step in it.
+    Raises ValueError with one sentence if there is no such lesson, or no such step or task in it.
     """
     if not row.lesson:
         return row.minutes, None
     for lesson in lessons:
         if lesson.name == row.lesson:
+            if unknown := {*row.write} - {task.name for task in lesson.tasks}:
+                raise ValueError(f'{FILE}: {row.lesson} has no task {", ".join(sorted(unknown))}.')
             return lesson.minutes_of(row.steps), lesson
     raise ValueError(f'{FILE} names {row.lesson}, which is no lesson.')
 
@@ -81,7 +86,9 @@ def _row(title: str, number: int, row: object) -> Row:
         case {'lesson': str(lesson)} if len(row) == 1:
             return Row(lesson)
         case {'lesson': str(lesson), 'steps': [int(first), int(last)]} if first <= last:
-            return Row(lesson, (first, last))
+            write = row.get('write', [])
+            if row.keys() <= {'lesson', 'steps', 'write'} and isinstance(write, list):
+                return Row(lesson, (first, last), write=tuple(map(str, write)))
     raise ValueError(
         f'{FILE}: row {number} of {title!r} is {row!r}. Write {{minutes: 15, text: Break}}, '
         '{lesson: start_here} or {lesson: start_here, steps: [1, 2]}.'

@@ -304,7 +304,8 @@ class Student:
 
     async def log_in(self) -> None:
         self.token = await self.hub.token_of(self.name)
-        await self.hub.ask(f'/hub/api/users/{self.name}/server', 'POST', {})
+        if not (await self.hub.ask(f'/hub/api/users/{self.name}'))['server']:
+            await self.hub.ask(f'/hub/api/users/{self.name}/server', 'POST', {})
         async with asyncio.timeout(START_S):
             while not (user := await self.hub.ask(f'/hub/api/users/{self.name}'))['server']:
                 assert user['pending'], f'the server of {self.name} did not start'
