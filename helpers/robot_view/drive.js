@@ -29,6 +29,10 @@ function drive({ step, poses, commands, scans, events, bumps, guess, strip = Inf
     return { x, y, yaw, v, w };
   }
 
+  // What the brake acted on when it was decided stays: at the bump, or when it was told to stand.
+  const drives = commands.findLastIndex(([, v, w]) => v || w);
+  const decided = bumps[0] ?? (drives < 0 ? Infinity : commands[drives + 1]?.[0] ?? Infinity);
+
   const latest = (rows, ms) => rows.findLast(([at]) => at <= ms);
 
   // The path around what the laser saw, from where it was.
@@ -46,12 +50,14 @@ function drive({ step, poses, commands, scans, events, bumps, guess, strip = Inf
 
   // All that is seen at a time.
   function look(ms) {
-    const till = Math.min(ms, bumps[0] ?? ms); // what the brake acted on at the bump stays
+    const till = Math.min(ms, decided);
     const command = latest(commands, till);
+    // Not each scan is saved: the time of the one that it acts on is that of the command, less its age.
     const taken = command && command[3] >= 0 ? scans.findLast(([, seq]) => seq <= command[3]) : undefined;
+    const seen = taken && command[0] - command[4];
     const now = latest(scans, ms);
     return {
-      ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]), age: taken && (till - taken[0]) / 1000,
+      ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(seen), age: taken && (till - seen) / 1000,
       told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}, ${seconds(command[4])} s old`) : 'nothing yet',
     };
   }
@@ -88,6 +94,7 @@ function ringAt(svg, { x, y, yaw }, r) {
 }
 
 function floor(run, record, svg) {
+  legible(svg);
   const find = name => svg.querySelector(`.${name}`);
   find('all').setAttribute('stroke-opacity', '.3');
   const marks = ['seconds', 'bumps'].map(name => {
