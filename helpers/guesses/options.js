@@ -94,7 +94,7 @@ const optionsKind = (() => {
       const button = place === null ? [] : [buttons[place]];
       // The name of its row is read there.
       if (button.length && names[place] === name) bare(button[0]);
-      return element('td', {}, ...button, ...(came ? [element('span', {}, texts.get(name)?.[i] ?? '')] : []));
+      return element('td', {}, ...button, ...(came ? [' ', element('span', {}, texts.get(name)?.[i] ?? '')] : []));
     };
     const head = element('tr', {}, element('td'), ...all.map(name => element('th', { scope: 'col' }, name)));
     const body = rows.map(([name, row]) => element('tr', {}, element('th', { scope: 'row' }, name), ...all.map((_, i) => cell(name, row, i))));
