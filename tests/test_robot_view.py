@@ -133,15 +133,41 @@ def test_a_picture_without_scripts_is_at_the_bump():
     assert '"opens":"end"' in unescape(html(at_end))
 
 
-def test_the_live_laser_belongs_to_its_pose():
+def live_record(view):
+    return json.loads(unescape(re.search("data-record='([^']*)'", view.html())[1]))
+
+
+def test_the_live_laser_belongs_to_its_pose(script):
     # The scan was made at x 1, and the robot has driven on.
-    record = made_drive((0, 1, 0.5), (2, 2, 0.5))
+    record = made_drive(*((t / 50, 1 + t / 100, 0.5) for t in range(101)))
     ranges = np.full(181, 0.5, np.float32)
     record.scans.append(Scan(0, 0.0, 0, ranges, -math.pi / 2, math.pi / 180))
-    robot = SimpleNamespace(record=record)
-    drawn = LiveView(robot, None).html()
-    assert re.search(r'class="fan" d="M1\.00 1\.25L', drawn)
-    assert 'class="robot" transform="translate(2.000 1.250)"' in drawn
+    [seen] = script(live_record(LiveView(SimpleNamespace(record=record), None)), [2000])['seen']
+    assert seen['fan'].startswith('M1 1.25L')
+    assert (seen['x'], seen['y']) == (2, 1.25)
+
+
+def test_a_telling_that_was_lost_is_no_harm():
+    record = made_drive((0, 1, 0.5))
+    view = LiveView(SimpleNamespace(record=record), None)
+    shown = live_record(view)['poses']
+    for step in range(1, 400):
+        record.poses.append(Step(step / 50, 1 + step / 100, 1.25, 0.0, 0.5, 0.0))
+        if step % 4:
+            continue
+        news = view.news()['rows']['poses']
+        if step % 100:  # else it is lost
+            shown[news['from'] :] = news['added']
+        assert len(news['added']) <= 30
+    assert [row[0] for row in shown] == [round(row.x, 3) for row in record.poses[::5]]
+
+
+def test_a_robot_that_leaves_its_strip_is_seen_on_the_floor():
+    record = made_drive((0, 1, 0.5))
+    view = LiveView(SimpleNamespace(record=record), None)
+    assert 'strip' in live_record(view)
+    record.poses.append(Step(0.02, 1, 2.0, 1.6, 0.5, 0.0))
+    assert 'strip' not in live_record(LiveView(SimpleNamespace(record=record), None))
 
 
 # Beside the queue
@@ -233,7 +259,11 @@ def test_the_replay_takes_the_place_of_the_pictures(watched):
     assert data['text/plain'] == SAID
     assert kind == ('update_display_data' if watched else 'display_data')
     assert bool(pictures) == watched
-    assert all('robot-live' in data['text/html'] for _, data in pictures)
+    if watched:
+        picture, *feed, over = [data['text/html'] for _, data in pictures]
+        assert 'robot-live' in picture
+        assert all("CustomEvent('drive'" in telling for telling in feed)
+        assert over == ''  # nothing of it is saved
 
 
 def test_a_tour_by_hand_says_what_is_done():

@@ -1,9 +1,10 @@
 // Shows what the server sends. What students wrote is put into the page as text, never as HTML.
 //
 // #wall shows how to join only. #cell=ID shows the guesses of one cell, for a slide, which says 'show'
-// to have its button pressed.
+// to have its button pressed, and 'drawn' or 'bars': whether it draws them itself.
 
 const find = id => document.getElementById(id);
+let drawn = false; // by the slide
 const shown = {}; // by the id of an element: what was put there last, as JSON
 
 function element(tag, text = '', properties = {}) {
@@ -74,7 +75,7 @@ function end() {
 function show(state) {
   if (state.over) return end();
   const [, cell] = location.hash.match(/^#cell=(.*)/) ?? [];
-  document.body.className = cell ? 'slide' : location.hash === '#wall' ? 'wall' : '';
+  document.body.className = cell ? `slide${drawn ? ' drawn' : ''}` : location.hash === '#wall' ? 'wall' : '';
   find('trouble').textContent = '';
   const { planned, own, all, gone } = state;
   const left = minutes => (minutes < 0 ? `0 (${-minutes} over)` : minutes);
@@ -136,7 +137,10 @@ onhashchange = () => {
   show(last);
 };
 onmessage = ({ source, data }) => {
-  if (source === parent && data === 'show') document.querySelector('.count button')?.click();
+  if (source !== parent) return;
+  if (data === 'show') return document.querySelector('.count button')?.click();
+  drawn = data === 'drawn';
+  if (last) show(last);
 };
 find('lessons').onchange = event => ask('go', { lesson: event.target.value, step: 0 });
 find('end').onclick = async () => {

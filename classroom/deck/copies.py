@@ -1,7 +1,8 @@
 """The copies of lessons that the deck shows.
 
 What happens in front of a class stays in the copies. All lessons have one, because slides link to
-each other. A copy in which nothing has happened follows its lesson. Any other is kept.
+each other. A copy in which nothing has happened follows its lesson. Any other is kept. Whatever a
+teacher has answered in the lesson: guesses and tasks begin as they were delivered.
 
 A copy says of itself, in its metadata `deck`, how it was made (`origin`, `made`), and the deck
 keeps its place there (`place`, `began`), and whether it was used before (`used`).
@@ -18,9 +19,11 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_markdown_cell
 
 from classroom.deck.slides import folded, slide_types
+from classroom.deck.texts import shortened
 from classroom.plan import NO_PLAN, Plan, plan_of
 from helpers import lesson
 from helpers.notebook import MARK
+from tools.lessons.answers import delivered
 from tools.lessons.clean import text_of, write
 
 FOLDER = 'presentation'
@@ -78,8 +81,12 @@ class Copies:
     def _make(self, path: Path) -> None:
         notebook = nbformat.read(path, as_version=4)
         notebook.metadata.pop(MARK, None)  # the slides show the outputs of this copy
+        as_delivered = delivered(path)
+        for cell in notebook.cells:
+            cell.source = as_delivered.get(cell.id, cell.source)
         self._leave_out(notebook, path.name)
-        for cell, kind in zip(notebook.cells, slide_types(notebook), strict=True):
+        types = slide_types(notebook)
+        for cell, kind in zip(notebook.cells, types, strict=True):
             cell.metadata.pop('slideshow', None)
             if kind:
                 cell.metadata.slideshow = nbformat.from_dict({'slide_type': kind})
@@ -87,6 +94,7 @@ class Copies:
                 cell.metadata.jupyter = {'source_hidden': True}
             if cell.cell_type == 'code':
                 cell.outputs, cell.execution_count = [], None
+        notebook.cells = shortened(notebook.cells, types)
         about = {'origin': self._origin_of(path), 'made': _state(notebook)}
         notebook.metadata[KEY] = nbformat.from_dict(about)
         write(self.folder / path.name, text_of(notebook))

@@ -3,9 +3,9 @@
 A title and a step (`#`, `##`) start a slide. A text starts one below it if code follows, and so
 does a task or a question (`### ✎`, `### Question`); a text without code joins what it is about.
 Code joins its text, as long as the slide shows not too much of it. The check and the solution of a
-task join the cell that they are about, whatever its length. A cell with the tag `deck-break`
-always starts a slide (JupyterLab, Property Inspector). A raw cell is a note for the instructor, and
-left out.
+task join the cell that they are about, whatever its length, and end its slide. So does a guess:
+what answers it has a slide of its own. A cell with the tag `deck-break` always starts a slide
+(JupyterLab, Property Inspector). A raw cell is a note for the instructor, and left out.
 
 The rule knows no heights: the deck makes a slide that is too full a little smaller, and scrolls it.
 """
@@ -14,9 +14,10 @@ import ast
 
 from nbformat import NotebookNode
 
-from helpers.lesson import has_heading, tags
+from helpers.lesson import WRITTEN, has_heading, tags
 
 LINES = 18  # of code that is not folded: more of it is on the next slide
+HELPERS = ast.Import, ast.ImportFrom, ast.FunctionDef, ast.Assign  # of a cell that runs nothing
 
 
 def slide_types(notebook: NotebookNode) -> list[str]:
@@ -44,7 +45,8 @@ def _starts(cell: NotebookNode, slide: list[NotebookNode], code_follows: bool) -
         return slide[-1].cell_type != 'code'
     if cell.cell_type == 'code':
         lines = sum(_lines(other) for other in [*slide, cell])
-        return _lines(cell) > 0 and lines > LINES and slide[-1].cell_type == 'code'
+        too_many = _lines(cell) > 0 and lines > LINES and slide[-1].cell_type == 'code'
+        return too_many or bool({'predict', 'check', 'solution'} & tags(slide[-1]))
     if has_heading(cell, '### Question '):
         return any(other.cell_type == 'code' or has_heading(other, '### ') for other in slide)
     has_code = any(other.cell_type == 'code' for other in slide)
@@ -64,13 +66,17 @@ def _lines(cell: NotebookNode) -> int:
 
 
 def folded(cell: NotebookNode) -> bool:
-    """Return whether a slide shows of a cell only the first line and the outputs."""
-    if cell.cell_type != 'code':
+    """Return whether a slide shows of a cell only the first line and the outputs.
+
+    So it is with what was folded in the lesson, with imports, and with functions that help.
+    """
+    if cell.cell_type != 'code' or WRITTEN & tags(cell):
         return False
     if cell.metadata.get('jupyter', {}).get('source_hidden'):
         return True
     try:
-        statements = ast.parse(cell.source).body
+        kinds = {type(statement) for statement in ast.parse(cell.source).body}
     except SyntaxError:  # a magic command
         return False
-    return bool(statements) and all(isinstance(s, ast.Import | ast.ImportFrom) for s in statements)
+    helps = kinds <= {ast.Import, ast.ImportFrom} or ast.FunctionDef in kinds
+    return bool(kinds) and helps and kinds <= {*HELPERS}

@@ -250,6 +250,13 @@ def into_a_cell(deck):
     deck.page.wait_for_slide(place)
 
 
+def whole_texts(deck):
+    needs = deck.tab.locator('.deck-on strong', has_text='You need')
+    for count in (0, 1, 0):
+        assert needs.count() == count
+        deck.key('t')
+
+
 def without_a_class(deck):
     """With one: see test_class_in_browser.py."""
     deck.key('s')
@@ -323,6 +330,7 @@ ROWS = {
     'A A': runs_above,
     'I I, 0 0': stops,
     'Enter, or a click': into_a_cell,
+    'T': whole_texts,
     'S, J': without_a_class,
     'B, or .': black,
     'N': opens_notes,
@@ -348,7 +356,7 @@ def test_other_letters_do_nothing(deck):
     deck.present(LESSON)
     code = Deck(deck).walk_to_code()
     before = deck.cells()
-    for key in [*'cdefghklmopqtuvwxyzdd123456', 'Shift+M', 'Shift+V', 'Shift+L', 'Alt+Enter']:
+    for key in [*'cdefghklmopquvwxyzdd123456', 'Shift+M', 'Shift+V', 'Shift+L', 'Alt+Enter']:
         deck.page.keyboard.press(key)
     deck.page.keyboard.press('Control+Z')
     assert deck.cells() == before

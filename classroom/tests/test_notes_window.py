@@ -8,18 +8,25 @@ from support.lab_server import ROOT, server
 from support.waits import wait_for
 
 from classroom.deck.slides import slide_types
+from classroom.deck.texts import shortened
 from classroom.tests.support.deck_page import DeckPage
 from helpers.lesson import first_heading, minutes_of_note, path_of, read, tags, without_links
 
 LESSON = path_of('lose_messages').name
 KNOWN = read((ROOT / 'notebooks' / LESSON).read_text(), LESSON)
-CELLS = KNOWN.notebook.cells
+TYPES = slide_types(KNOWN.notebook)
+STARTS = {
+    cell.id
+    for cell, kind in zip(KNOWN.notebook.cells, TYPES, strict=True)
+    if kind in ('slide', 'subslide')
+}
+CELLS = shortened(KNOWN.notebook.cells, TYPES)  # those of the copy
 # The third note of a step, below its heading, and the heading after this step.
 NOTE = [i for i, cell in enumerate(CELLS) if 'notes' in tags(cell)][3]
 NEXT = next(i for i, cell in enumerate(CELLS) if i > NOTE and cell.source.startswith('## '))
 OWN = minutes_of_note(CELLS[NOTE].source)
 PLANNED = sum(minutes_of_note(cell.source) for cell in CELLS[:NEXT])
-SLIDES = [kind in ('slide', 'subslide') for kind in slide_types(KNOWN.notebook)]
+SLIDES = [cell.id in STARTS for cell in CELLS]
 SHOWS = "slide => document.querySelector('#slide').textContent === slide"
 
 
@@ -51,6 +58,7 @@ def window(deck):
 def test_the_window_follows_the_deck(deck, window):
     wait_for_place(window, 0)
     assert 'the lesson in a class' in window.locator('#notes').inner_text()
+    assert 'You need' in window.locator('#rest').inner_text()  # the slide does not say it
     while deck.active() < NEXT:
         promised = words(window.locator('#next').inner_text())
         place = deck.go_on()
@@ -64,7 +72,9 @@ def test_the_window_follows_the_deck(deck, window):
         window.locator(f'#{name}').inner_text()
         for name in ('step', 'own', 'planned', 'all', 'gone')
     ]
-    heading = first_heading(CELLS[NOTE - 1].source)
+    heading = next(
+        first_heading(cell.source) for cell in CELLS[NOTE::-1] if cell.source.startswith('## ')
+    )
     assert shown == [heading, str(OWN), str(PLANNED), str(KNOWN.minutes), '0']
     assert words(window.locator('#notes').inner_text()) == words(without_links(CELLS[NOTE].source))
     window.screenshot(path=deck.artefacts / 'notes_window.png')

@@ -1,6 +1,7 @@
 """The copies that `make present` shows: they keep what was typed, and lessons stay as they are."""
 
 import socket
+import subprocess
 
 import nbformat
 import pytest
@@ -64,6 +65,28 @@ def test_what_was_typed_is_kept_until_thrown_away(root):
     assert nbformat.read(copy, as_version=4).metadata.deck.used  # the deck says it
     assert code(copy_of(root, new=True)).source == 'newer()'
     assert code(other).source == 'typed()'
+
+
+def test_what_a_teacher_has_answered_in_the_lesson_is_not_in_the_copy(root):
+    path = root / 'notebooks/02_lose.ipynb'
+    cells = [
+        new_code_cell('my_guess = guess("How many?", ...)', metadata={'tags': ['predict']}),
+        new_code_cell('# Your code', metadata={'tags': ['exercise']}),
+        new_code_cell('remember(one_name=..., other_name=...)'),
+        new_code_cell('run()'),
+    ]
+    nbformat.write(new_notebook(cells=cells), path)
+    for command in (['init', '-q'], ['add', '.'], ['commit', '-qm', 'Deliver']):
+        author = ['-c', 'user.name=a', '-c', 'user.email=a@b.c']
+        subprocess.run(['git', *author, *command], cwd=root, check=True)
+    delivered = [cell.source for cell in nbformat.read(path, as_version=4).cells]
+    notebook = nbformat.read(path, as_version=4)
+    for cell in notebook.cells:
+        cell.source = f'mine = {len(cell.source)}'
+    nbformat.write(notebook, path)
+    sources = [cell.source for cell in nbformat.read(copy_of(root), as_version=4).cells]
+    # What a teacher has changed elsewhere is meant for the class.
+    assert sources == [*delivered[:3], notebook.cells[3].source]
 
 
 def test_what_was_run_is_kept_too(root):

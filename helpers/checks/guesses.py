@@ -9,8 +9,9 @@ the same in every fresh run from top to bottom.
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Set
+from collections.abc import Mapping, Set
 from numbers import Integral, Real
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,7 @@ from IPython.display import display
 
 from helpers.checks import classroom, progress
 from helpers.checks.portrait import line_of
-from helpers.notebook import can_ask
+from helpers.notebook import BEGIN_EMPTY, can_ask
 
 if TYPE_CHECKING:
     from helpers.guesses import Guess
@@ -33,6 +34,7 @@ def compare_prediction(
     outcome: object,
     tolerance: float = 0,
     because: str | None = None,
+    table: Mapping[str, str | Mapping[str, str]] | None = None,
 ) -> None:
     """Print the question, the guess, whether the guess was right, and if not, the right answer.
 
@@ -48,7 +50,9 @@ def compare_prediction(
     The right answer is then printed for a student only, not in a run without one.
 
     For a guess that was made in a picture, `outcome` is what its kind compares: the robot, a
-    number, or what came out of the options. The gap is shown there, in one sentence.
+    number, or what came out of the options. The gap is shown there, in one sentence. If cells of a
+    table were ticked, `table` is what has come into them: texts by the options, or by row and
+    column, which may be more than were asked about.
 
     `because` is a sentence that explains the outcome. It is printed after any guess. If there is no
     guess yet, a student is asked for one; a run without a student, as in CI, prints the answer. A
@@ -59,7 +63,7 @@ def compare_prediction(
     # Loaded where a guess was made in a picture, and by nothing else: it is heavy.
     pictures = sys.modules.get('helpers.guesses')
     if pictures and isinstance(guess, pictures.Guess):
-        _compare(question, guess, outcome, tolerance, because)
+        _compare(question, guess, outcome, tolerance, because, table)
         return
     outcome, guess = _plain(outcome), _plain(guess)
     wanted = _kind(outcome)
@@ -91,24 +95,35 @@ def compare_prediction(
 
 
 def _compare(
-    question: str, guess: Guess, measured: object, tolerance: float, because: str | None
+    question: str,
+    guess: Guess,
+    measured: object,
+    tolerance: float,
+    because: str | None,
+    table: Mapping[str, str | Mapping[str, str]] | None,
 ) -> None:
     """Show the gap between a guess that was made in a picture and what came out."""
+    from helpers.guesses import Gap
+
     print(question)
     try:
         outcome = guess.kind.outcome(_plain(measured), guess.run, tolerance)
     except ValueError:  # a student's own program may do what nobody has thought of
         print(f'  The answer is {_written(_plain(measured))}: it was none of the options.')
         return
+    if table is not None:
+        outcome['table'] = guess.kind.came(table)
+    # In front of a class there may be no guess but those of the class.
+    in_class = bool(os.environ.get(BEGIN_EMPTY))
     if guess.value is None:
-        if _has_student():
+        if _has_student() and not in_class:
             print(f'  No guess yet. {guess.kind.asks} Then run this cell again.')
             return
-        if answer := guess.kind.answer(outcome):
+        if table is not None or (in_class and guess.run is None):
+            display(Gap(guess, outcome))
+        elif answer := guess.kind.answer(outcome):
             print(f'  The answer is {answer}.')
     else:
-        from helpers.guesses import Gap
-
         display(Gap(guess, outcome))
         if lesson := progress.this_lesson():
             progress.add(line_of(lesson, guess, outcome))

@@ -1,4 +1,4 @@
-"""A guess as an object in the picture that answers it: a place, a level, or a choice of options.
+"""A guess as an object in the picture that answers it: a place, a level, ticks, or options.
 
     guess = Guess('How many are received?', Level(0, 41, 'messages'))
     show(guess)                     a cell shows it; the student sets it there
@@ -11,7 +11,7 @@ told at once, elsewhere the browser keeps it. The kind of a place on a floor is 
 """
 
 from helpers.guesses.guess import CSS, MEMORY, Gap, Guess, Kind, show
-from helpers.guesses.kinds import Level, Options, Rows, kind_of, number_of
+from helpers.guesses.kinds import Level, Options, Rows, Ticks, kind_of, number_of
 
 __all__ = [
     'CSS',
@@ -22,6 +22,7 @@ __all__ = [
     'Level',
     'Options',
     'Rows',
+    'Ticks',
     'kind_of',
     'number_of',
     'show',

@@ -9,8 +9,8 @@ function show(root, record) {
 
   function tell(value) {
     root.classList.toggle('guess-new', value === null);
-    if (value === null) says.textContent = record.outcome ? '' : record.asks;
-    else if (record.outcome) says.textContent = kind.gap(record, value, record.outcome).says;
+    if (record.outcome) says.textContent = kind.gap(record, value, record.outcome).says;
+    else if (value === null) says.textContent = record.asks;
     else says.replaceChildren('You say: ', element('b', {}, kind.said(record, value)));
   }
 

@@ -102,19 +102,28 @@ class Guess:
 class Gap:
     """A guess and what came out: the gap, in words and in the picture, and its cause.
 
-    The picture is left out if that of the run has it already.
+    The picture is left out if that of the run has it already. Without a guess it shows what came
+    out, and on a slide what the class has guessed.
     """
 
     guess: Guess
     outcome: Mapping
 
     def __str__(self) -> str:
-        says = self.guess.gap(self.outcome)['says']
-        return f'  You say: {self.guess.said()}\n  {says}'
+        if self.guess.value is None:
+            answer = self.guess.kind.answer(self.outcome)
+            lines = [f'The answer is {answer}.'] if answer else []
+        else:
+            lines = [f'You say: {self.guess.said()}', self.guess.gap(self.outcome)['says']]
+        table = self.outcome.get('table', {'columns': [], 'rows': []})
+        for name, texts in table['rows']:
+            cells = zip(table['columns'], texts, strict=True)
+            lines.append(f'{name}: {", ".join(f"{column} {text}" for column, text in cells)}.')
+        return '\n'.join(f'  {line}' for line in lines)
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         guess = self.guess
-        if guess.run is not None:
+        if guess.run is not None and guess.value is not None:
             html = f'<p>You said: {escape(guess.said())}</p>'
             return {'text/plain': str(self), 'text/html': html}
         record = attribute({**guess.record(), 'outcome': dict(self.outcome)})

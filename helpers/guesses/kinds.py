@@ -13,6 +13,7 @@ from helpers.guesses.guess import Kind
 HERE = Path(__file__).parent
 YES, NO = {'yes', 'y', 'true'}, {'no', 'n', 'false'}
 MOST_STEPS = 100  # of the keys, from one end of an axis to the other
+FEW = 10  # whole numbers, at most, are a button each
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Level:
     unit: str = ''
     marks: Mapping[str, float] = field(default_factory=dict)
 
-    scripts = (HERE / 'level.js',)
+    scripts = (HERE / 'level.js', HERE / 'options.js')
 
     def __post_init__(self) -> None:
         if not self.low < self.high:
@@ -44,7 +45,14 @@ class Level:
         return isinstance(self.low, int) and isinstance(self.high, int)
 
     @property
+    def are_few(self) -> bool:
+        """Whether the numbers are so few that each has a button, and no axis is drawn."""
+        return self.is_whole and self.high - self.low < FEW and not self.marks
+
+    @property
     def asks(self) -> str:
+        if self.are_few:
+            return f'Choose the number of {self.unit}.' if self.unit else 'Choose a number.'
         return 'Put your line on the axis: click there, drag it, or press the arrow keys.'
 
     @property
@@ -62,6 +70,7 @@ class Level:
             'unit': self.unit,
             'step': step,
             'marks': dict(self.marks),
+            'few': self.are_few,
         }
 
     def picture(self) -> str:
@@ -178,6 +187,40 @@ class Options:
 
 
 @dataclass(frozen=True)
+class Ticks(Options):
+    """Options that are cells of the table that comes: any number of them is ticked.
+
+    `cells` are the names of the options by row and column. A row may lack a column.
+    """
+
+    cells: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+
+    @property
+    def asks(self) -> str:
+        return 'Tick the cells of which you expect it.'
+
+    def record(self) -> dict:
+        names = [*self.values]
+        places = {
+            name: {column: names.index(option) for column, option in row.items()}
+            for name, row in self.cells.items()
+        }
+        return super().record() | {'table': _table(places, None)}
+
+    def came(self, texts: Mapping[str, str | Mapping[str, str]]) -> dict:
+        """Return the table that has come, as the script shows it.
+
+        `texts` are by the options, or by row and column, which may be more than were asked about.
+        """
+        if all(isinstance(text, str) for text in texts.values()):
+            texts = {
+                name: {column: texts.get(option, '') for column, option in row.items()}
+                for name, row in self.cells.items()
+            }
+        return _table(texts, '')
+
+
+@dataclass(frozen=True)
 class Rows:
     """A row for each thing that is asked about, by its name, and one option chosen in each."""
 
@@ -236,8 +279,9 @@ def kind_of(
 ) -> Kind:
     """Return the kind of a guess that `on` names: `bool`, an axis, options, or rows of them.
 
-    With a unit, a pair of numbers is an axis. A dict of options is several rows. `marks` are
-    numbers on the axis, or the points of the options, by their names.
+    With a unit, a pair of numbers is an axis. A dict of options is several rows, and a dict of
+    dicts a table whose cells are ticked. `marks` are numbers on the axis, or the points of the
+    options, by their names.
 
     Raises TypeError for anything else.
     """
@@ -247,6 +291,8 @@ def kind_of(
         return Level(*map(float, on), unit, marks or {})
     if isinstance(on, range) and not several:
         return Level(on[0], on[-1], unit, marks or {})
+    if isinstance(on, Mapping) and on and all(isinstance(row, Mapping) for row in on.values()):
+        return _ticks(on)
     if isinstance(on, Mapping) and on and all(map(_is_options, on.values())):
         return Rows({name: _options(one) for name, one in on.items()})
     if isinstance(on, Mapping) or _is_options(on):
@@ -267,6 +313,21 @@ def _options(on: object, several: bool | int = False, points: Mapping | None = N
         return Options(dict(on), several, points)
     values = sorted(on, key=str) if isinstance(on, AbstractSet) else on
     return Options({str(value): value for value in values}, several, points)
+
+
+def _table(rows: Mapping[str, Mapping[str, object]], empty: object) -> dict:
+    """Return the columns of all rows, and of each row its name and what its cells hold."""
+    columns = list(dict.fromkeys(column for row in rows.values() for column in row))
+    cells = [[name, [row.get(column, empty) for column in columns]] for name, row in rows.items()]
+    return {'columns': columns, 'rows': cells}
+
+
+def _ticks(on: Mapping[str, Mapping[str, object]]) -> Ticks:
+    values = [value for row in on.values() for value in row.values()]
+    named = {
+        name: {column: str(value) for column, value in row.items()} for name, row in on.items()
+    }
+    return Ticks({str(value): value for value in values}, True, cells=named)
 
 
 def number_of(typed: object, unit: str = '') -> float | None:

@@ -1,6 +1,7 @@
 // A level: a number on an axis. `said` and `gap` need no page.
 const levelKind = (() => {
   const [TALL, LEFT, RIGHT, LINE] = [144, 60, 40, 84];
+  const [DOT, STACK, ROOM] = [12, 132, 24]; // a student of the class; how high they stand, at most and below the flags
   const rounded = ({ step }, value) => +(Math.round(value / step) * step).toFixed(3);
   const one = ({ unit }, value) => (value === 1 ? unit.replace(/s$/, '') : unit);
   const named = ({ unit = '', step }, value) => [`${+value.toFixed(3)}`, Number.isInteger(step) ? one({ unit }, value) : unit].filter(Boolean).join(' ');
@@ -8,8 +9,9 @@ const levelKind = (() => {
   const said = (record, value) => `${named(record, value)}.`;
 
   function gap(record, value, { at, tolerance }) {
-    const right = Math.abs(value - at) <= tolerance;
+    const right = value !== null && Math.abs(value - at) <= tolerance;
     const exact = +at.toPrecision(3);
+    if (value === null) return { right, says: `It is ${named(record, exact)}.` };
     if (right) return { right, says: `Right: it is ${named(record, exact)}.` };
     if (!record.unit) return { right, says: `It is ${exact}: you said ${value}.` };
     const [much, little] = Number.isInteger(record.step) ? ['many', 'few'] : ['much', 'little'];
@@ -27,44 +29,64 @@ const levelKind = (() => {
     return made;
   };
 
+  // A few whole numbers: a button for each.
+  function buttons(record, set) {
+    const { question, low, high, outcome } = record;
+    const names = Array.from({ length: high - low + 1 }, (_, i) => `${low + i}`);
+    const shown = optionsKind.row(names, question, true, outcome && [Math.round(outcome.at) - low], place => set(low + place));
+    classOf(record, values => shown.count(values.map(String)));
+    return { node: shown.node, put: value => shown.press(value === null ? [] : [value - low]) };
+  }
+
   function draw(record, image, set) {
+    if (record.few) return buttons(record, set);
     const { low, high, step, unit, marks = {}, outcome } = record;
     // On a phone it is drawn narrower, not smaller: its letters stay as large.
     const [WIDE, TICKS] = matchMedia('(max-width: 600px)').matches ? [400, 4] : [800, 8];
     const x = value => LEFT + (WIDE - LEFT - RIGHT) * (value - low) / (high - low);
-    const svg = svgElement('svg', { class: 'guess-axis', viewBox: `0 0 ${WIDE} ${unit ? TALL : TALL - 24}`, 'font-size': 18, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' });
+    const tall = unit ? TALL : TALL - 24;
+    const svg = svgElement('svg', { class: 'guess-axis', viewBox: `0 0 ${WIDE} ${tall}`, 'font-size': 18, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' });
     const rough = (high - low) / TICKS;
     const power = 10 ** Math.floor(Math.log10(rough));
     const tick = Math.max([1, 2, 5, 10].find(n => n * power >= rough) * power, Number.isInteger(step) ? 1 : 0);
-    svg.append(svgElement('path', { d: `M${LEFT} ${LINE}H${WIDE - RIGHT}`, stroke: 'currentColor', 'stroke-width': 2 }));
+    const ground = svgElement('g'); // the axis, and the class on it
+    svg.append(ground);
+    ground.append(svgElement('path', { d: `M${LEFT} ${LINE}H${WIDE - RIGHT}`, stroke: 'currentColor', 'stroke-width': 2 }));
     // Both ends have a number, and what is too near to one of them has none.
     const at = [low, high];
     for (let n = Math.ceil(low / tick); n * tick < high; n += 1) {
       if (Math.min(n * tick - low, high - n * tick) > 0.6 * tick) at.push(n * tick);
     }
     for (const value of at) {
-      svg.append(svgElement('path', { d: `M${x(value)} ${LINE}v8`, stroke: 'currentColor', 'stroke-width': 2 }),
+      ground.append(svgElement('path', { d: `M${x(value)} ${LINE}v8`, stroke: 'currentColor', 'stroke-width': 2 }),
         svgElement('text', { x: x(value), y: LINE + 28, 'text-anchor': 'middle' }, `${+value.toPrecision(6)}`));
     }
-    svg.append(svgElement('text', { x: WIDE - RIGHT, y: TALL - 8, 'text-anchor': 'end' }, unit));
+    ground.append(svgElement('text', { x: WIDE - RIGHT, y: TALL - 8, 'text-anchor': 'end' }, unit));
     for (const [name, value] of Object.entries(marks)) {
-      svg.append(svgElement('path', { d: `M${x(value)} ${LINE}V62`, stroke: 'currentColor', 'stroke-width': 2, 'stroke-dasharray': '3 4' }),
+      ground.append(svgElement('path', { d: `M${x(value)} ${LINE}V62`, stroke: 'currentColor', 'stroke-width': 2, 'stroke-dasharray': '3 4' }),
         svgElement('text', { x: x(value), y: 54, 'text-anchor': 'middle' }, name));
     }
     const gapLine = svgElement('path', { stroke: 'var(--look-lost)', 'stroke-width': 4, fill: 'none', d: '' });
     const gapLabel = svgElement('text', { y: LINE - 20, 'text-anchor': 'middle', class: 'gap-label' });
     const you = svgElement('g', { class: 'you', tabindex: outcome ? -1 : 0, role: 'slider', 'aria-label': 'Your line', 'aria-valuemin': low, 'aria-valuemax': high });
-    you.append(svgElement('path', { class: 'you-round', d: `M0 ${LINE}V34`, stroke: 'var(--look-you)', 'stroke-width': 4 }),
+    you.append(svgElement('path', { class: 'you-round flag', d: `M0 ${LINE}V34`, stroke: 'var(--look-you)', 'stroke-width': 4 }),
       svgElement('circle', { cy: 34, r: 9, fill: 'var(--look-you)' }),
       svgElement('text', { class: 'you-label', y: 18 }));
+    // The class: a dot for each student, those who have said the same above each other. Who was right
+    // lights up.
     const ghosts = svgElement('g', { class: 'class' });
-    svg.append(ghosts, gapLine, gapLabel, you);
-    classOf(record, values => ghosts.replaceChildren(...values.filter(Number.isFinite).map(value => svgElement('path', {
-      d: `M${x(Math.min(Math.max(value, low), high))} ${LINE}v-40`, stroke: 'var(--look-you)', 'stroke-width': 6, 'stroke-opacity': 0.3,
-    }))));
+    ground.append(ghosts);
+    svg.append(gapLine, gapLabel, you);
+    // The axis is lower, so that the class has room above it.
+    function lower(by) {
+      svg.setAttribute('viewBox', `0 0 ${WIDE} ${tall + by}`);
+      ground.setAttribute('transform', `translate(0 ${by})`);
+      svg.querySelectorAll('.flag').forEach(flag => flag.setAttribute('d', flag.getAttribute('d').replace(/ .*V/, ` ${LINE + by}V`)));
+    }
+
     if (outcome) {
       const at = x(Math.min(Math.max(outcome.at, low), high));
-      svg.append(svgElement('path', { d: `M${at} ${LINE}V34`, stroke: 'var(--look-robot)', 'stroke-width': 4 }),
+      svg.append(svgElement('path', { class: 'flag', d: `M${at} ${LINE}V34`, stroke: 'var(--look-robot)', 'stroke-width': 4 }),
         svgElement('circle', { cx: at, cy: 34, r: 9, fill: 'var(--look-robot)' }));
       svg.append(svgElement('text', { class: 'came-out', x: at, y: 18, 'text-anchor': 'middle' }, named(record, +outcome.at.toPrecision(3))));
     }
@@ -111,6 +133,17 @@ const levelKind = (() => {
         to(ends ?? (now === null ? low : now + KEYS[event.key] * step));
       });
     }
+    classOf(record, values => {
+      const place = value => Math.round(x(Math.min(Math.max(value, low), high)) / DOT) * DOT;
+      const stacks = [...Map.groupBy(values.filter(Number.isFinite).sort((a, b) => a - b), place)];
+      const most = Math.max(0, ...stacks.map(([, stack]) => stack.length));
+      const apart = Math.min(DOT, STACK / most);
+      ghosts.replaceChildren(...stacks.flatMap(([cx, stack]) => stack.map((value, i) => svgElement('circle', {
+        cx, cy: LINE - DOT / 2 - i * apart, r: DOT / 2 - 1,
+        class: outcome && Math.abs(value - outcome.at) <= outcome.tolerance ? 'right' : '',
+      }))));
+      lower(Math.max(0, most * apart - ROOM));
+    });
     return { node: svg, put };
   }
 

@@ -1,21 +1,26 @@
 // Options, of which one is chosen, or several. `said` and `gap` need no page. A value is the place
 // of the option, or a list of places.
 const optionsKind = (() => {
+  const DOTS = 60; // of a class, about so many at most
   const listed = (names, places) => [places].flat().map(place => names[place]).join(', ') || 'none';
 
   const said = ({ names }, value) => `${listed(names, value)}.`;
 
   function gap({ names }, value, { at }) {
+    if (value === null) return { right: false, says: `It is ${listed(names, at)}.` };
     const right = `${value}` === `${at}`;
     return { right, says: right ? `Right: ${listed(names, at)}.` : `It is ${listed(names, at)}: you said ${listed(names, value)}.` };
   }
+
+  // The class page makes numbers of texts: 1 is '1.0'.
+  const isSame = (value, name) => value === name || (name !== '' && +value === +name);
 
   // Return a row of buttons and `press(places)`. `choose` gets the place of one that is clicked, or
   // reached by an arrow key, if only `one` is chosen. `right` are the places of what came out.
   function row(names, label, one, right, choose) {
     const buttons = names.map((name, place) => element('button', {
       type: 'button', role: one ? 'radio' : 'checkbox', disabled: right ? '' : undefined, onclick: () => choose(place),
-      class: right?.includes(place) ? 'guess-true' : undefined,
+      class: `guess-choice${right?.includes(place) ? ' guess-true' : ''}`,
     }, name));
 
     function onkeydown(event) {
@@ -31,12 +36,19 @@ const optionsKind = (() => {
     const node = element('div', { class: 'guess-options', role: one ? 'radiogroup' : 'group', 'aria-label': label, onkeydown }, ...buttons);
     const press = places => buttons.forEach((button, place) => button.setAttribute('aria-checked', places.includes(place)));
 
-    // How many of a class have chosen each: `values` are their words, none at all before they are shown.
+    // Those of a class who have chosen each, a dot for a student, and of many a dot for several:
+    // `values` are their words, none at all before they are shown. Dots of what is right light up.
     function count(values) {
+      const each = Math.ceil(values.length / DOTS);
       buttons.forEach((button, place) => {
-        const students = values.filter(value => value === names[place]).length;
-        if (students) button.dataset.class = `${students}`;
-        else delete button.dataset.class;
+        const students = values.filter(value => isSame(value, names[place])).length;
+        button.querySelector('.guess-class')?.remove();
+        delete button.dataset.class;
+        if (!students) return;
+        button.dataset.class = `${students}`;
+        button.style.setProperty('--class', students);
+        const dots = Array.from({ length: Math.ceil(students / each) }, () => element('i'));
+        button.append(element('span', { class: 'guess-class', 'aria-hidden': 'true' }, ...dots));
       });
     }
 
@@ -64,6 +76,31 @@ const optionsKind = (() => {
     node.prepend(shown);
   }
 
+  // A button in a table whose head or row says its name.
+  function bare(button) {
+    button.ariaLabel = button.textContent;
+    button.replaceChildren();
+    button.classList.add('guess-bare');
+    return button;
+  }
+
+  // Put buttons into the cells of their table. In that which has come, a cell also says what came.
+  function table(node, { columns, rows }, names, came) {
+    const buttons = [...node.children];
+    const all = came?.columns ?? columns;
+    const texts = new Map(came?.rows);
+    const cell = (name, row, i) => {
+      const place = row[columns.indexOf(all[i])] ?? null;
+      const button = place === null ? [] : [buttons[place]];
+      // The name of its row is read there.
+      if (button.length && names[place] === name) bare(button[0]);
+      return element('td', {}, ...button, ...(came ? [' ', element('span', {}, texts.get(name)?.[i] ?? '')] : []));
+    };
+    const head = element('tr', {}, element('td'), ...all.map(name => element('th', { scope: 'col' }, name)));
+    const body = rows.map(([name, row]) => element('tr', {}, element('th', { scope: 'row' }, name), ...all.map((_, i) => cell(name, row, i))));
+    node.prepend(element('table', { class: 'guess-table' }, head, ...body));
+  }
+
   function draw(record, image, set) {
     const { names, several, points, outcome } = record;
     const one = several === null;
@@ -72,6 +109,7 @@ const optionsKind = (() => {
     const pressed = value => (value === null ? [] : value.length === 0 ? [none] : [value].flat());
     const shown = row(none < 0 ? names : [...names, 'none of them'], record.question, one, outcome && pressed(outcome.at), choose);
     if (points) plane(shown.node, points);
+    if (record.table) table(shown.node, record.table, names, outcome?.table);
     let now = null;
     // A list that is empty says none of them. An option that is the text of a number comes as one.
     classOf(record, values => shown.count(values.flatMap(value => ([].concat(value).length ? value : ['none of them'])).map(String)));
@@ -94,5 +132,5 @@ const optionsKind = (() => {
     return { node: shown.node, put };
   }
 
-  return { said, gap, draw, row };
+  return { said, gap, draw, row, bare };
 })();

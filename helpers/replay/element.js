@@ -26,6 +26,15 @@ function drawing(image) {
   return seen(svg, image.alt);
 }
 
+// Its letters have 16 units, and never less than 14 pixels, however small it is shown.
+function legible(svg) {
+  new ResizeObserver(() => {
+    const scale = svg.isConnected && svg.getScreenCTM()?.a;
+    if (scale) svg.style.setProperty('--letters', `${Math.max(16, 14 / scale).toFixed(1)}px`);
+  }).observe(svg);
+  return svg;
+}
+
 // What replays, levels and free play have of their own on a page.
 function wake(root, name) {
   root.classList.add('replay-on');

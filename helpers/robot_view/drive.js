@@ -1,7 +1,9 @@
 // The drive of a robot: one more run under the slider of view.js, with a floor instead of lists.
 
 // Return what walk.js returns of a run: times, seek, scan. And `told`, which steps say something.
-function drive({ step, poses, commands, scans, events, bumps, guess, strip = Infinity, outcome: said }, root) {
+// In a drive that still goes on, the rows of `record` grow, and `took` is the scan that a callback has.
+function drive(record, root) {
+  const { step, poses, commands, scans, events, bumps, guess, strip = Infinity, outcome: said } = record;
   const kept = guess && memory(root, guess);
   const turn = w => (w ? ` and ${w.toFixed(2)} rad/s` : '');
   const speed = ([, v, w]) => `${v.toFixed(2)} m/s${turn(w)}`;
@@ -29,6 +31,13 @@ function drive({ step, poses, commands, scans, events, bumps, guess, strip = Inf
     return { x, y, yaw, v, w };
   }
 
+  // What the brake acted on when it was decided stays: at the bump, or when it was told to stand.
+  function decided() {
+    const drives = commands.findLastIndex(([, v, w]) => v || w);
+    return bumps[0] ?? (drives < 0 ? Infinity : commands[drives + 1]?.[0] ?? Infinity);
+  }
+
+  const point = ([x, y]) => `${x} ${y}`;
   const latest = (rows, ms) => rows.findLast(([at]) => at <= ms);
 
   // The path around what the laser saw, from where it was.
@@ -46,12 +55,15 @@ function drive({ step, poses, commands, scans, events, bumps, guess, strip = Inf
 
   // All that is seen at a time.
   function look(ms) {
-    const till = Math.min(ms, bumps[0] ?? ms); // what the brake acted on at the bump stays
+    const till = Math.min(ms, decided());
     const command = latest(commands, till);
-    const taken = command && command[3] >= 0 ? scans.findLast(([, seq]) => seq <= command[3]) : undefined;
+    // Not each scan is saved: the time of the one that it acts on is that of the command, less its age.
+    const has = record.took ?? command?.[3] ?? -1;
+    const taken = has < 0 ? undefined : scans.findLast(([, seq]) => seq <= has);
+    const seen = taken && (record.took === undefined ? command[0] - command[4] : taken[0]);
     const now = latest(scans, ms);
     return {
-      ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(taken[0]), age: taken && (till - taken[0]) / 1000,
+      ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(seen), age: taken && (till - seen) / 1000,
       told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}, ${seconds(command[4])} s old`) : 'nothing yet',
     };
   }
@@ -67,7 +79,8 @@ function drive({ step, poses, commands, scans, events, bumps, guess, strip = Inf
     times: steps.map(([ms]) => 1000 * ms),
     told: steps.map(([, said]) => said !== ''),
     ranks: steps.map(([, , rank]) => rank), // what is said while it plays: a stop or an event, above all a bump
-    points: poses.map(([x, y]) => `${x} ${y}`),
+    points: poses.map(point),
+    point, pose,
     says: to => says[to - 1] ?? '',
     scan: () => bumps.map(at => steps.findLastIndex(([ms]) => ms <= at) + 1),
     look,
@@ -88,14 +101,16 @@ function ringAt(svg, { x, y, yaw }, r) {
 }
 
 function floor(run, record, svg) {
+  legible(svg);
   const find = name => svg.querySelector(`.${name}`);
   find('all').setAttribute('stroke-opacity', '.3');
-  const marks = ['seconds', 'bumps'].map(name => {
-    const path = find(name);
-    return [path, (path.getAttribute('d') + path.dataset.later).split(/(?=M)/)];
-  });
   const radius = +find('robot').querySelector('circle').getAttribute('r');
-  let hits = 0;
+  const arm = 7 / find('robot').parentNode.transform.baseVal.consolidate().matrix.a;
+  // A dot for each second, and a cross where it hit something.
+  const dot = ({ x, y }) => `M${x.toFixed(2)} ${y.toFixed(2)}h0`;
+  const cross = ({ x, y, yaw }) => `M${(x + radius * Math.cos(yaw)).toFixed(3)} ${(y + radius * Math.sin(yaw)).toFixed(3)}`
+    + `m${-arm} ${-arm}l${2 * arm} ${2 * arm}m0 ${-2 * arm}l${-2 * arm} ${2 * arm}`;
+  let [seconds, hits] = [0, 0];
   const wide = svg.viewBox.baseVal.width;
   const ghost = document.createElementNS(svg.namespaceURI, 'text');
   ghost.setAttribute('class', 'ghost');
@@ -111,7 +126,7 @@ function floor(run, record, svg) {
     ghost.setAttribute('y', record.strip ? 26 : Math.max(y - 6, 30).toFixed(1));
   }
   const mine = run.kept && placeKind.yours(svg, record.guess);
-  const ended = run.times.at(-1) / 1000; // ms
+  const ended = record.id === undefined ? run.times.at(-1) / 1000 : Infinity; // ms; not yet
   let drawn = () => {};
 
   // Your robot, once you have put it somewhere: also elsewhere on this page.
@@ -134,10 +149,13 @@ function floor(run, record, svg) {
     const r = radius;
     find('old').setAttribute('d', now.old && `${now.old}M${now.was.x - r} ${now.was.y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`);
     label(now, r);
-    const counts = [Math.floor(ms / 1000), record.bumps.filter(at => at <= ms).length];
-    if (plays && counts[1] > hits) ringAt(svg, now, radius);
-    [, hits] = counts;
-    marks.forEach(([path, parts], i) => path.setAttribute('d', parts.slice(0, counts[i]).join('')));
+    const bumped = record.bumps.filter(at => at <= ms);
+    if (plays && bumped.length > hits) ringAt(svg, now, radius);
+    if (bumped.length !== hits || seconds !== Math.floor(ms / 1000) || !plays) {
+      [seconds, hits] = [Math.floor(ms / 1000), bumped.length];
+      find('seconds').setAttribute('d', Array.from({ length: seconds + 1 }, (_, i) => dot(run.pose(1000 * i))).join(''));
+      find('bumps').setAttribute('d', bumped.map(at => cross(run.pose(at))).join(''));
+    }
     drawn = () => mine?.measure(ms >= (record.bumps[0] ?? ended) - 1 ? now : null);
     drawn();
     time.textContent = `${(ms / 1000).toFixed(2)} s`;

@@ -1,32 +1,35 @@
-"""A robot while it drives: a picture in the cell's output, drawn again twelve times a second."""
+"""A robot while it drives: a picture in the cell's output, which is told of the drive.
+
+The picture is that of the replay (drive.js). live.js lets it follow: twelve times a second a second
+output of the cell, which is not seen, is drawn again, and its script tells the page what is new.
+"""
 
 from __future__ import annotations
 
+import json
 import threading
 from html import escape
+from itertools import count
+from pathlib import Path
 
 from rclpy.subscription import Subscription
 
-from helpers.guesses import Guess
+from helpers.guesses import CSS, MEMORY, Guess
 from helpers.notebook import somebody_watches
-from helpers.replay import Replay, style
-from helpers.robot import Pose, Robot
-from helpers.robot_view.picture import DRIVE_CSS, Seen, floor_in_words, floor_picture, is_lane
-from helpers.robot_view.replay import bumps, outcome, place, replay_drive, seconds
+from helpers.replay import Replay, attribute, picture_of, script, style
+from helpers.robot import RATE_HZ, Pose, Robot
+from helpers.robot_view.picture import DRIVE_CSS, LANE_M, floor_in_words, floor_picture, is_lane
+from helpers.robot_view.replay import bumps, outcome, rays, replay_drive
 from helpers.robot_view.scans import ScanRecording
 from helpers.ros import current_session
 
+HERE = Path(__file__).parent
 PERIOD_S = 1 / 12
 EVERY = 5  # steps of the robot: a point of its path
+AGAIN = 20  # rows of each kind that are told again: a telling may be lost
 OLD_S = 0.5  # a scan that is older is worth a sentence
 NEWS_S = 3.0  # so long an event is shown
-# Those of view.js, in their places: nothing moves when the replay comes.
-CONTROLS = (
-    '<div class="replay-controls" aria-hidden="true"><button disabled>‹</button>'
-    '<button disabled>›</button><button class="replay-play" disabled>● Live</button>'
-    '<button class="replay-rate" disabled>1×</button>'
-    '<input type="range" disabled min="0" max="1" value="1"></div>'
-)
+NUMBERS = count()  # of the pictures of a kernel
 
 
 def watch(
@@ -69,7 +72,7 @@ def watch(
 
 
 class LiveView:
-    """The picture of a drive, from `start` to `stop`, sent by a thread of its own.
+    """The picture of a drive, from `start` to `stop`, told by a thread of its own.
 
     To update a display, unlike to make one, needs no cell: it moves, whatever the cell waits for.
     """
@@ -78,7 +81,10 @@ class LiveView:
         self, robot: Robot, recording: ScanRecording | None, guess: Guess | None = None
     ) -> None:
         self._record, self._recording, self._guess = robot.record, recording, guess
-        self._display = None
+        self._id = next(NUMBERS)
+        self._display = self._feed = None
+        self._as_lane = self._is_lane()
+        self._told: dict[str, int] = {}  # how many rows of each kind
         self._took: int | None = None  # the scan of the last callback
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run, name='robot view', daemon=True)
@@ -92,13 +98,16 @@ class LiveView:
         if somebody_watches():
             from IPython.display import display
 
-            data = {'text/html': self.html()}
-            self._display = display(data, raw=True, display_id=True)
+            self._display = display({'text/html': self.html()}, raw=True, display_id=True)
+            self._feed = display({'text/html': self.telling()}, raw=True, display_id=True)
             self._thread.start()
 
     def _run(self) -> None:
         while not self._over.wait(PERIOD_S):
-            self._display.update({'text/html': self.html()}, raw=True)
+            if self._as_lane and not self._is_lane():  # it has turned away: the strip is too narrow
+                self._as_lane = False
+                self._display.update({'text/html': self.html()}, raw=True)
+            self._feed.update({'text/html': self.telling()}, raw=True)
 
     def stop(self, shown: Replay) -> None:
         """End the pictures, and show this in their place."""
@@ -109,82 +118,80 @@ class LiveView:
             return
         self._over.set()
         self._thread.join()
+        self._feed.update({'text/html': ''}, raw=True)
         self._display.update(shown)
 
     def html(self) -> str:
-        """Return the picture of now, and what the robot and its callback do."""
-        record = self._record
-        poses, scans, commands = record.poses, record.scans, record.commands
-        now, hit = poses[-1], bumps(record)
-        svg = floor_picture(
-            record.floor,
-            [row[1:3] for row in [*poses[::EVERY], now]],
-            Pose(now.x, now.y, now.yaw),
-            scans[-1] if scans else None,
-            [place(record, bump.t_s) for bump in hit],
-            seconds(record, now.t_s),
-            scan_pose=place(record, scans[-1].t_s) if scans else None,
-            ring_s=now.t_s - hit[-1].t_s if hit else None,
-            as_lane=is_lane(record.floor, [row[1:3] for row in poses]),
-            guess=self._guess,
-            seen=(seen := self._seen(hit[0].t_s if hit else now.t_s)),
-        )
-        lane = ' replay-lane' if is_lane(record.floor, [row[1:3] for row in poses]) else ''
-        told = 'nothing yet'
-        if commands:
-            _, v, w = commands[-1]
-            told = f'{v:.2f} m/s' + (f' and {w:.2f} rad/s' if w else '')
-        news = record.events[-1:]
-        event = news[0].text if news and now.t_s - news[0].t_s < NEWS_S else ''
-        if not event and seen is not None and seen.age_s > OLD_S:
-            event = f'The brake works on a scan that is {seen.age_s:.1f} s old.'
-        if hit:
-            event = outcome(record)
+        """Return the picture and its script, with all that is known until now."""
+        floor, start = self._record.floor, self._record.floor.start
+        svg = floor_picture(floor, [start[:2]], Pose(*start), as_lane=self._as_lane)
+        self._told.clear()
+        record = {
+            'id': self._id,
+            'step': EVERY / RATE_HZ,
+            **{kind: told['added'] for kind, told in self._rows().items()},
+            'events': [],
+            **({'strip': LANE_M} if self._as_lane else {}),
+            **({'depth': self._recording.depth} if self._recording else {}),
+            **({'guess': self._guess.record()} if self._guess else {}),
+        }
+        guessed = (*self._guess.kind.scripts, MEMORY) if self._guess else ()
+        files = (*guessed, 'element.js', 'board.js', HERE / 'drive.js', HERE / 'live.js')
         return (
-            f'<div class="replay replay-on robot-live">{style(DRIVE_CSS)}{CONTROLS}'
-            f'<p class="replay-says">{escape(event)}</p><div class="replay-runs">'
-            f'<div class="replay-floor{lane}">'
-            f'<span role="img" aria-label="{escape(floor_in_words(record.floor))}">{svg}</span>'
-            f'{_row("time", f"{now.t_s:.2f} s")}{_row("robot", speeds(now.v, now.w))}'
-            f'{_row("told", told)}</div>{self._queue(now.t_s)}</div>'
-            f'<p>A drive on the floor {escape(record.floor.name)}.</p></div>'
+            f'<div class="replay robot-live" data-record={attribute(record)}>'
+            f'{style(DRIVE_CSS, CSS)}{picture_of(svg, floor_in_words(floor))}'
+            f'<p>A drive on the floor {escape(floor.name)}.</p>'
+            f'<script>{script(*files)}</script></div>'
         )
 
-    def _seen(self, now_s: float) -> Seen | None:
-        """Return the scan that a callback works on, or the last one that it worked on."""
-        if self._recording is None:
-            return None
-        runs, _ = self._recording.now(self._recording.depth)
-        if runs:
-            self._took = min(runs)
-        if self._took is None:
-            return None
-        scan = self._record.scans[self._took]
-        return Seen(scan, place(self._record, scan.t_s), now_s - scan.t_s)
-
-    def _queue(self, now_s: float) -> str:
-        """Return which message has a callback, and which wait."""
-        if self._recording is None:
-            return ''
-        runs, waits = self._recording.now(self._recording.depth)
-        busy = [
-            f'<li class="replay-busy">message <b>{seq}</b>, {age_s:.2f} s old</li>'
-            for seq, age_s in runs.items()
-        ]
-        waiting = ''.join(f'<li><b>{seq}</b></li>' for seq in waits)
-        busy = busy or ['<li class="replay-free">free</li>']
-        rows = (
-            _row('time', f'{now_s:.3f} s')
-            + _row('callback', ''.join(busy))
-            + _row('queue', waiting, 'replay-queue')
+    def telling(self) -> str:
+        """Return a script that tells the picture what is new."""
+        detail = json.dumps({'id': self._id, **self.news()}).replace('</', '<\\/')
+        return (
+            '<i class="robot-feed"></i><script>'
+            f"document.dispatchEvent(new CustomEvent('drive', {{ detail: {detail} }}));</script>"
         )
-        return f'<div class="replay-run">{rows}</div>'
 
+    def news(self) -> dict:
+        """Return the time (ms), the new rows, what is said, and which scans run, wait, are lost."""
+        record = self._record
+        now_s = record.poses[-1].t_s if record.poses else 0.0
+        told = {'ms': round(1000 * now_s), 'rows': self._rows()}
+        works = ''
+        if self._recording is not None:
+            recording = self._recording
+            runs, waits = recording.now(recording.depth)
+            self._took = min(runs, default=self._took)
+            taken = None if self._took is None else record.scans[self._took]
+            if taken and now_s - taken.t_s > OLD_S:
+                works = f'The brake works on scan {self._took}, and {len(waits)} newer ones wait.'
+            lost = max(recording.published - recording.heard - len(waits), 0)
+            told |= {'busy': [*runs] or [None], 'waits': waits, 'lost': lost, 'took': self._took}
+        news = [event.text for event in record.events[-1:] if now_s - event.t_s < NEWS_S]
+        says = outcome(record) if bumps(record) else news[0] if news else works
+        return told | {'says': says}
 
-def speeds(v: float, w: float) -> str:
-    return f'{v:.2f} m/s, {w:.2f} rad/s'
+    def _rows(self) -> dict[str, dict]:
+        """Return what drive.js needs, of each kind the newest rows, and how many come before."""
+        record = self._record
+        found = {
+            'poses': (record.poses[::EVERY], lambda one: [round(n, 3) for n in one[1:]]),
+            'commands': (
+                record.commands,
+                lambda one: [round(1000 * one.t_s), *(round(n, 3) for n in one[1:]), -1, 0],
+            ),
+            'scans': (
+                record.scans,
+                lambda one: [round(1000 * one.t_s), one.seq, *rays(one)],
+            ),
+            'bumps': (bumps(record), lambda one: round(1000 * one.t_s)),
+        }
+        told = {}
+        for kind, (rows, row) in found.items():
+            first = max(self._told.get(kind, AGAIN) - AGAIN, 0)
+            told[kind] = {'from': first, 'added': [row(one) for one in rows[first:]]}
+            self._told[kind] = len(rows)
+        return told
 
-
-def _row(name: str, content: str, kind: str = '') -> str:
-    items = f'<ul class="{kind}">{content}</ul>'
-    return f'<div class="replay-row"><b>{name}</b><div>{items}</div></div>'
+    def _is_lane(self) -> bool:
+        return is_lane(self._record.floor, [row[1:3] for row in self._record.poses])

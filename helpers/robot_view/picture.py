@@ -10,11 +10,9 @@ import math
 from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from helpers.guesses import Guess
 from helpers.notebook import LOOK
 from helpers.robot import RADIUS_M, RANGE_MAX, Floor, Pose, Scan
 
@@ -23,27 +21,8 @@ SMALLEST = 9  # pixels: the robot's radius on a large floor
 BEAMS = 40  # of a scan, in a picture
 WALL_M = 0.15  # of an outer wall
 LANE_M, WORDS_M = 0.5, 0.26  # of a lane: to each side of the robot, and beyond for words
-RING, RING_S = 30, 0.4  # pixels, and how long: around a bump, as drive.js draws it
-WORDS_Y = 26  # of what a lane says above
-SEES = 'the brake sees this, {:.1f} s ago'  # as drive.js says it
 DRIVE_CSS = Path(__file__).with_name('drive.css')
 ROBOT, WAITING, LOST = LOOK['robot'], LOOK['waiting'], LOOK['lost']
-
-
-class Seen(NamedTuple):
-    """What a callback works on: a scan, where it was made, and how old it is (s)."""
-
-    scan: Scan
-    pose: Pose
-    age_s: float
-
-
-class Later(NamedTuple):
-    """What comes after the time of a picture. `points` are those of the whole drive."""
-
-    points: Sequence[tuple[float, float]] = ()
-    bumps: Sequence[Pose] = ()
-    seconds: Sequence[Pose] = ()
 
 
 def floor_picture(
@@ -55,28 +34,23 @@ def floor_picture(
     seconds: Sequence[Pose] = (),
     *,
     scan_pose: Pose | None = None,
-    later: Later | None = None,
-    ring_s: float | None = None,
+    whole: Sequence[tuple[float, float]] = (),
     as_lane: bool = False,
-    guess: Guess | None = None,
-    seen: Seen | None = None,
 ) -> str:
     """Return the SVG: the floor, the path through `points`, the robot at `pose` with its laser.
 
     `scan` was made at `scan_pose`, which is mostly a little behind `pose`. `seconds` are the places
-    that get a dot, `bumps` those where it hit something, the last one `ring_s` ago. `later` is what
-    comes after `pose`: drive.js draws it when its time has come. `as_lane` draws only the strip of
-    a corridor, with room above and below it for words. `guess` is one of a place,
-    `seen` what the callback works on.
+    that get a dot, `bumps` those where it hit something. `whole` is the path also after `pose`:
+    drive.js draws the rest when its time has come. `as_lane` draws only the strip of a corridor,
+    with room above and below it for words.
     """
     x, y, right, above = lane_edges(floor) if as_lane else edges(floor)
     scale = min((WIDTH - 2 * MARGIN) / (right - x), (HEIGHT - 2 * MARGIN) / (above - y))
     width, height = (scale * size + 2 * MARGIN for size in (right - x, above - y))
     r = max(RADIUS_M, SMALLEST / scale)  # on a large floor the robot is drawn larger than it is
     way = line(points)
-    whole, drawn = (line(later.points), way) if later else (way, '')
-    pale = ' stroke-opacity=".3"' if later else ''
-    later = later or Later()
+    drawn = way if whole else ''
+    pale = ' stroke-opacity=".3"' if whole else ''
     start = floor.start
     strip = LANE_M if as_lane else math.inf
     ring = f'M{start.x - r:.3f} {start.y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} 0'
@@ -85,12 +59,13 @@ def floor_picture(
         _lane(floor) if as_lane else _floor(floor, scale),
         f'<path class="fan" d="{fan(scan_pose or pose, scan, strip)}" fill="{ROBOT}" '
         f'fill-opacity=".16" stroke="{ROBOT}" stroke-opacity=".6"/>',
-        f'<path class="old" d="{seen_from(seen, r, strip)}" fill="none" stroke="{WAITING}" '
+        f'<path class="old" d="" fill="none" stroke="{WAITING}" '
         'stroke-width="2" stroke-dasharray="5 4"/>',
-        f'<path class="all" d="{whole}" fill="none" stroke="{ROBOT}" stroke-width="2.6"{pale}/>',
+        f'<path class="all" d="{line(whole) if whole else way}" fill="none" stroke="{ROBOT}" '
+        f'stroke-width="2.6"{pale}/>',
         f'<path class="driven" d="{drawn}" fill="none" stroke="{ROBOT}" stroke-width="2.6"/>',
-        f'<path class="seconds" d="{dots(seconds)}" data-later="{dots(later.seconds)}" '
-        f'stroke="{ROBOT}" stroke-width="6.5" stroke-linecap="round"/>',
+        f'<path class="seconds" d="{dots(seconds)}" stroke="{ROBOT}" stroke-width="6.5" '
+        'stroke-linecap="round"/>',
         f'<path class="start" d="{ring}" fill="none" stroke="currentColor" stroke-opacity=".6" '
         'stroke-dasharray="3 3"/>',
         # A disc with an arrow that shows its heading.
@@ -98,27 +73,9 @@ def floor_picture(
         f'<g transform="rotate({math.degrees(pose.yaw):.1f})">'
         f'<circle r="{r:.3f}" fill="{ROBOT}"/><path d="M{0.68 * r:.3f} 0L{-0.42 * r:.3f} '
         f'{0.52 * r:.3f}L{-0.18 * r:.3f} 0L{-0.42 * r:.3f} {-0.52 * r:.3f}z" fill="#fff"/></g></g>',
-        f'<path class="bumps" d="{crosses(bumps, r, 7 / scale)}" '
-        f'data-later="{crosses(later.bumps, r, 7 / scale)}" stroke="{LOST}" stroke-width="3.2"/>',
+        f'<path class="bumps" d="{crosses(bumps, r, 7 / scale)}" stroke="{LOST}" '
+        'stroke-width="3.2"/>',
     ]
-    if bumps and ring_s is not None and ring_s < RING_S:
-        x0, y0, yaw = bumps[-1][:3]
-        part = ring_s / RING_S
-        parts.append(
-            f'<circle class="ring" cx="{x0 + r * math.cos(yaw):.3f}" '
-            f'cy="{y0 + r * math.sin(yaw):.3f}" r="{(0.3 + 0.7 * part) * RING / scale:.3f}" '
-            f'fill="none" stroke="{LOST}" stroke-opacity="{1 - part:.2f}" stroke-width="3" '
-            'vector-effect="non-scaling-stroke"/>'
-        )
-    if guess is not None:
-        parts.insert(2, _guess(guess, r, scale))
-    words = ''
-    if seen is not None:
-        across = MARGIN + scale * (seen.pose.x - x)
-        words = (
-            f'<text class="ghost" x="{min(max(across, 130), width - 130):.0f}" y="{WORDS_Y}">'
-            f'{SEES.format(seen.age_s)}</text>'
-        )
     left, below = 14 + scale * WALL_M, height - 14 - scale * (WORDS_M if as_lane else WALL_M)
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
@@ -129,34 +86,8 @@ def floor_picture(
         f'scale({scale:.2f} -{scale:.2f})" stroke-linejoin="round">{"".join(parts)}</g>'
         f'<path d="M{left:.0f} {below:.0f}v-6m0 3h{scale:.0f}m0-3v6" fill="none" '
         f'stroke="currentColor"/><text x="{left + scale / 2:.0f}" y="{below - 7:.0f}" '
-        f'text-anchor="middle" fill="currentColor">1 m</text>{words}</svg>'
+        f'text-anchor="middle" fill="currentColor">1 m</text></svg>'
     ).replace('<path ', '<path vector-effect="non-scaling-stroke" ')
-
-
-def _guess(guess: Guess, r: float, scale: float) -> str:
-    """Return the line of a guess and the robot of the student, as place.js draws them."""
-    kind, you = guess.kind.record(), LOOK['you']
-    x, y, yaw = kind['start']
-    turned = f'translate({x} {y}) rotate({math.degrees(yaw):.1f})'
-    drawn = ''
-    if kind['line']:
-        drawn = (
-            f'<path d="M{kind["ahead"] - kind["line"]:.3f} {LANE_M}v-{2 * LANE_M}" '
-            'stroke="currentColor" stroke-width="2" stroke-dasharray="3 6"/>'
-            f'<text transform="translate({kind["ahead"] - kind["line"]:.3f} {-LANE_M}) '
-            f'scale({1 / scale:.5f} -{1 / scale:.5f})" y="18" text-anchor="middle" '
-            f'fill="currentColor">{escape(kind["label"])}</text>'
-        )
-    if guess.value is not None:
-        drawn += (
-            f'<circle class="you" cx="{kind["ahead"] - guess.value:.3f}" r="{r:.3f}" fill="{you}" '
-            f'fill-opacity=".25" stroke="{you}" stroke-width="3" '
-            'vector-effect="non-scaling-stroke"/>'
-            f'<text transform="translate({kind["ahead"] - guess.value:.3f} {-r:.3f}) '
-            f'scale({1 / scale:.5f} -{1 / scale:.5f})" y="18" text-anchor="middle" '
-            f'font-weight="600" fill="{you}">you</text>'
-        )
-    return f'<g transform="{turned}">{drawn}</g>'
 
 
 def is_lane(floor: Floor, poses: Iterable[Sequence[float]] = ()) -> bool:
@@ -246,17 +177,6 @@ def crosses(poses: Sequence[Pose], r: float, a: float) -> str:
         f'M{x + r * math.cos(yaw) - a:.3f} {y + r * math.sin(yaw) - a:.3f}l{2 * a:.3f} {2 * a:.3f}'
         f'm0-{2 * a:.3f}l-{2 * a:.3f} {2 * a:.3f}'
         for x, y, yaw, *_ in poses
-    )
-
-
-def seen_from(seen: Seen | None, r: float, strip: float) -> str:
-    """Return a path around what a callback works on, and around the robot as it was."""
-    if seen is None:
-        return ''
-    x, y, _ = seen.pose
-    return (
-        f'{fan(seen.pose, seen.scan, strip)}M{x - r:.3f} {y:.3f}a{r:.3f} {r:.3f} 0 1 0 {2 * r:.3f} '
-        f'0a{r:.3f} {r:.3f} 0 1 0 {-2 * r:.3f} 0'
     )
 
 

@@ -102,7 +102,7 @@ const placeKind = (() => {
   }
 
   function draw(record, image, set) {
-    const svg = drawing(image);
+    const svg = legible(drawing(image));
     const { node: you, put, valueAt } = yours(svg, record);
     const { ahead, radius } = record;
     // A screen reader hears one slider, and the picture's words before it.

@@ -18,7 +18,6 @@ from helpers.robot_view.picture import (
     BEAMS,
     DRIVE_CSS,
     LANE_M,
-    Later,
     floor_in_words,
     floor_picture,
     is_lane,
@@ -86,28 +85,22 @@ class Drive:
 
     def picture(self, at_s: float | None = None) -> str:
         """Return the floor as an SVG, at the time at which it opens."""
-        record, end = self.record_, self.span_s[1]
+        record = self.record_
         now = self.telling_s if at_s is None else at_s
         step, poses = self.sampled()
         points = poses[:, :2].tolist()
         pose = place(record, now)
         before = [scan for scan in record.scans if scan.t_s <= now + 1e-9]
-        hits = [(bump.t_s <= now + 1e-9, place(record, bump.t_s)) for bump in bumps(record)]
-        dots = [(second <= now, pose) for second, pose in enumerate(seconds(record, end))]
         return floor_picture(
             record.floor,
             [*points[: int(now / step) + 1], pose[:2]],
             pose,
             before[-1] if before else None,
-            [hit for done, hit in hits if done],
-            [dot for done, dot in dots if done],
+            [place(record, bump.t_s) for bump in bumps(record) if bump.t_s <= now + 1e-9],
+            seconds(record, now),
             scan_pose=place(record, before[-1].t_s) if before else None,
+            whole=points,
             as_lane=self.as_lane,
-            later=Later(
-                points,
-                [hit for done, hit in hits if not done],
-                [dot for done, dot in dots if not done],
-            ),
         )
 
     @property

@@ -15,6 +15,9 @@ OPTIONS = Guess('Which three wait?', Options({str(n): n for n in range(5)}, 3))
 ONE = Guess('Does it stop?', Options({'yes': True, 'no': False}))
 ANY = Guess('Which are lost?', Options({name: name for name in 'ABC'}, True))
 ROWS = Guess('How many are lost?', kind_of({'depth 1': range(4), 'depth 2': range(4)}))
+FEW = Guess('How many threads?', kind_of(range(1, 5), unit='threads'))
+CELLS = {'one thread': {'exclusive': 'A', 'reentrant': 'B'}, 'two': {'exclusive': 'C'}}
+TICKS = Guess('Which lose none?', kind_of(CELLS))
 
 
 def group(page, guess):
@@ -79,11 +82,49 @@ def test_a_row_for_each_thing_and_none_of_the_options(phone, artefacts):
         "told => document.dispatchEvent(new CustomEvent('class', { detail: told }))", told
     )
     shown = page.locator('[data-class]').evaluate_all(
-        'nodes => nodes.map(one => `${one.textContent} ${one.dataset.class}`)'
+        'nodes => nodes.map(one => `${one.ariaLabel ?? one.textContent} ${one.dataset.class}`)'
     )
     assert shown == ['3 2', '0 2', 'A 1', 'B 2', 'none of them 1']
     assert not page.evaluate(WIDER)
     page.screenshot(path=artefacts / 'guess_rows.png', full_page=True)
+
+
+def test_cells_of_the_coming_table_are_ticked(phone, artefacts):
+    page = phone(TICKS, FEW)
+    heads = group(page, TICKS).locator('th').all_inner_texts()
+    assert heads == ['exclusive', 'reentrant', 'one thread', 'two']
+    for name in 'BC':
+        group(page, TICKS).get_by_role('checkbox', name=name, exact=True).click()
+    assert says(page, TICKS) == 'You say: B, C.'
+    group(page, FEW).get_by_role('radio', name='3').click()
+    assert says(page, FEW) == 'You say: 3 threads.'
+    assert not page.evaluate(WIDER)
+    came = {'A': 'some', 'B': 'none', 'C': 'some'}
+    table = TICKS.kind.came(
+        {row: {n: came[v] for n, v in one.items()} | {'runs': '7'} for row, one in CELLS.items()}
+    )
+    page = phone(Gap(Guess(TICKS.question, TICKS.kind, [1, 2]), {'at': [1], 'table': table}))
+    assert says(page, TICKS) == 'It is B: you said B, C.'
+    cells = [' '.join(cell.split()) for cell in group(page, TICKS).locator('td').all_inner_texts()]
+    assert cells == ['', 'A some', 'B none', '7', 'C some', '', '7']
+    page.screenshot(path=artefacts / 'guess_ticks.png', full_page=True)
+
+
+def test_a_class_lights_up_where_it_was_right(phone):
+    level = Guess(LEVEL.question, LEVEL.kind)
+    page = phone(Gap(level, {'at': 14, 'tolerance': 2}), Gap(ONE, {'at': 0}))
+    told = [
+        {'question': LEVEL.question, 'values': [14, 14, 16, 40]},
+        {'question': ONE.question, 'values': ['yes', 'no', 'yes']},
+    ]
+    page.evaluate(
+        "told => document.dispatchEvent(new CustomEvent('class', { detail: told }))", told
+    )
+    assert says(page, LEVEL) == 'It is 14 messages.'  # nobody has guessed here
+    assert group(page, LEVEL).locator('.class circle').count() == 4
+    assert group(page, LEVEL).locator('.class .right').count() == 3
+    assert group(page, ONE).locator('.guess-true .guess-class i').count() == 2
+    assert group(page, ONE).locator('.guess-class i').count() == 3
 
 
 def test_a_finger_puts_the_robot_there(file_page, tmp_path):

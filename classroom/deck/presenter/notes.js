@@ -45,11 +45,12 @@ function show(state) {
   find('slide').textContent = `${state.slide} of ${state.slides}`;
   for (const id of ['own', 'planned', 'all', 'step']) find(id).textContent = state[id];
   showMinutes();
-  for (const id of ['notes', 'next']) {
+  for (const id of ['rest', 'notes', 'next']) {
     if (state[id] === before[id]) continue; // what is unfolded or scrolled stays so
     find(id).innerHTML = state[id];
     scrollTo(0, 0);
   }
+  find('goes-on').hidden = !state.rest;
 }
 
 setInterval(follow, ASK_MS);

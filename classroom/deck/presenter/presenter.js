@@ -16,7 +16,7 @@ const SAVE_MS = 300;
 const SCALES = { texts: [1.6, 1.45, 1.3, 1.15, 1, 0.95, 0.9], code: [1.25, 1.1, 1, 0.95, 0.9] };
 const TYPED = 'textarea, select, [contenteditable], input:not([type=range], [type=number], [type=button])';
 // What works with the focus in a replay, a level or a list, too: its other keys are its own.
-const EVERYWHERE = ['pagedown', 'pageup', 'b', '.', 'n', 's', 'j', 'escape', 'f5', 'Control s', 'Control r'];
+const EVERYWHERE = ['pagedown', 'pageup', 'b', '.', 'n', 's', 'j', 't', 'escape', 'f5', 'Control s', 'Control r'];
 
 let packages; // of JupyterLab, by name
 let server; // { baseUrl, ask, open }
@@ -91,7 +91,7 @@ function begin(app, tracker, actions, { makeRequest }, dialogs) {
     if (deck && event.target.closest?.('.jp-MarkdownCell')) event.stopImmediatePropagation();
   }, true);
   window.addEventListener('message', onGuesses);
-  document.addEventListener('class-wanted', tellPictures);
+  document.addEventListener('class-wanted', () => setTimeout(tellPictures)); // once it is drawn
   window.addEventListener('message', onNotesWindow);
   window.addEventListener('resize', () => deck && fit());
   // A dialog has no place on a projector, and would take the keys: a line says what it says, and its
@@ -221,16 +221,25 @@ const hasRun = ({ model }) => model.executionCount > 0 || model.executionState =
 
 const isSolution = ({ model }) => model.getMetadata('tags')?.includes('solution');
 
+// What a text says beyond what a slide shows of it (../texts.py): for the notes window, or for T.
+const isRest = cell => kindOf(cell) === 'notes';
+
 // Return the slides: the indices of their cells.
 function slides() {
   const found = [];
   deck.content.widgets.forEach((cell, index) => {
     const kind = kindOf(cell);
-    if (kind === 'skip') return;
-    if (kind || !found.length) found.push([]);
+    if (kind === 'skip' || (isRest(cell) && !deck.deckWhole)) return;
+    if ((kind && !isRest(cell)) || !found.length) found.push([]);
     found.at(-1).push(index);
   });
   return found;
+}
+
+// The whole texts, or what a slide shows of them.
+function whole() {
+  deck.deckWhole = !deck.deckWhole;
+  goTo(here(), deck.content.activeCellIndex);
 }
 
 function slideOf(place) {
@@ -280,7 +289,9 @@ function update() {
   const slide = shownOn(all[number]);
   widgets.forEach(({ node, model }, index) => {
     node.classList.toggle('deck-on', slide.includes(index));
+    node.classList.toggle('deck-rest', isRest(widgets[index]) && !deck.deckWhole);
     node.classList.toggle('deck-runs', model.executionState === 'running');
+    node.classList.toggle('deck-ran', model.type === 'code' && hasRun(widgets[index]));
   });
   const sourceOf = index => widgets[index].model.sharedModel.getSource();
   const step = all.slice(0, number + 1).map(([first]) => first).findLast(first => widgets[first].model.type === 'markdown' && /^##? /.test(sourceOf(first)));
@@ -304,15 +315,25 @@ function update() {
   if (about) void showGuesses(about, place);
 }
 
-// The letters are as large as the slide has room for. What grows below it comes into view.
+// The letters are as large as the slide has room for. If there is none even for small ones, code that
+// has run makes room for what came out: see deck-tight in deck.css. What grows below comes into view.
 function fit() {
   const { node, viewportNode, widgets } = deck.content;
   const outer = scroller();
-  const hasCode = widgets.some(cell => cell.node.classList.contains('deck-on') && cell.model.type === 'code');
+  const on = widgets.filter(cell => cell.node.classList.contains('deck-on'));
+  const isText = ({ model, inputHidden }) => model.type !== 'code' || (inputHidden && !model.outputs?.length);
+  const hasCode = !on.every(isText);
+  for (const { node: cell } of on) cell.classList.toggle('deck-drives', cell.querySelectorAll('.replay:has(.replay-floor)').length > 1);
   let room = 0;
   viewportNode.style.marginTop = 0;
-  for (const scale of SCALES[hasCode ? 'code' : 'texts']) {
+  const least = SCALES.code.at(-1);
+  const tries = hasCode
+    ? [...SCALES.code.filter(scale => scale >= 1).map(scale => [scale, 0]), ...SCALES.code.map(scale => [scale, 1]), [least, 2]]
+    : SCALES.texts.map(scale => [scale, 0]);
+  for (const [scale, tight] of tries) {
     node.style.setProperty('--deck-scale', scale);
+    deck.toggleClass('deck-tight', tight > 0);
+    deck.toggleClass('deck-tighter', tight > 1);
     room = outer.clientHeight - viewportNode.getBoundingClientRect().height;
     if (room >= 0) break;
   }
@@ -388,6 +409,8 @@ async function tell(place) {
   const path = context.path;
   void tellClass({ lesson: path.match(/\d\d_(\w+)\.ipynb$/)?.[1], cell: cells[at].id, began_s: began ?? null, ...minutes });
   const following = (all[here() + 1] ?? []).map(index => cells[index]);
+  const until = all[here() + 1]?.[0] ?? cells.length;
+  const rest = cells.filter((_, index) => index > all[here()][0] && index < until && isRest(content.widgets[index]));
   const state = {
     lesson: step.lesson,
     step: step.step,
@@ -396,6 +419,7 @@ async function tell(place) {
     began,
     ...minutes,
     notes: step.notes,
+    rest: (await Promise.all(rest.map(htmlOf))).join(''),
     next: (await Promise.all(following.map(htmlOf))).join(''),
   };
   if (place !== shownPlace) return; // the deck has gone on meanwhile
@@ -431,8 +455,14 @@ async function showGuesses({ model, node }, place) {
 }
 
 // Pictures on the slide draw the numbers that the class has guessed: those of now, and later ones.
+// What they draw needs no bars.
 function tellPictures() {
   document.dispatchEvent(new CustomEvent('class', { detail: classGuesses }));
+  const frame = document.getElementById('deck-guesses');
+  const draws = document.querySelector('.deck-on :is(.guess-class, .class > *)') ? 'drawn' : 'bars';
+  if (!frame || draws === frame.dataset.draws) return;
+  frame.dataset.draws = draws;
+  frame.contentWindow.postMessage(draws, new URL(frame.src).origin);
 }
 
 function onGuesses({ source, data }) {
@@ -482,6 +512,7 @@ const KEYS = {
   r: () => again('r', 'R again: throw away what was typed and run in this lesson', fresh),
   s: showAnswers,
   j: () => void showJoins(),
+  t: whole,
   b: () => document.body.classList.add('deck-black'),
   '.': () => document.body.classList.add('deck-black'),
   n: () => void window.open(server.baseUrl + NOTES, 'notes', 'popup'),

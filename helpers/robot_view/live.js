@@ -1,0 +1,63 @@
+// A drive while it happens: the floor of drive.js and the queue of board.js, as live.py tells of them
+// by the event 'drive'. Between two tellings the robot goes on, a little later than it does.
+const LATE_MS = [150, 300]; // later than this it hurries, and more it never is
+
+function live(root, record) {
+  const { poses, depth } = record;
+  const run = drive(record, root);
+  const shown = floor(run, record, drawing(root.querySelector('img')));
+  const says = element('p', { class: 'replay-says' });
+  const time = element('span', { class: 'replay-time' });
+  const lost = element('span', { class: 'replay-count' });
+  const setup = { callbacks: [{ name: 'callback', depth }], threads: ['thread 1'], groups: [] };
+  const queue = depth && board(setup, ['threads', 'queue']);
+  const off = (name, kind) => element('button', { type: 'button', disabled: '', class: kind }, name);
+  let [ms, heard, before] = [0, 0, undefined];
+
+  // Rows come again and again: a telling may be lost.
+  function put(rows) {
+    for (const [name, { from, added }] of Object.entries(rows)) {
+      while (record[name].length < from) record[name].push(record[name].at(-1) ?? added[0]);
+      record[name].splice(from, record[name].length, ...added);
+    }
+    run.points.push(...poses.slice(run.points.length).map(run.point));
+  }
+
+  function hear({ detail }) {
+    if (!root.isConnected) return document.removeEventListener('drive', hear);
+    if (detail.id !== record.id) return;
+    put(detail.rows);
+    heard = detail.ms;
+    Object.assign(record, { took: detail.took });
+    says.textContent = detail.says;
+    if (!queue) return;
+    setup.threads = detail.busy.map((_, i) => `thread ${i + 1}`);
+    const item = seq => ({ callback: 0, seq });
+    queue.draw({ runs: detail.busy.map(seq => (seq === null ? undefined : item(seq))), queues: [detail.waits.map(item)], lost: [], values: {} });
+    lost.textContent = `${detail.lost} lost`;
+  }
+
+  function frame(now) {
+    if (!root.isConnected) return;
+    const hurry = heard - ms > LATE_MS[0] ? 1.25 : 1;
+    ms = Math.min(Math.max(ms + hurry * (now - (before ?? now)), heard - LATE_MS[1]), heard);
+    before = now;
+    shown.draw(0, 1000 * ms, true);
+    time.textContent = `${(ms / 1000).toFixed(3)} s`;
+    requestAnimationFrame(frame);
+  }
+
+  const beside = queue && element('div', { class: 'replay-run' }, row('time', time), queue.rows[0], row('', lost), queue.rows[1]);
+  root.querySelectorAll('figure').forEach(figure => figure.remove());
+  root.querySelector('p').before(
+    element('div', { class: 'replay-controls', 'aria-hidden': 'true' }, off('‹'), off('›'), off('● Live', 'replay-play'), off('1×', 'replay-rate'),
+      element('input', { type: 'range', disabled: '', min: 0, max: 1, value: 1 })),
+    says, element('div', { class: 'replay-runs' }, shown.node, ...(queue ? [beside] : [])));
+  root.classList.add('replay-on');
+  document.addEventListener('drive', hear);
+  put({});
+  requestAnimationFrame(frame);
+}
+
+const root = document.currentScript.closest('.replay');
+live(root, JSON.parse(root.dataset.record));
