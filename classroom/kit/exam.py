@@ -34,6 +34,7 @@ from helpers.faults import FAULTS, FILE, KINDS, NAME, Fault, read
 
 ROBOTS = ('uma', 'vic', 'wim', 'xia', 'yuri', 'zoe')
 EACH = 3
+GIVEN = re.compile(r'(\d{3,})(?: ?\(\d+\))?\.tar\.gz')  # a browser may add a number
 ANSWERS = 'answers.yaml'
 HEAD = """\
 # What is wrong with each robot? The kinds are: {kinds}.
@@ -161,7 +162,7 @@ def judge(folder: Path, faults: dict[str, Fault], students: list[Student], seed:
     found, _ = submissions_of(folder)
     table = [['number', 'name', 'robot', 'fault', 'kind', 'evidence', 'said', 'mend']]
     for student in students:
-        same = [one for one in found if student.number == (one.number or _digits(one.name))]
+        same = [one for one in found if number_of(one) == int(student.number)]
         answers, files, said = handed_in(same[0]) if same else ({}, {}, ['nothing is handed in'])
         for robot, fault in drawn(faults, seed, student.number).items():
             kind, proves, why = judged(fault, robot, answers.get(robot))
@@ -172,9 +173,14 @@ def judge(folder: Path, faults: dict[str, Fault], students: list[Student], seed:
     return table
 
 
-def _digits(name: str) -> str:
-    found = re.search(r'\d+', name)
-    return found[0] if found else ''
+def number_of(one: Submission) -> int | None:
+    """Return the number of a student: that of the archive which the student got, if it is kept.
+
+    Else it is the number in Moodle or Canvas, or that in the name of a file.
+    """
+    names = [GIVEN.fullmatch(file.name.rpartition('/')[2]) for file in one.files]
+    found = [match[1] for match in names if match] + re.findall(r'\d+', one.number or one.name)
+    return int(found[0]) if found else None
 
 
 def main(arguments: list[str] | None = None) -> int:

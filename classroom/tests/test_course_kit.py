@@ -132,6 +132,27 @@ def test_an_exam_is_judged_by_evidence_and_shows_the_mend(private):
     assert rows['17', exam.ROBOTS[0]]['name'] == "'=Cy"
 
 
+@pytest.mark.parametrize(
+    'path', ['001.tar.gz', 'Ada_17_assignsubmission_file/001 (2).tar.gz', 'ada_5_90_001.tar.gz']
+)
+def test_the_archive_that_a_student_got_says_whose_it_is(private, path):
+    """Whatever number Moodle or Canvas gives: here that of another student."""
+    assert run(private) == 0
+    files = unpacked(private / 'out/001.tar.gz')
+    folder = private / 'handed_in'
+    (folder / path).parent.mkdir(parents=True)
+    with tarfile.open(folder / path, 'w:gz') as archive:
+        for name, content in files.items():
+            info = tarfile.TarInfo(name)
+            info.size = len(content)
+            archive.addfile(info, io.BytesIO(content))
+    assert run(private, '--folder', folder) == 0
+    text = (private / 'out/judged.csv').read_text(encoding='utf-8')
+    said = {row['number']: row['said'] for row in csv.DictReader(io.StringIO(text))}
+    assert said['1'] == 'not answered'
+    assert said['17'].startswith('nothing is handed in')
+
+
 def test_what_students_have_is_no_exam(private, capsys):
     shutil.copytree(FAULTS['two_clocks'].folder, private / 'faults/two_clocks')
     assert run(private) == 1

@@ -15,7 +15,7 @@ import pytest
 from classroom.grade import alike, limits, runner
 from classroom.grade.__main__ import main
 from classroom.grade.answers import answers_of, handed_out, lesson_of
-from classroom.grade.judge import FULL, LIMIT_MET
+from classroom.grade.judge import FULL, LIMIT_MET, HungError, Kernel, Witness
 from classroom.grade.marking import Marking
 from classroom.grade.results import Kept, Outcome, Result, digest_of, job_of, result_of
 from classroom.grade.source import code_only
@@ -822,6 +822,9 @@ def test_real_checks_judge_and_survive(submit, capsys):
         f'Cy: lesson 00: 0 of {OF}; task 1: its code ended the kernel',
         f'Di: lesson 00: 1 of {OF}',
     ]
+    with zipfile.ZipFile(folder.with_name('submissions_graded') / 'feedback.zip') as archive:
+        told = archive.read('Bob/b.ipynb').decode()
+    assert 'Speed is distance' in told  # the hint of that point, at once
 
 
 FORGERY = """
@@ -864,6 +867,19 @@ def test_a_cell_meets_its_limits_in_a_real_kernel(submit, capsys):
     for line, (name, (_, why)) in zip(lines, LIMITED.items(), strict=False):
         assert line.startswith(f'{name}: lesson 00: 0 of {OF}')
         assert f'task 1: its cell {why}' in line
+
+
+def test_a_kernel_that_ends_without_memory_has_its_sentence(tmp_path):
+    """It ends without a word, and the system does not count it: it was full when last looked at."""
+    kernel = Kernel(tmp_path)
+    witness = Witness(kernel, tmp_path, 'start_here')
+    take = 'import os, time\nhoard = bytearray(2_100_000_000)\ntime.sleep(1)\nos._exit(1)'
+    try:
+        with pytest.raises(HungError, match=limits.MUCH_MEMORY):
+            kernel.run(take, 60)
+    finally:
+        witness.close()
+        kernel.close()
 
 
 STUBBORN = """
