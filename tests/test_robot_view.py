@@ -134,7 +134,7 @@ def test_a_picture_without_scripts_is_at_the_bump():
 
 
 def live_record(view):
-    return json.loads(unescape(re.search("data-record='([^']*)'", view.html())[1]))
+    return json.loads(unescape(re.search("data-live='([^']*)'", view.html())[1]))
 
 
 def test_the_live_laser_belongs_to_its_pose(script):

@@ -164,7 +164,7 @@ function floor(run, record, svg) {
     return run.says(position);
   }
 
-  const node = element('div', { class: record.strip ? 'replay-floor replay-lane' : 'replay-floor' }, ...(record.name ? [element('b', {}, record.name)] : []), svg,
+  const node = element('div', { class: record.strip ? 'replay-floor replay-lane' : 'replay-floor' }, ...(record.name ? [element('b', {}, record.name)] : []), ...(record.label ? [element('b', { class: 'replay-label' }, record.label)] : []), svg,
     row('time', time), row('robot', robot), row('told', told));
   if (mine) {
     guessed();

@@ -60,4 +60,4 @@ function live(root, record) {
 }
 
 const root = document.currentScript.closest('.replay');
-live(root, JSON.parse(root.dataset.record));
+live(root, JSON.parse(root.dataset.live));

@@ -138,7 +138,7 @@ class LiveView:
         guessed = (*self._guess.kind.scripts, MEMORY) if self._guess else ()
         files = (*guessed, 'element.js', 'board.js', HERE / 'drive.js', HERE / 'live.js')
         return (
-            f'<div class="replay robot-live" data-record={attribute(record)}>'
+            f'<div class="replay robot-live" data-live={attribute(record)}>'
             f'{style(DRIVE_CSS, CSS)}{picture_of(svg, floor_in_words(floor))}'
             f'<p>A drive on the floor {escape(floor.name)}.</p>'
             f'<script>{script(*files)}</script></div>'

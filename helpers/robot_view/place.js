@@ -61,13 +61,26 @@ const placeKind = (() => {
 
     // The robots of a class, one beside the other. Those who were right light up at the end.
     const ghosts = make('g', { class: 'class' });
-    group.insertBefore(ghosts, you);
-    classOf(record, values => ghosts.replaceChildren(...values.filter(Number.isFinite).map((value, i) => {
-      const [cx, cy] = along(Math.max(value, radius), ((i * 37) % 9 - 4) * 0.1);
-      const ghost = make('circle', { cx, cy, r: r / 2, fill: 'var(--look-you)', 'fill-opacity': 0.35 });
-      ghost.dataset.at = value;
-      return ghost;
-    })));
+    group.insertBefore(ghosts, svg.querySelector('.robot'));
+    let stands = null;
+    classOf(record, values => {
+      ghosts.replaceChildren(...values.filter(Number.isFinite).map((value, i) => {
+        const [cx, cy] = along(Math.max(value, radius), ((i * 37) % 9 - 4) * 0.1);
+        const ghost = make('circle', { cx, cy, r: r / 2, fill: 'var(--look-you)' });
+        ghost.dataset.at = value;
+        return ghost;
+      }));
+      light();
+    });
+
+    function light() {
+      const outcome = stands && { at: metres(stands), hit: hits(record, metres(stands)), what: '', cause: '' };
+      ghosts.childNodes.forEach(ghost => {
+        const isRight = outcome && gap(record, +ghost.dataset.at, outcome).right;
+        ghost.setAttribute('fill', isRight ? 'var(--look-robot)' : 'var(--look-you)');
+        ghost.setAttribute('fill-opacity', isRight ? 1 : 0.35);
+      });
+    }
 
     function put(value) {
       now = value;
@@ -81,11 +94,8 @@ const placeKind = (() => {
     function measure(pose) {
       bracket.setAttribute('d', '');
       far.textContent = '';
-      ghosts.childNodes.forEach(ghost => {
-        const isRight = pose && Math.abs(+ghost.dataset.at - metres(pose)) <= RIGHT;
-        ghost.setAttribute('fill', isRight ? 'var(--look-robot)' : 'var(--look-you)');
-        ghost.setAttribute('fill-opacity', isRight ? 1 : 0.35);
-      });
+      stands = pose;
+      light();
       if (!pose || now === null) return;
       const real = metres(pose);
       if (Math.abs(real - now) < RIGHT / 2) return;

@@ -46,6 +46,7 @@ class Drive:
     setup: None = None
     opens: str = 'bump'  # where it opens: at its first bump, if there is one, or at its 'end'
     guess: Guess | None = None  # of a place on this floor
+    label: str = ''  # what it is called beside other drives of the same cell
 
     @property
     def scripts(self) -> tuple[Path, ...]:
@@ -112,6 +113,7 @@ class Drive:
         step, poses = self.sampled()
         return {
             'name': self.name,
+            **({'label': self.label} if self.label else {}),
             'outcome': self.headline,
             **({'guess': self._guessed()} if self.guess else {}),
             'step': round(step, 4),
@@ -237,7 +239,7 @@ def replay_drive(
     called = f'{name}: ' if name else ''
     summary = f'{called}A drive on the floor {record.floor.name}. The robot {end}.'
     if recording is None:
-        return Replay((Drive(record, summary, opens=opens, guess=guess),))
+        return Replay((Drive(record, summary, opens=opens, guess=guess, label=name),))
     if record.started_s is None:
         raise ValueError(
             'In sim time a drive and a recording share no clock: replay the drive alone.'
@@ -247,7 +249,7 @@ def replay_drive(
     (run,) = replay(table, recording.depth).runs
     # How many messages there were differs from run to run.
     words = run.summary.partition(', ')[2]
-    drive = Drive(record, summary, recording, opens=opens, guess=guess)
+    drive = Drive(record, summary, recording, opens=opens, guess=guess, label=name)
     after_s = drive.span_s[1] - run.moves[-1][0] / 1e6
     words = called + words[0].upper() + words[1:]
     run = replace(run, summary=words, time_label=TIME_LABEL, after_s=after_s)

@@ -24,7 +24,9 @@ from helpers.lesson import (
     beside_time,
     code_of_solution,
     compares,
+    first_heading,
     guess_of,
+    has_heading,
     names_of_memory,
     tags,
     with_slugs,
@@ -76,17 +78,22 @@ def page_of(lesson: Lesson, figures: Path) -> NotebookNode:
         if cell.cell_type == 'code' and (names := names_of_memory(cell.source)):
             cell.outputs = []
             cells.append(_quiz_of(cell, names))
-    cells[0].source = _with_download(cells[0].source, lesson.file)
+    cells[0].source = _with_download(cells[0].source, lesson)
     notebook.cells = cells
     notebook.metadata['language_info'] = {'name': 'python', 'pygments_lexer': 'cell'}
     return notebook
 
 
-def _with_download(opening: str, file: str) -> str:
-    """Return the first cell with a link to the lesson as it is, on one line with its time."""
-    link = f'<a href="{file}" download>Download the notebook</a>'
-    beside = beside_time(opening, f'<span class="lesson-file"> · {link}</span>')
-    return beside or f'{opening}\n\n<span class="lesson-file">{link}</span>'
+def _with_download(opening: str, lesson: Lesson) -> str:
+    """Return the first cell with links on the line of its time: to its beginning, and its file."""
+    first = next(first_heading(c.source) for c in lesson.cells if has_heading(c, '## '))
+    slug = re.sub(r'[^\w\- ]', '', first.lower()).replace(' ', '-')
+    links = (
+        f'<a class="begin" href="#{slug}">Begin</a> · '
+        f'<a href="{lesson.file}" download>Download the notebook</a>'
+    )
+    beside = beside_time(opening, f'<span class="lesson-file"> · {links}</span>')
+    return beside or f'{opening}\n\n<span class="lesson-file">{links}</span>'
 
 
 def is_widget(output: NotebookNode) -> bool:

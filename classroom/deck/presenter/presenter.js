@@ -14,6 +14,7 @@ const TWICE_MS = 2000; // I I, 0 0, R R and Escape Escape come within this time
 const SAVE_MS = 300;
 // Of the letters of a slide: what does not fit in the smallest ones is scrolled.
 const SCALES = { texts: [1.6, 1.45, 1.3, 1.15, 1, 0.95, 0.9], code: [1.25, 1.1, 1, 0.95, 0.9] };
+const FIGURES = [42, 38, 34, 30]; // how high a picture is that makes room, in the unit of deck.css
 const TYPED = 'textarea, select, [contenteditable], input:not([type=range], [type=number], [type=button])';
 // What works with the focus in a replay, a level or a list, too: its other keys are its own.
 const EVERYWHERE = ['pagedown', 'pageup', 'b', '.', 'n', 's', 'j', 't', 'escape', 'f5', 'Control s', 'Control r'];
@@ -328,12 +329,13 @@ function fit() {
   viewportNode.style.marginTop = 0;
   const least = SCALES.code.at(-1);
   const tries = hasCode
-    ? [...SCALES.code.filter(scale => scale >= 1).map(scale => [scale, 0]), ...SCALES.code.map(scale => [scale, 1]), [least, 2]]
+    ? [...SCALES.code.filter(scale => scale >= 1).map(scale => [scale, 0]), ...SCALES.code.map(scale => [scale, 1]), ...FIGURES.map(tall => [least, 2, tall])]
     : SCALES.texts.map(scale => [scale, 0]);
-  for (const [scale, tight] of tries) {
+  for (const [scale, tight, tall] of tries) {
     node.style.setProperty('--deck-scale', scale);
     deck.toggleClass('deck-tight', tight > 0);
     deck.toggleClass('deck-tighter', tight > 1);
+    node.style.setProperty('--deck-tall', tall);
     room = outer.clientHeight - viewportNode.getBoundingClientRect().height;
     if (room >= 0) break;
   }
