@@ -24,7 +24,11 @@ from tools.lessons.first_pictures.drives import drive_picture
 from tools.lessons.first_pictures.faults import faults_picture
 from tools.lessons.first_pictures.queues import gate_picture, queue_picture, threads_picture
 from tools.lessons.first_pictures.sensors import camera_picture, lidar_picture, wheels_picture
-from tools.lessons.first_pictures.windows import program_picture, terminal_picture
+from tools.lessons.first_pictures.windows import (
+    command_picture,
+    program_picture,
+    terminal_picture,
+)
 
 IMAGES = FOLDER / PICTURES
 PHOTOGRAPH = re.compile(r'data:image/png;base64,([^"]*)')
@@ -40,7 +44,12 @@ FIRST = {
     'keep_what_is_fresh': one_brake_picture,
     'call_a_service_from_a_callback': partial(call_picture, cell_id='drive-deadlock'),
     'run_a_long_job': partial(drive_picture, cell_id='lesson-07-19', share=0.5),
-    'set_parameters': partial(drive_picture, cell_id='run-15-obey'),
+    'set_parameters': partial(
+        command_picture,
+        cell_id='drive-15',
+        command='ros2 param set /driver max_speed 0.0',
+        drive='run-15-obey',
+    ),
     'make_a_package': partial(
         terminal_picture,
         lines=[

@@ -22,6 +22,7 @@ class Lane(NamedTuple):
     """What a lane shows, from which metre of the corridor on, and where: all else is pixels."""
 
     from_m: float
+    wall_m: float = WALL_M
     left: float = PAD
     height: float = 90
     middle: float = 33  # where the robot drives, below the upper edge
@@ -32,7 +33,7 @@ class Lane(NamedTuple):
 
     @property
     def scale(self) -> float:
-        return self.wall_x / (WALL_M - self.from_m)
+        return self.wall_x / (self.wall_m - self.from_m)
 
     def x(self, metres: float) -> float:
         return self.scale * (metres - self.from_m)
@@ -43,7 +44,7 @@ class Lane(NamedTuple):
 
     def floor(self, before_wall_m: float) -> str:
         """Return the strip, its wall, and a line so far before it."""
-        wall, line = self.wall_x, self.x(WALL_M - before_wall_m)
+        wall, line = self.wall_x, self.x(self.wall_m - before_wall_m)
         return (
             f'<path class="way" d="M0 0H{wall:.1f}V{self.height}H0z"/>'
             f'<path class="line" d="M{line:.1f} 0V{self.height}"/>'

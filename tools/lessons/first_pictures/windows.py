@@ -1,4 +1,4 @@
-"""Windows with text: a terminal and what commands have printed, or a program above its drive."""
+"""Windows with text: a terminal and what it has printed, or a program or command above a drive."""
 
 from html import escape
 
@@ -18,6 +18,7 @@ from tools.lessons.first_pictures.look import (
 
 LINE, PAD = 32, 18  # pixels
 LANE = Lane(from_m=0.95, height=66)
+HALL_LANE = LANE._replace(wall_m=7.5)  # of the floor that set_parameters draws
 STOPS_M = 0.4  # where the robot of the program stands
 STYLE = """
 .window{fill:COLOUR(way);stroke:COLOUR(wall);stroke-opacity:.5}
@@ -80,14 +81,31 @@ def program_picture(lesson: Lesson, cell_id: str, lines: list[str], drive: str) 
         if not any(one.startswith(line) for one in code):
             raise ValueError(f'{cell_id} of {lesson.name} has no line {line!r} any more.')
         shown.append(('typed good' if 'Your code' in line else 'printed ink', line))
-    height, program = window(shown)
     (run,) = runs_of(output_of(lesson, drive))
+    return _above_a_drive(lesson, shown, run, LANE, STOPS_M, 'Which C++ stops it before the wall?')
+
+
+def command_picture(lesson: Lesson, cell_id: str, command: str, drive: str) -> str:
+    """Return a command of a cell, which comes when its robot is told to stop, and the drive."""
+    if f'!{command}' not in cell(lesson, cell_id).source:
+        raise ValueError(f'{cell_id} of {lesson.name} has no command {command!r} any more.')
+    (run,) = runs_of(output_of(lesson, drive))
+    stops_ms = next(at for at, v, *_ in run['commands'] if not v)
+    delay = PLAYS_S * stops_ms / 1000 / way_of(run)[-1][0]
+    shown = [(f'typed ink later" style="animation-delay:{delay:.2f}s', f'$ {command}')]
+    return _above_a_drive(lesson, shown, run, HALL_LANE, 0, 'Why does the driver listen to it?')
+
+
+def _above_a_drive(
+    lesson: Lesson, shown: list[tuple[str, str]], run: dict, lane: Lane, stops_m: float, asks: str
+) -> str:
+    """Return a window above a saved drive, and a question below it."""
+    height, lines = window(shown)
     way = way_of(run)
-    robot, css = LANE.robot('r', [(t_s * PLAYS_S / way[-1][0], x) for t_s, x in way])
+    robot, css = lane.robot('r', [(t_s * PLAYS_S / way[-1][0], x) for t_s, x in way])
     body = (
-        f'{program}{LANE.at(height + 6, LANE.floor(STOPS_M) + robot)}'
-        f'<text class="asks ink" x="{LANE.left}" y="{height + LANE.height + 34:.0f}">'
-        'Which C++ stops it before the wall?</text>'
+        f'{lines}{lane.at(height + 6, lane.floor(stops_m) + robot)}'
+        f'<text class="asks ink" x="{lane.left}" y="{height + lane.height + 34:.0f}">{asks}</text>'
     )
-    about = f'A program of {lesson.name}, and its real drive'
-    return svg(height + LANE.height + 50, about, STYLE + lanes.STYLE + css, body)
+    about = f'A window of {lesson.name}, and its real drive'
+    return svg(height + lane.height + 50, about, LATER + STYLE + lanes.STYLE + css, body)
