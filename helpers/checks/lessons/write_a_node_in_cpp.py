@@ -31,6 +31,7 @@ SCAN_S = 0.1  # between two scans of a laser
 TRY_S = 20  # for a program of ours to end
 START_S = 8  # for a program to start and be known to the others
 CALLS_MY_SPIN = 'brake.cpp calls spin, not my_spin: run the cell above this task again'
+NOT_ANSWERED = 'not judged: each scan must first be answered'
 READS_EMPTY = 'it reads the value of a std::optional that is empty'
 
 
@@ -670,12 +671,12 @@ def your_executor(workspace):
         return bool(drives(workspace, (3, 0.5), (0.55, 0.2), (0.25, 0.0)))
 
     def answers_after_a_pause():
-        needs(answers, 'not judged: each scan must first be answered')
+        needs(answers, NOT_ANSWERED)
         _, called = counts()
         return expect(called, 3, 'three messages come, 0.3 s apart; calls of the callback')
 
     def handles_what_it_took():
-        needs(built)
+        needs(answers, NOT_ANSWERED)
         calls, _ = counts()
         if calls == 2:
             return 'a callback was called though take_type_erased returned false'
