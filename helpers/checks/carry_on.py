@@ -11,7 +11,6 @@ taken that the student has neither solved nor borrowed.
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Iterator
 from importlib import import_module
@@ -36,8 +35,7 @@ from helpers.notebook import wrap
 if TYPE_CHECKING:
     from helpers.workspace import BuildResult, Workspace
 
-WRITE = re.compile(r'%%write (\S+)(?: part (\d+))?[ \t]*\n')
-TERMINAL = '%%terminal\n'
+WRITE, TERMINAL = '%%write ', '%%terminal\n'
 CPU_LIMIT_S, LIMIT_S = 60.0, 90.0  # of each point of the check that takes the whole
 MADE = shutil.ignore_patterns('__pycache__', '.pytest_cache', '*.egg-info')
 
@@ -131,11 +129,20 @@ def _parts(lesson: Lesson) -> Iterator[Part]:
             if cell in task.checks and not task.solutions and task.name in borrowed:
                 code = kept_solution(cell)
         name = task.name if task else ''
-        if found := WRITE.match(code):
-            number = found[2] and int(found[2])
-            yield Part(found[1], number, code[found.end() :], name)
+        if written := _written(code):
+            yield Part(*written, name)
         elif code.startswith(TERMINAL):
             yield Part('', None, code.removeprefix(TERMINAL), name)
+
+
+def _written(code: str) -> tuple[str, int | None, str] | None:
+    """Return the file that a cell writes, which part of it, and the text; None for other cells."""
+    from helpers.workspace import path_and_part
+
+    if not code.startswith(WRITE):
+        return None
+    line, _, text = code.removeprefix(WRITE).partition('\n')
+    return *path_and_part(line), text
 
 
 def _files(lesson: Lesson, solved: set[str]) -> set[str]:
@@ -143,8 +150,8 @@ def _files(lesson: Lesson, solved: set[str]) -> set[str]:
     owners = {cell.id: task.name for task in lesson.tasks for cell in task.cells}
     writers: dict[str, set[str]] = {}
     for cell in lesson.code_cells():
-        if found := WRITE.match(code_of_solution(cell.source)):
-            writers.setdefault(found[1], set()).add(owners.get(cell.id, ''))
+        if written := _written(code_of_solution(cell.source)):
+            writers.setdefault(written[0], set()).add(owners.get(cell.id, ''))
     return {file for file, tasks in writers.items() if tasks <= solved | {''}}
 
 

@@ -33,7 +33,7 @@ from helpers.workspace.processes import DIED, Process, show_launch, wait_until
 from helpers.workspace.rosdep import rosdep, run_rosdep
 from helpers.workspace.tf2_msgs import provide_tf2_msgs
 from helpers.workspace.wheels import fix_wheels
-from helpers.workspace.workspace import SMALL_RCLCPP, Workspace
+from helpers.workspace.workspace import SMALL_RCLCPP, Workspace, path_and_part
 
 __all__ = [
     'play_colleague',
@@ -59,6 +59,7 @@ __all__ = [
     'Workspace',
     'fix_wheels',
     'lines_that_matter',
+    'path_and_part',
     'provide_tf2_msgs',
     'without_folders',
 ]

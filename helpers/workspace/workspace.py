@@ -440,6 +440,12 @@ def _packages_done(lines: Sequence[str]) -> float:
 # --- In a notebook -------------------------------------------------------------------------------
 
 
+def path_and_part(line: str) -> tuple[str, int | None]:
+    """Return the file that a line of `%%write` names, and which part of it, None for all of it."""
+    path, part = re.fullmatch(r'(.*?)(?: part (\d+))?', line.strip()).groups()
+    return path.strip('\'"'), part and int(part)
+
+
 def write(line: str, cell: str) -> None:
     """`%%write PATH`: write the rest of the cell to a file of the open workspace.
 
@@ -449,10 +455,9 @@ def write(line: str, cell: str) -> None:
 
     if _open_workspace is None:
         raise UsageError("Open a workspace first: workspace = Workspace('my_lesson').")
-    path, part = re.fullmatch(r'(.*?)(?: part (\d+))?', line.strip()).groups()
-    path = path.strip('\'"')
+    path, part = path_and_part(line)
     try:
-        _open_workspace.write(path, cell, part and int(part))
+        _open_workspace.write(path, cell, part)
     except (ValueError, OSError) as error:
         raise UsageError(str(error)) from error
     print(f'Wrote part {part} of {path}' if part else f'Wrote {path}')

@@ -16,7 +16,7 @@ from typing import Any
 import yaml
 
 from helpers.lesson import ROOT, Lesson, code_of_solution, paths, read, tags
-from helpers.workspace import Workspace, why_it_failed
+from helpers.workspace import Workspace, path_and_part, why_it_failed
 
 HERE = Path(__file__).parent
 PROGRAMS, INSIDE = HERE / 'programs.yaml', HERE / 'inside'
@@ -149,9 +149,9 @@ def fill(lesson: Lesson, workspace: Workspace, also: dict[str, str | None]) -> N
         magic = MAGIC.match(code)
         body = code[magic.end() :] if magic else code
         if magic and magic[1] == 'write':
-            path, part = re.fullmatch(r'(.*?)(?: part (\d+))?', magic[2].strip()).groups()
+            path, part = path_and_part(magic[2])
             if not path.startswith('overlay/') or cell in also:
-                workspace.write(path, body, part and int(part))
+                workspace.write(path, body, part)
         elif magic and (cell in also or ('pkg create' in body and not magic[2])):
             workspace.terminal(body)
         elif cell in also and not magic:
