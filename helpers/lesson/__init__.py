@@ -87,6 +87,7 @@ from helpers.lesson.lesson import (
 from helpers.lesson.mentions import (
     bare_mentions,
     links_to_tasks,
+    slug_of_myst,
     with_mentions,
     with_slugs,
     without_links,
@@ -147,6 +148,7 @@ __all__ = [
     'path_of',
     'paths',
     'read',
+    'slug_of_myst',
     'starts_memory',
     'step_number',
     'tags',

@@ -68,14 +68,18 @@ def without_links(text: str) -> str:
     return LINK.sub(lambda link: link['text'] if link['name'] or link['task'] else link[0], text)
 
 
+def slug_of_myst(heading: str) -> str:
+    """Return what MyST, which makes the site, calls a heading in the address of a page."""
+    return re.sub(r'[^\w\- ]', '', heading.lower()).replace(' ', '-')
+
+
 def with_slugs(text: str) -> str:
     """Return a text whose links to tasks are as MyST, which makes the site, calls headings."""
 
     def written(link: re.Match) -> str:
         if not link['task']:
             return link[0]
-        slug_of_myst = re.sub(r'[^\w\- ]', '', link['task'][1:].lower())
-        return link[0].replace(link['task'], f'#{slug_of_myst}')
+        return link[0].replace(link['task'], f'#{slug_of_myst(link["task"][1:])}')
 
     return LINK.sub(written, text)
 

@@ -28,6 +28,7 @@ from helpers.lesson import (
     guess_of,
     has_heading,
     names_of_memory,
+    slug_of_myst,
     tags,
     with_slugs,
 )
@@ -87,9 +88,8 @@ def page_of(lesson: Lesson, figures: Path) -> NotebookNode:
 def _with_download(opening: str, lesson: Lesson) -> str:
     """Return the first cell with links on the line of its time: to its beginning, and its file."""
     first = next(first_heading(c.source) for c in lesson.cells if has_heading(c, '## '))
-    slug = re.sub(r'[^\w\- ]', '', first.lower()).replace(' ', '-')
     links = (
-        f'<a class="begin" href="#{slug}">Begin</a> · '
+        f'<a class="begin" href="#{slug_of_myst(first)}">Begin</a> · '
         f'<a href="{lesson.file}" download>Download the notebook</a>'
     )
     beside = beside_time(opening, f'<span class="lesson-file"> · {links}</span>')
