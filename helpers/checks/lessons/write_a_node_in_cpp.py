@@ -6,7 +6,6 @@ import shutil
 import signal
 import time
 from contextlib import suppress
-from dataclasses import dataclass, field
 
 from geometry_msgs.msg import Twist
 from sensor_msgs.msg import LaserScan
@@ -157,45 +156,22 @@ def the_nearest_range(workspace):
 # --- A program that answers scans -----------------------------------------------------------------
 
 
-@dataclass
-class Heard:
-    """What a program said to each scan, the names of its nodes, and why it said no more."""
+def hear(workspace, distances):
+    """Run the watcher, show it a wall at each of these distances, and return what it says (m).
 
-    answers: list = field(default_factory=list)
-    names: list = field(default_factory=list)
-    problem: str = ''
-
-    def first(self, count):
-        """Return the first answers. Raises Failed if there are fewer."""
-        if len(self.answers) < count:
-            raise Failed(self.problem, hint='')
-        return self.answers[:count]
-
-
-def hear(workspace, program, kind, topic, *distances):
-    """Run a program, show it a wall at each of these distances, and return what is `Heard`."""
-    heard = Heard()
-    with Bench() as bench, Program(workspace.run(program, program)) as running:
-        answers = bench.hear(topic, kind, RELIABLE)
-        try:
-            start(bench, running, topic, answers)
-            for distance in distances:
-                running.wait(lambda: True)  # it has not ended
-                ranges = [math.nan] * 3 if math.isnan(distance) else [3.5, distance]
-                bench.publisher('scan', LaserScan).publish(scan(ranges, limits=(0.1, 3.5)))
-                running.wait(lambda: len(answers) > len(heard.answers), STOP_S)
-                bench.quiet()
-                if len(answers) != len(heard.answers) + 1:
-                    count = f'scans: {len(heard.answers) + 1}, messages on {topic}: {len(answers)}'
-                    raise Failed(count)
-                heard.answers = [*answers]
-            # A program says how its nodes are called after the topics that they use.
-            bench.wait(lambda: names_of_others(bench.tester), START_S)
-            heard.names = names_of_others(bench.tester)
-        except Failed as failed:
-            heard.problem = READS_EMPTY if running.says(EMPTY_OPTIONAL) else str(failed)
-            running.end(signal.SIGKILL)  # a callback without an end would hear no Ctrl+C
-    return heard
+    Raises Failed if it does not say one number for each scan.
+    """
+    with Bench() as bench, Program(workspace.run('watcher', 'watcher')) as running:
+        answers = bench.hear('nearest', Float32, RELIABLE)
+        start(bench, running, 'nearest', answers)
+        for sent, distance in enumerate(distances, 1):
+            running.wait(lambda: True)  # it has not ended
+            bench.publisher('scan', LaserScan).publish(scan([3.5, distance], limits=(0.1, 3.5)))
+            running.wait(lambda sent=sent: len(answers) >= sent, STOP_S)
+            bench.quiet()
+            if len(answers) != sent:
+                raise Failed(f'scans: {sent}, messages on nearest: {len(answers)}')
+        return [round(message.data, 3) for message in answers]
 
 
 def meet(bench, running, topic):
@@ -302,11 +278,7 @@ def its_cmakelists(workspace):
 
     def watches(*distances):
         needs(built)
-        heard = hear(workspace, 'watcher', Float32, 'nearest', *distances)
-        if heard.problem:
-            return heard.problem
-        found = [round(message.data, 3) for message in heard.answers]
-        return expect(found, [*distances], f'walls at {distances} m; it says')
+        return expect(hear(workspace, distances), [*distances], f'walls at {distances} m; it says')
 
     hint = (
         'Four commands: find_package, add_executable, target_link_libraries, install(TARGETS ...).'
