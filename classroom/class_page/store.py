@@ -60,7 +60,7 @@ ORDER BY what, seat
 """
 
 
-# What an event is about, by its kind, and who knows the lesson of that.
+# What an event is about, by its kind, and what finds the lesson of that.
 FIELDS = {'guess': 'question', 'outcome': 'question', 'task': 'task', 'cell': 'cell'}
 HOMES = {'question': home_of_guess, 'task': home_of_task, 'cell': home_of_cell}
 

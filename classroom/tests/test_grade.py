@@ -929,7 +929,7 @@ os.wait()
 for _ in range(300):
     subprocess.Popen(['sleep', '1000'])
 """
-SOMEBODY = 12345  # root may start any number of programs; who is not root is that user
+SOMEBODY = 12345  # root may start any number of programs; this user may not
 
 
 def test_an_answer_starts_so_many_programs_and_leaves_none(submit, tmp_path):

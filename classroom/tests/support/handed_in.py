@@ -49,7 +49,7 @@ def submit(tmp_path):
 
 
 class Stand(runner.Where):
-    """Stands for the container: who writes RIGHT is right. It counts what it has judged."""
+    """Stands for the container: an answer with RIGHT is right. It counts what it has judged."""
 
     script = f"""
 import json, sys
