@@ -33,6 +33,7 @@ from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
 import helpers
+from helpers.ros.domain import configure_discovery
 
 HELPERS = Path(helpers.__file__).parent
 PRIVATE = re.compile(r'_[a-zA-Z]\w*')
@@ -46,6 +47,8 @@ NO_SECRETS = {
 @pytest.fixture(scope='module')
 def owners():
     """One of each kind of thing that has private names."""
+    # Fast DDS reads its profiles once in a process: later sessions need those of the course.
+    configure_discovery('LOCALHOST')
     context = rclpy.Context()
     context.init(domain_id=101)
     executor = MultiThreadedExecutor(2, context=context)

@@ -13,9 +13,9 @@ from helpers.lesson import path_of
 LESSON = path_of('lose_messages').name
 NAMES = {'ada': 41, 'bob': 14, 'cyd': 14}
 CELLS = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4).cells
-[GUESS] = [i for i, cell in enumerate(CELLS) if 'my_guess = guess(' in cell.source]
-[COMPARED] = [i for i, cell in enumerate(CELLS) if 'my_guess, ' in cell.source]
-QUESTION = re.search(r"guess\('(.*)', ", CELLS[GUESS].source)[1]
+[GUESS] = [cell for cell in CELLS if 'my_guess = guess(' in cell.source]
+[COMPARED] = [cell for cell in CELLS if 'my_guess, ' in cell.source]
+QUESTION = re.search(r"guess\('(.*)', ", GUESS.source)[1]
 # The line for the wall, and the address of the page.
 STARTED = r"(join_class\('.*', '.*'\))[\s\S]*?(http://localhost:\d+/\w+/)[\s\S]*Ctrl\+C"
 # A task that everybody solves.
@@ -32,7 +32,7 @@ raise_hand()
 def write_lesson_of(folder, name, join):
     """Write a lesson whose first cell makes its kernel a student of its own, who joins."""
     notebook = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4)
-    cells = [cell for cell in notebook.cells if cell is notebook.cells[GUESS]]
+    cells = [cell for cell in notebook.cells if cell.id == GUESS.id]
     own = f'{folder / name / "progress.txt"}'
     cells[0].source = f'my_guess = guess({QUESTION!r}, {NAMES[name]})'
     sources = [
@@ -114,7 +114,7 @@ sys.stdin.read()
             lab_page(presenter, 'class_deck', DeckPage) as deck,
         ):
             deck.present(LESSON)
-            deck.walk_to(GUESS)
+            deck.walk_to(GUESS.id)
             assert 'guessed\n' in iter(ada.stdout.readline, '')
             frame = deck.page.frame_locator('#deck-guesses')
             frame.get_by_text('1 of 1 have answered').wait_for()
@@ -137,6 +137,6 @@ sys.stdin.read()
             assert deck.page.locator('#deck-joins').count() == 0
             deck.press('Home')
             assert deck.page.locator('#deck-guesses').count() == 0
-            deck.walk_to(COMPARED)
+            deck.walk_to(COMPARED.id)
             frame.locator('.bars').wait_for()
             deck.screenshot('class_deck_compared')

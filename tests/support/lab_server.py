@@ -6,15 +6,16 @@ into the checkout but what lessons build in `scratch`.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
@@ -33,7 +34,7 @@ class Server(NamedTuple):
     folder: Path
 
 
-@contextmanager
+@contextlib.contextmanager
 def made(
     folder: Path, printed: str, *make: str, inside: Sequence[str] = ()
 ) -> Iterator[tuple[subprocess.Popen, re.Match]]:
@@ -59,6 +60,8 @@ def made(
             if process.poll() is not None or time.monotonic() > end:
                 raise RuntimeError(f'{make[0]} did not start:\n{log.read_text()}')
             time.sleep(0.05)
+        if not inside:
+            wait_until_it_listens(found[0], end)
         yield process, found
     finally:
         if process.poll() is None:
@@ -74,6 +77,20 @@ def made(
                 raise
 
 
+def wait_until_it_listens(printed: str, end: float) -> None:
+    """Wait until the port of a printed address takes connections, until a time of the clock.
+
+    JupyterLab prints its address in `start_app` and listens when its loop runs, a moment later.
+    """
+    if address := re.search(r'http://localhost:(\d+)', printed):
+        while time.monotonic() < end:
+            with contextlib.suppress(ConnectionRefusedError):
+                socket.create_connection(('localhost', int(address[1]))).close()
+                return
+            time.sleep(0.05)
+        raise RuntimeError(f'It printed {address[0]}, and nothing listens there.')
+
+
 def command_of(folder: Path, command: str, *options: str) -> list[str]:
     """Return a command of the Makefile that keeps JupyterLab's state in a folder."""
     # Two workers start servers at the same moment, and would both find the first free port. The
@@ -85,7 +102,7 @@ def command_of(folder: Path, command: str, *options: str) -> list[str]:
     return ['make', command, f'PORT={port}', 'BROWSER=no', f'ROOT={folder}', *variables, *options]
 
 
-@contextmanager
+@contextlib.contextmanager
 def server(folder: Path, *make: str) -> Iterator[Server]:
     """Run a command of the Makefile that starts JupyterLab, on a copy of the notebooks."""
     shutil.copytree(ROOT / 'notebooks', folder / 'notebooks', dirs_exist_ok=True)

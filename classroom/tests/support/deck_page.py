@@ -69,8 +69,13 @@ class DeckPage(LabPage):
         """Wait until a cell is revealed and has the focus, and all of its slide is drawn."""
         self.page.wait_for_function(SLIDE_DRAWN, arg=index)
 
-    def walk_to(self, index: int) -> None:
-        """Press Space until a cell is shown, and choose it."""
+    def walk_to(self, cell: str) -> None:
+        """Press Space until the cell with this id is shown, and choose it.
+
+        Its index is not that of the lesson: what a slide leaves of a text is two cells.
+        """
+        places = f'id => {PANEL}.content.widgets.findIndex(cell => cell.model.id === id)'
+        index = self.page.evaluate(places, cell)
         shown = f"index => {PANEL}.content.widgets[index].node.classList.contains('deck-on')"
         while not self.page.evaluate(shown, index):
             self.page.keyboard.press('Space')
