@@ -24,7 +24,8 @@ from helpers.robot.sensors import Sensors
 from helpers.robot_view import drive_by_hand, replay_drive, watch
 from helpers.robot_view.by_hand import Tour
 from helpers.robot_view.live import LiveView
-from helpers.ros import ros_session
+from helpers.robot_view.scans import ScanRecording
+from helpers.ros import ros_session, spun
 
 MOST_BYTES = 61_000
 
@@ -221,6 +222,22 @@ def test_one_sees_which_scan_it_acted_on(script, capsys):
     )
     # One slider for both: the page gets the queue as the second run.
     assert record_of(shown, 1)['setup']['callbacks'][0]['depth'] == 50
+
+
+def test_a_scan_of_just_before_the_recording_has_the_time_of_the_robot():
+    with ros_session() as session:
+        robot, node = Robot(CORRIDOR), Node('listener')
+        scans = node.create_subscription(LaserScan, 'scan', lambda scan: None, 50)
+        session.wait_until(lambda: len(robot.record.scans) > 3)  # they wait: nobody spins
+        recording = ScanRecording(robot, scans)
+        session.spin(spun(node))
+        session.wait_until(lambda: recording.heard > 5 and recording.published > 1)
+    table = recording.table().dropna(subset='started_s')
+    begun_s = recording.started_s - robot.record.started_s
+    first = robot.record.scans[table['seq'].iloc[0]]
+    assert begun_s == pytest.approx(first.t_s)
+    assert (table['published_s'] <= table['started_s']).all()
+    assert recording.table().equals(recording.table())
 
 
 # In a kernel

@@ -53,7 +53,7 @@ GROUP BY seat ORDER BY n
 SOLVED = """
 SELECT max(value) FROM events WHERE kind = 'task' AND lesson = ? AND what = ? GROUP BY seat
 """
-# Who has solved a task of which each student has another one, by what it was about.
+# Students who have solved a task that differs for each student, by what theirs was about.
 ABOUT = """
 SELECT what, value, seat FROM events WHERE kind = 'about' AND lesson = ?
 ORDER BY what, seat
@@ -165,7 +165,7 @@ class ClassStore:
 
     @property
     def is_closed(self) -> bool:
-        """Whether nobody new may join. Who has a seat keeps it."""
+        """Whether nobody new may join. A student who has a seat keeps it."""
         return self._db.execute('SELECT 1 FROM closed').fetchone() is not None
 
     def close_door(self, closed: bool) -> None:

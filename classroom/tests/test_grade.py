@@ -810,7 +810,8 @@ os._exit(3)
 def test_real_checks_judge_and_survive(submit, capsys):
     """A right answer, a wrong one, and one that ends the kernel: each gets its line.
 
-    Who has solved another task only is not accused of what the lesson's own solution does.
+    A student who has solved only another task is not accused of what the lesson's own solution
+    does.
     """
     files = {'Ada/a.ipynb': with_answer(RIGHT), 'Bob/b.ipynb': with_answer(WRONG)}
     other = json.dumps(notebook(**SECOND)).encode()

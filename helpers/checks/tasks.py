@@ -216,8 +216,8 @@ class Tasks:
     def borrow(self, task: str) -> None:
         """Put what the next steps need of a task into place, without showing it.
 
-        Who is stuck in an edition without solutions can go on. It is there after some tries, and is
-        not the student's: the task counts as borrowed, and not as solved.
+        A student who is stuck in an edition without solutions can go on. It is there after some
+        tries, and is not the student's: the task counts as borrowed, and not as solved.
 
         Raises UsageError with a sentence if it cannot be borrowed.
         """

@@ -72,8 +72,8 @@ const levelKind = (() => {
     you.append(svgElement('path', { class: 'you-round flag', d: `M0 ${LINE}V34`, stroke: 'var(--look-you)', 'stroke-width': 4 }),
       svgElement('circle', { cy: 34, r: 9, fill: 'var(--look-you)' }),
       svgElement('text', { class: 'you-label', y: 18 }));
-    // The class: a dot for each student, those who have said the same above each other. Who was right
-    // lights up.
+    // The class: a dot for each student, those who have said the same above each other. Those who were
+    // right light up.
     const ghosts = svgElement('g', { class: 'class' });
     ground.append(ghosts);
     svg.append(gapLine, gapLabel, you);

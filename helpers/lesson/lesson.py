@@ -372,7 +372,7 @@ class Lesson:
 
     @cached_property
     def starred(self) -> list[Node]:
-        """The cells below a heading with a star: whoever leaves tasks out need not run them."""
+        """The cells below a heading with a star, which a reader may leave out."""
         found, level = [], 0  # of the heading with a star that is open; 0: none is
         for cell in self.cells:
             headings = ANY_HEADING.finditer(cell.source) if cell.cell_type == 'markdown' else ()

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
+from geometry_msgs.msg import TwistStamped
 from rclpy.action import ActionClient
 from rclpy.node import Node
 
@@ -188,9 +189,11 @@ def ended_by(workspace: Workspace, end: str, halt: bool = False) -> Ended:
             for name, words in options.items()
         }
 
-        def is_there():  # `halt` must hear the guard before that one ends
+        def is_there():
             return client.count_publishers('cmd_vel') == 1 + halt
 
+        if halt:
+            _wait_until_it_misses(session, client, programs['guard'])
         _begin_to_drive(session, robot, server, [*programs.values()], is_there)
         since_s = robot.t_s
         if end in SIGNALS:
@@ -209,6 +212,31 @@ def ended_by(workspace: Workspace, end: str, halt: bool = False) -> Ended:
         if end == 'patrol freezes':
             os.kill(programs['patrol'].pid, signal.SIGCONT)  # or it could not end
     return Ended(robot, stands, sum(step.v for step in moves) / RATE_HZ, len(moves) / RATE_HZ)
+
+
+def _wait_until_it_misses(session: Session, client: Node, guard: Process) -> None:
+    """Freeze the guard until `halt` says that no command comes, then let it go on.
+
+    Only what `halt` has heard it can miss, and nobody else can see whom it has discovered. Without
+    this, a busy computer may end the guard before `halt` has met it. Raises RuntimeError if `halt`
+    says nothing, TimeoutError if the guard says nothing.
+    """
+    senders = set()
+    client.create_subscription(
+        TwistStamped, 'cmd_vel', lambda stamped: senders.add(stamped.header.frame_id), 10
+    )
+    for _ in range(10):
+        senders.clear()
+        session.wait_until(lambda: '' in senders, LIMIT_S)  # those of the guard
+        os.kill(guard.pid, signal.SIGSTOP)
+        try:
+            with contextlib.suppress(TimeoutError):
+                session.wait_until(lambda: 'halt' in senders, 2.0)
+        finally:
+            os.kill(guard.pid, signal.SIGCONT)  # or it could not end
+        if 'halt' in senders:
+            return
+    raise RuntimeError('The guard was frozen, and halt did not stop the robot.')
 
 
 def killed_alone(workspace: Workspace, guess: Guess | None = None) -> Robot:
@@ -270,7 +298,8 @@ def driven_live(workspace: Workspace, file: str) -> Robot:
         watch(robot)
         server = ActionClient(client, action(), 'patrol')
         session.spin(spun(client))
-        arguments = f'patrol.launch.xml floor:={path.stem} robot:=false'
+        # A busy computer may hold back a scan for longer than a robot's own would.
+        arguments = f'patrol.launch.xml floor:={path.stem} robot:=false timeout:=5.0'
         with workspace.start(LAUNCH + arguments, 'program') as program:
             robot.run(LIMIT_S, until=lambda: server.server_is_ready() or not program.running)
             robot.run(2.0)  # until the battery has spoken

@@ -127,7 +127,22 @@ class Recording:
     @property
     def started_s(self) -> float:
         """When `table` has its second 0, in seconds of `time.monotonic`; NaN before that."""
-        return min((at_s for _, at_s in self._published), default=float('nan'))
+        return min((at_s for _, at_s in self._all_published()), default=math.nan)
+
+    def published_earlier_s(self, seq: int) -> float:  # noqa: ARG002 - a kind of recording knows it
+        """Return when a message of before this recording was published, NaN if that is not known.
+
+        In seconds of `time.monotonic`.
+        """
+        return math.nan
+
+    def _all_published(self) -> list[tuple[int, float]]:
+        """Return the messages of this recording, and those of before it that were heard in it."""
+        published = list(self._published)
+        first = min((seq for seq, _ in published), default=math.inf)
+        earlier = {run.seq for run in list(self._heard) if run.seq < first}
+        times = [(seq, self.published_earlier_s(seq)) for seq in sorted(earlier)]
+        return [(seq, at_s) for seq, at_s in times if not math.isnan(at_s)] + published
 
     def runs_here(self) -> int:
         """Return the number of the message whose callback runs in this thread, or -1."""
@@ -186,7 +201,7 @@ class Recording:
 
         Raises ValueError if two messages have the same sequence number.
         """
-        published = pd.DataFrame(list(self._published), columns=['seq', 'published_s'])
+        published = pd.DataFrame(self._all_published(), columns=['seq', 'published_s'])
         heard = pd.DataFrame(
             [(run.seq, run.started_s, run.finished_s, run.thread) for run in list(self._heard)],
             columns=['seq', 'started_s', 'finished_s', 'thread'],

@@ -56,7 +56,7 @@ def watch(
     view = LiveView(robot, recording, guess)
 
     def end() -> None:
-        # Who has watched sees the robot stay where it stopped.
+        # A person who has watched sees the robot stay where it stopped.
         opens = 'end' if view.is_shown else 'bump'
         try:
             shown = replay_drive(robot.record, recording, name, opens, guess)

@@ -35,7 +35,7 @@ class ScanRecording(Recording):
                 f'This subscription hears {subscription.topic_name}: give one that hears {topic}.'
             )
         self.depth = subscription.qos_profile.depth
-        self._scans = robot.record.scans
+        self._record = robot.record
         super().__init__(topics[topic], subscription)
         # Of each command of this node: when it was sent, its speeds, and the scan of its callback.
         self.sent: list[tuple[float, float, float, int]] = []
@@ -58,7 +58,14 @@ class ScanRecording(Recording):
 
         publisher.publish = recorded_publish
 
+    def published_earlier_s(self, seq: int) -> float:
+        """Return when the robot published a scan: it drives from its beginning on.
+
+        So a scan of just before the recording began may be heard afterwards.
+        """
+        return self._record.started_s + self._record.scans[seq].t_s
+
     def number_of(self, message) -> int:
         """Return the number of a scan. It was recorded before it was published."""
         stamp_ns = Time.from_msg(message.header.stamp).nanoseconds
-        return next(scan.seq for scan in reversed(self._scans) if scan.stamp_ns == stamp_ns)
+        return next(scan.seq for scan in reversed(self._record.scans) if scan.stamp_ns == stamp_ns)

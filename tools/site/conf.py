@@ -42,8 +42,8 @@ REPAIRS = [
 ]
 
 
-# Who shares a link sees these. A preview picture needs an address with a host: SITE_URL, where the
-# site is published.
+# A person who shares a link sees these. A preview picture needs an address with a host: SITE_URL,
+# where the site is published.
 ADDRESS = os.environ.get('SITE_URL', '').rstrip('/')
 DESCRIPTION = (
     'Learn ROS 2 in notebooks: write the programs of a robot, watch why it crashes, mend it.'

@@ -1,5 +1,5 @@
 // Free drive: the robot of the lessons on the site's first page, moved by keys, mouse or fingers,
-// without a kernel. Who has come to all places has a time, and may try again.
+// without a kernel. A person who has come to all places has a time, and may try again.
 
 const SPEED = 1, BACK = -0.5, TURN = 1.6; // m/s, rad/s
 const KEYS = { ArrowUp: [SPEED, 0], ArrowDown: [BACK, 0], ArrowLeft: [0, TURN], ArrowRight: [0, -TURN] };

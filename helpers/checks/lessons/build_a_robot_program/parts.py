@@ -263,7 +263,7 @@ def the_watchdog(workspace):
             bench.spin(node)
             begin = dog.now_s()
             if abs(begin - time.time()) < 3600:
-                return 'now_s() is the time of day: whoever sets it sets your watchdog'
+                return 'now_s() is the time of day: if somebody sets it, your watchdog changes'
             if not bench.wait(lambda: dog.now_s() != begin):
                 return 'now_s() stands still: no /clock comes'
             earlier, began_s, later = between(dog)
