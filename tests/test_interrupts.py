@@ -25,7 +25,7 @@ def test_an_interrupt_survives_a_failing_block():
     assert isinstance(interrupt.value.__context__, ZeroDivisionError)
 
 
-def test_an_interrupt_of_a_command_ends_its_cell():
+def test_a_command_of_a_cell_can_be_interrupted_and_knows_its_variables():
     with Kernel() as kernel:
         kernel.run('import helpers.ros.session')
         interrupt = threading.Timer(2, kernel.km.provisioner.process.send_signal, [signal.SIGINT])
@@ -33,3 +33,5 @@ def test_an_interrupt_of_a_command_ends_its_cell():
         said = kernel.run('!sleep 60\nprint("the cell goes on")')
         assert 'the cell goes on' not in said
         assert kernel.run('!echo the kernel lives').strip() == 'the kernel lives'
+        in_a_function = 'def say(word):\n    !echo {word} $word\n\nsay("twice")'
+        assert kernel.run(in_a_function).strip() == 'twice twice'
