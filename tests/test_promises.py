@@ -102,6 +102,19 @@ def test_page_99_has_as_many_answers_as_the_readme_says_each_with_its_source():
     assert promised <= len(rows) < promised + 50, 'Say it in README.md.'
 
 
+def test_what_happens_without_a_message_is_in_tables_that_one_can_read():
+    """Each has its subject above it, and a person who looks for a row reads 30 at most."""
+    page = path_of('look_up_a_term')
+    cells = read(page.read_text(encoding='utf-8'), page.name).cells
+    texts = [cell.source for cell in cells if '| what happens |' in cell.source]
+    subjects = [re.findall(r'^### (.+)$', text, re.M) for text in texts]
+    rows = [len(re.findall(r'^\| ', text, re.M)) - 1 for text in texts]
+    assert len(texts) > 5
+    assert [text[:40] for text, above in zip(texts, subjects, strict=True) if len(above) != 1] == []
+    assert [above for above, count in zip(subjects, rows, strict=True) if count > 30] == []
+    assert len({above for (above,) in subjects}) == len(texts)
+
+
 def test_a_message_that_ends_with_what_to_do_is_one_of_ours():
     """Their words are in the code, but for what a message fills in."""
     listed = re.search(r'These messages end with what to do: (.*?)\.\n\n', ENVIRONMENT, re.S)[1]
