@@ -19,6 +19,7 @@ from support.kernel import Kernel
 
 from helpers.lesson import outlines
 from helpers.ros.domain import reserve_domain_id
+from helpers.waits.blockers import nearly
 from helpers.waits.sentences import CURES
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,6 +28,19 @@ HANGS = [file for file in PROGRAMS if not file.stem.startswith('slow')]
 SLOW = [file for file in PROGRAMS if file.stem.startswith('slow')]
 TIMEOUT_S = 40
 ACCUSES = re.compile('(It|They) cannot:')
+
+
+@pytest.mark.parametrize(
+    ('name', 'said'),
+    [
+        ('/Scan', ' (nearly the same name: /scan)'),
+        ('/scans', ' (nearly the same name: /scan)'),
+        ('/scan', ''),  # that one is no other
+        ('/scan_raw', ''),  # another topic of the same sensor
+    ],
+)
+def test_only_a_name_that_is_nearly_the_same_is_called_so(name, said):
+    assert nearly(name, ['/scan', '/cmd_vel']) == said
 
 
 class Asked:
