@@ -440,7 +440,7 @@ def a_node_of_your_own(workspace):
     def stops_for_old_scans():
         answers = tried().answers('ages')
         said = 'scans are 0.1, 0.8 and 0.1 s old, the wall is at 2 m: its speeds (m/s) are'
-        return expect([one[-1:] for one in answers], [[0.5], [0.0], [0.5]], said)
+        return expect([one[-1] if one else None for one in answers], [0.5, 0.0, 0.5], said)
 
     def watches():
         before = [*tried().of_timer('begin'), *tried().of_timer('ages')]
@@ -452,7 +452,8 @@ def a_node_of_your_own(workspace):
             return 'no scan comes, and it commands nothing'
         if set(silent) != {0.0}:
             return f'no scan comes, and it commands {max(silent)}'
-        return expect(tried().answers('silence'), [[0.5]], 'scans come again: its speed (m/s) is')
+        again = [speed for speeds in tried().answers('silence') for speed in speeds]
+        return expect(again, [0.5], 'scans come again: its speed (m/s) is')
 
     def stops_at_ctrl_c():
         runs()
