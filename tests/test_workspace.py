@@ -745,3 +745,16 @@ def test_an_interrupted_cell_ends_its_processes(shell, built):
     third = start()
     shell.events.trigger('post_run_cell', None)  # what IPython does outside the cell
     assert not third.running
+
+
+def test_a_tree_has_folders_in_one_line_but_not_their_files(capsys):
+    workspace = Workspace('test_workspace_tree')
+    workspace.write('src/one/two/three.py', '')
+    workspace.write('src/one/two/four.py', '')
+    workspace.write('src/five/six.py', '')
+    capsys.readouterr()
+    workspace.print_tree()
+    assert capsys.readouterr().out.splitlines() == [
+        *('src/', '  five/', '    six.py', '  one/two/', '    four.py', '    three.py'),
+    ]
+    shutil.rmtree(workspace.path)
