@@ -69,7 +69,7 @@ notebooks: set_up ## run the notebooks whose code has changed, save outputs, tab
 	@$(PYTHON) -m tools.lessons.run $(LESSON) $(if $(RUN),--run "$(RUN)")
 	@$(PYTHON) -m tools.lessons.first_pictures
 
-lesson: set_up ## begin a lesson: NAME=count_the_losses, AFTER=04; REMOVE=yes takes it out
+lesson: set_up ## begin a lesson: NAME=measure_the_delay, AFTER=04; REMOVE=yes takes it out
 	@$(PYTHON) -m tools.lessons.new "$(NAME)" $(if $(AFTER),--after "$(AFTER)") $(if $(filter yes,$(REMOVE)),--remove)
 
 task: set_up ## begin a task in a lesson: LESSON=02, AFTER=3, NAME=count_them

@@ -182,8 +182,7 @@ class Moved:
     def said(self) -> list[str]:
         """Return a sentence for each lesson into which something comes that a student wrote."""
         return [
-            f'What you have written for some tasks of {source.stem} is in {file.stem} now, as they '
-            'are.'
+            f'Some tasks of {source.stem} have moved to {file.stem}, with what you have written.'
             for file, of in self.coming.items()
             for source in of
             if self.is_written(file)

@@ -5,6 +5,7 @@ from support.kernel import Kernel
 
 from helpers.checks.missing_names import NO_ANSWER, NO_GUESS, NOT_RUN, OF_A_CLASS
 from helpers.checks.missing_names import explain_missing_name as explain
+from helpers.notebook import wrap
 
 
 @pytest.mark.parametrize(
@@ -26,12 +27,13 @@ def test_a_sentence_says_what_to_run(name, first_line, begun, said):
 
 
 def test_a_kernel_says_it_before_any_helper_is_imported():
+    not_run = '\n'.join(wrap(NOT_RUN))
     with Kernel() as kernel:
         kernel.run('%load_ext helpers.kernel')
         assert OF_A_CLASS.format('join_class') in kernel.run('join_class("127.0.0.1", "a")')
-        assert NOT_RUN in kernel.run('print(something)')
-        assert NOT_RUN in kernel.run('%%solution 1')  # after helpers.checks was loaded
+        assert not_run in kernel.run('print(something)')
+        assert not_run in kernel.run('%%solution 1')  # after helpers.checks was loaded
         assert kernel.run('import helpers.workspace') == ''
         said = kernel.run('print(something)')
         assert "name 'something' is not defined" in said
-        assert NOT_RUN not in said
+        assert not_run not in said

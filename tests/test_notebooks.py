@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from mutants.lessons import of_lesson
+from mutants.made import is_program
 from support.answers import EQUAL, LEAST, answers_of, source_of
 
 from helpers.lesson import code_of_solution, lessons
@@ -68,10 +69,14 @@ def test_each_answer_can_still_be_made_from_its_task(lesson):
         sources += [cell.source for cell in task.exercises]
         for kind in ('wrong', 'right'):
             for answer in answers.get(f'{task.name} {kind}', []):
+                where = f'Below `{task.name} {kind}:` of {file.name}.'
                 try:
-                    source_of(answer, *sources)
+                    source = source_of(answer, *sources)
                 except ValueError as error:
-                    problems.append(f'Below `{task.name} {kind}:` of {file.name}. {error}')
+                    problems.append(f'{where} {error}')
+                else:  # a wrong one whose cell fails tells nothing about its check
+                    if kind == 'wrong' and not is_program(source):
+                        problems.append(f'{where} This answer has a syntax error:\n{source}')
     assert not problems, '\n'.join(problems)
 
 

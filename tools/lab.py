@@ -14,7 +14,7 @@ from typing import NoReturn
 
 from jupyter_core.paths import jupyter_config_dir, jupyter_data_dir, jupyter_runtime_dir
 
-from helpers.machine import sentence_about
+from helpers.machine import OWNED, sentence_about
 
 ROOT = Path(__file__).resolve().parents[1]
 PLAIN = 'jupyter_server.services.contents.largefilemanager.AsyncLargeFileManager'
@@ -80,6 +80,15 @@ def open_lab(
     os.execv(sys.executable, [*command, *options.more])
 
 
+def not_brought_over(root: Path) -> str:
+    """Return a sentence if files of version 0.3, whose update left them, wait for another one."""
+    left = sorted(path.parent for path in root.glob(f'scratch/lesson_[0-9][0-9]/{OWNED}'))
+    if not left:
+        return ''
+    names = ', '.join(path.relative_to(root).as_posix() for path in left)
+    return f'Type `make update` once more, as before: it brings over what is in {names}.'
+
+
 def _must_be_free(port: str | None) -> None:
     try:
         socket.create_server(('localhost', int(port or 0))).close()
@@ -114,4 +123,6 @@ def _must_take_files(folder: Path) -> None:
 
 
 if __name__ == '__main__':
+    if left := not_brought_over(ROOT):
+        print(left, file=sys.stderr)
     open_lab(parser('Open JupyterLab on this course.').parse_args(), FIRST)

@@ -45,11 +45,12 @@ def load_ipython_extension(shell) -> None:
         if kind is KeyboardInterrupt:
             return
         begun = any(module in sys.modules for module in OF_FIRST_CELLS)
-        from helpers.checks import explain_missing_name  # no kernel waits for it when it starts
+        from helpers.checks import explain_missing_name  # no kernel waits for them when it starts
+        from helpers.notebook import wrap
 
         name = getattr(error, 'name', None) or ''
         if text := explain_missing_name(name, _first_line(traceback), begun):
-            print(text)
+            print(*wrap(text), sep='\n')
 
     shell.set_custom_exc((NameError, UsageError, KeyboardInterrupt), explain)
 

@@ -7,6 +7,7 @@ import difflib
 import functools
 import random
 import re
+import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from hashlib import blake2s
@@ -82,6 +83,11 @@ def same_program(one: str, other: str) -> bool:
     """Return whether two answers are the same, but for comments and spaces."""
     program = _program(one)
     return program is not None and program == _program(other)
+
+
+def is_program(source: str) -> bool:
+    """Return whether an answer has no syntax error, as far as it is Python."""
+    return _program(source) is not None
 
 
 def written_lines(solution: str, starters: Iterable[str]) -> set[int]:
@@ -269,7 +275,8 @@ def _program(source: str) -> str | None:
         )
     python, _, hidden = _as_python(body)
     try:
-        compile(python, 'answer', 'exec', dont_inherit=True)
+        with warnings.catch_warnings(action='ignore', category=SyntaxWarning):
+            compile(python, 'answer', 'exec', dont_inherit=True)
         return magics + ast.dump(ast.parse(python)) + repr(hidden)
     except (SyntaxError, ValueError):
         return None

@@ -15,7 +15,8 @@ from support.processes import put
 from support.troubles import another_user, as_root, folder_of_all, full, read_only, small_disk
 
 from helpers.lesson import path_of
-from helpers.machine import sentence_about
+from helpers.machine import OWNED, sentence_about
+from tools.lab import not_brought_over
 
 ADDRESS = r'http://localhost:(\d+)/lab/tree/notebooks/00_start_here.ipynb\?token=\w+'
 # A network without anything but this machine.
@@ -151,3 +152,13 @@ def test_each_trouble_of_a_disk_has_its_sentence():
             assert sentence(root.parent / 'a' / 'b', root).endswith(
                 '/b: No such file or directory.'
             )
+
+
+def test_files_of_version_0_3_that_wait_for_a_second_update_are_named(tmp_path):
+    folder = tmp_path / 'scratch/lesson_09'
+    folder.mkdir(parents=True)
+    assert not_brought_over(tmp_path) == ''  # nobody has written anything there
+    (folder / OWNED).touch()
+    assert 'once more, as before: it brings over what is in scratch/lesson_09.' in (
+        not_brought_over(tmp_path)
+    )

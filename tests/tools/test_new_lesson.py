@@ -1,6 +1,7 @@
 """A lesson or a task is added, or a lesson taken out, in a copy of this checkout: rules hold."""
 
 import os
+import re
 import subprocess
 import sys
 
@@ -12,7 +13,7 @@ from helpers.lesson import ROOT, bare_mentions, lessons, links_to_tasks, read
 from tools.lessons import new, run, tables, task
 
 KNOWN = lessons()[12]
-MIDDLE = 'find_your_keys'  # no test may name its file: it could not be taken out
+MIDDLE = new.EXAMPLE  # which CONTRIBUTING.md and `make help` name
 CHEAP = ['tests/test_notebooks.py', 'tests/test_progress.py']
 
 
@@ -61,7 +62,7 @@ def test_added_in_the_middle_and_at_the_end_with_a_task(tmp_path, capsys):
     the_rules_hold(copy)
 
     after = lessons(copy / 'notebooks')
-    assert (titles(copy)[5], titles(copy)[-2]) == ('Find your keys', 'Lose your keys')
+    assert (titles(copy)[5], titles(copy)[-2]) == ('Measure the delay', 'Lose your keys')
     kept = [*after[:5], *after[6:-2], after[-1]]
     for old, lesson in zip(before, kept, strict=True):
         assert (old.name, old.title) == (lesson.name, lesson.title)
@@ -70,7 +71,7 @@ def test_added_in_the_middle_and_at_the_end_with_a_task(tmp_path, capsys):
         if old.number != lesson.number:
             assert int(lesson.number) == int(old.number) + 1
     readme = (copy / 'README.md').read_text(encoding='utf-8')
-    assert f'| [05 Find your keys](notebooks/05_{MIDDLE}.ipynb) |' in readme
+    assert f'| [05 Measure the delay](notebooks/05_{MIDDLE}.ipynb) |' in readme
 
     commit(copy)
     assert (copy / f'tests/answers/{MIDDLE}.yaml').exists()
@@ -84,7 +85,10 @@ def test_added_in_the_middle_and_at_the_end_with_a_task(tmp_path, capsys):
 
 @pytest.mark.parametrize('path', sorted(tables.documents()), ids=lambda path: path.name)
 def test_documents_mention_lessons_by_links(path):
-    assert [*bare_mentions(tables.BLOCK.sub('', path.read_text(encoding='utf-8')))] == []
+    text = tables.BLOCK.sub('', path.read_text(encoding='utf-8'))
+    assert [*bare_mentions(text)] == []
+    bare = re.sub(r'```.*?```|`[^`\n]*`|\[[^\]\n]*\]\([^)]*\)', '', text, flags=re.DOTALL)
+    assert re.findall(r'.*(?<![\w:.,-])0[1-9](?![\w:.]).*', bare) == []
 
 
 def test_later_tasks_follow_a_new_one():
@@ -155,6 +159,7 @@ def changed(tmp_path_factory):
     [
         (['Count_losses'], 'Name the lesson in small letters'),
         ([KNOWN.name], f'There is notebooks/{KNOWN.file} already'),
+        ([KNOWN.tasks[0].name], f'{KNOWN.file} has a task {KNOWN.tasks[0].name}: choose another'),
         (['count_losses', '--after', '77'], "There is no single lesson '77'. Give a number or a"),
         (['count_losses', '--after', '99'], 'The glossary stays at the end'),
         (['count_losses', '--after', '04'], 'Commit your changes first'),

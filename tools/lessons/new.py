@@ -1,8 +1,8 @@
 """Add a lesson, or take one out. The notebooks after it get new numbers.
 
-    python -m tools.lessons.new count_the_losses                 at the end
-    python -m tools.lessons.new count_the_losses --after 04      as lesson 05
-    python -m tools.lessons.new count_the_losses --remove        out again
+    python -m tools.lessons.new measure_the_delay                 at the end
+    python -m tools.lessons.new measure_the_delay --after 04      as lesson 05
+    python -m tools.lessons.new measure_the_delay --remove        out again
 
 The new lesson is a copy of a complete small lesson that keeps all rules: template.txt is its
 notebook, template.yaml the answers with which its checks are tested. A notebook that gets another
@@ -31,7 +31,7 @@ BESIDE = {
     'helpers/checks/lessons/{name}.py': TEMPLATE.with_suffix('.py'),
 }
 OF_NO_LESSON = 'tests/', 'classroom/tests/', 'tools/lessons/new.py', 'tools/lessons/template'
-EXAMPLE = 'make lesson NAME=count_the_losses'
+EXAMPLE = 'measure_the_delay'
 
 
 def template(stem: str = '90_write_a_lesson', part: str = 'nodes') -> NotebookNode:
@@ -67,12 +67,16 @@ def plan_to_add(name: str, after: str, root: Path) -> Plan:
     if not re.fullmatch(r'[a-z]+(_[a-z0-9]+)+', name):
         raise ValueError(
             'Name the lesson in small letters, a verb and what it is about, with _ between '
-            f'the words: {EXAMPLE}'
+            f'the words: make lesson NAME={EXAMPLE}'
         )
     stems = [path.stem for path in paths(root / 'notebooks')]
     there = [_path(stem) for stem in stems if name in (stem, stem[3:])] + _existing(name, root)
     if there:
         raise ValueError(f'There is {there[0]} already: choose another name.')
+    texts = tables.texts_of(root)
+    for lesson in tables.lessons_of(texts):  # in the code nothing could tell the two apart
+        if name in (task.name for task in lesson.tasks):
+            raise ValueError(f'{lesson.file} has a task {name}: choose another name.')
     numbered = _numbered(root)
     place = len(numbered)
     if after:
@@ -81,7 +85,7 @@ def plan_to_add(name: str, after: str, root: Path) -> Plan:
             raise ValueError('The glossary stays at the end: name another lesson with AFTER.')
         place = numbered.index(before.stem) + 1 if before.stem in numbered else 0
     numbered.insert(place, '')
-    texts, moved = _move(tables.texts_of(root), numbered)
+    texts, moved = _move(texts, numbered)
     new = f'{place + 1:02d}_{name}'
     before = tables.lessons_of(texts)[place]
     part = before.part if before.is_lesson else 'nodes'
@@ -102,9 +106,10 @@ def plan_to_remove(lesson: str, root: Path) -> Plan:
     removed = [_path(old), *_existing(old[3:], root)]
     texts = {path: text for path, text in tables.texts_of(root).items() if path not in removed}
     texts |= tables.updated(texts)
-    known = texts | {path: text for path, text in _code(root).items() if path not in removed}
-    named_as = re.compile(rf'\b(?:\d\d_)?{old[3:]}\b')
-    if named := sorted(path for path, text in known.items() if named_as.search(text)):
+    code = {path: text for path, text in _code(root).items() if path not in removed}
+    link, name = re.compile(rf'\b\d\d_{old[3:]}\b'), re.compile(rf'\b(?:\d\d_)?{old[3:]}\b')
+    named = [path for path, text in texts.items() if link.search(text)]
+    if named := sorted({*named, *(path for path, text in code.items() if name.search(text))}):
         raise ValueError(
             f'{", ".join(named)}: these files name {old[3:]}. Take it out there, then try again.'
         )
@@ -158,7 +163,7 @@ def judges_of(name: str, root: Path) -> list[Path]:
 
 def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
     parser = argparse.ArgumentParser(description='Add a lesson, or take one out.')
-    parser.add_argument('name', help='for example count_the_losses; to remove, also a number')
+    parser.add_argument('name', help=f'for example {EXAMPLE}; to remove, also a number')
     parser.add_argument('--after', default='', metavar='LESSON', help='the lesson before it')
     parser.add_argument('--remove', action='store_true', help='take the lesson out')
     options = parser.parse_args(arguments)

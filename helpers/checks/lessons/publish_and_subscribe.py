@@ -37,12 +37,13 @@ def hear_the_text(MinimalSubscriber):
         right = [f'[INFO] [minimal_subscriber]: I heard: "{text}"' for text in texts]
         return expect(log, right, 'its log is')
 
-    quotes = 'The text has quotation marks: I heard: "..."'
+    append = 'The text is message.data, and a list has .append(...).'
+    info = 'self.get_logger().info(...), and the text has quotation marks: I heard: "..."'
     return [
-        ('it keeps one text', lambda: keeps('Hello World: 7'), 'A list has .append(...).'),
-        ('it keeps two texts', lambda: keeps('one', 'two'), 'Append message.data.'),
-        ('it logs one text', lambda: logs('Hello World: 7'), "self.get_logger().info(f'...')"),
-        ('it logs two texts', lambda: logs('one', 'two'), quotes),
+        ('it keeps one text', lambda: keeps('Hello World: 7'), append),
+        ('it keeps two texts', lambda: keeps('one', 'two'), append),
+        ('it logs one text', lambda: logs('Hello World: 7'), info),
+        ('it logs two texts', lambda: logs('one', 'two'), info),
     ]
 
 
