@@ -11,12 +11,13 @@ from collections.abc import Sequence
 
 from helpers.faults.cases import FAULTS, Case, forget, mend_in_words, take
 from helpers.faults.drives import Drive, drive
+from helpers.ros import ros_session
 from helpers.workspace import Workspace, error_of_launch
 
 CORE = {'ada': 'deaf_brake', 'bo': 'unread_limit', 'cleo': 'slow_look', 'dan': 'second_voice'}
 OTHERS = 'eve', 'finn', 'gus', 'hana', 'ivo', 'joy', 'kim', 'leo', 'mia', 'noa', 'oli', 'pia'
 UP_S = 60.0
-NODES = '/brake', '/manager', '/robot', '/route'
+NODES = 'brake', 'manager', 'robot', 'route'
 TURNED = 0.3  # rad, to both sides
 
 
@@ -75,10 +76,15 @@ def did(end: Drive) -> str:
 
 def wait_until_up(case: Case) -> None:
     """Wait until the robot and the three nodes of its package are there, or raise TimeoutError."""
-    end_s = time.monotonic() + UP_S
-    while not set(NODES) <= set(case.workspace.terminal('ros2 node list').splitlines()):
-        if time.monotonic() > end_s:
-            raise TimeoutError(f'Of {case.name} not all nodes have come: does its launch run?')
+    with ros_session() as session:
+        try:
+            session.wait_until(lambda: set(NODES) <= set(session.node.get_node_names()), UP_S)
+        except TimeoutError:
+            raise TimeoutError(
+                f'Of {case.name} not all nodes have come: does its launch run?'
+            ) from None
+        for record in session.records():  # they stand in the terminal
+            record.printed = True
 
 
 def seen(case: Case) -> tuple[str, str, str]:

@@ -16,11 +16,11 @@ LAST = Floor.from_text(
 )
 CLOSE = Floor.from_text(
     """
-#######
-#     #
-# >   #
-#     #
-#######
+######
+#    #
+# >  #
+#    #
+######
 """,
     name='close to a wall',
 )

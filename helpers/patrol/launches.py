@@ -15,6 +15,7 @@ from rclpy.action import ActionClient
 from rclpy.node import Node
 
 from helpers.guesses import Guess
+from helpers.notebook import ProgressBar
 from helpers.patrol.floors import CLOSE
 from helpers.patrol.program import PACKAGE, action, route_of
 from helpers.robot import CORRIDOR, KIND, RATE_HZ, TURTLEBOT3, Driver, Floor, Robot
@@ -91,8 +92,7 @@ def launched(
                 robot.run(0.1)
                 limit = time.monotonic() + limit_s
                 while len(robot.record.commands) == before and time.monotonic() < limit:
-                    time.sleep(0.004)
-                    robot.run(0)
+                    robot.executor.spin_once(timeout_sec=0.1)  # ends when the command comes
                 return len(robot.record.commands) > before
 
             if problem := _begun(workspace, program, server, robot):
@@ -111,10 +111,12 @@ def launched(
                 beat(0.5)
             if goal is None or not goal.accepted:
                 return robot, 'the goal is refused' if goal else 'the goal gets no answer'
-            ended = goal.get_result_async()
-            while robot.t_s < seconds and not ended.done() and not robot.bumps:
-                if not beat():
-                    return robot, f'a scan had no command. {printed(workspace, program.lines)}'
+            ended, begun_s = goal.get_result_async(), time.monotonic()
+            with ProgressBar(lambda: robot.t_s / seconds) as bar:
+                while robot.t_s < seconds and not ended.done() and not robot.bumps:
+                    if not beat():
+                        return robot, f'a scan had no command. {printed(workspace, program.lines)}'
+                    bar.update(time.monotonic() - begun_s)
     return robot, STATUS[ended.result().status] if ended.done() else 'not ended'
 
 
@@ -302,12 +304,15 @@ def driven_live(workspace: Workspace, file: str) -> Robot:
         arguments = f'patrol.launch.xml floor:={path.stem} robot:=false timeout:=5.0'
         with workspace.start(LAUNCH + arguments, 'program') as program:
             robot.run(LIMIT_S, until=lambda: server.server_is_ready() or not program.running)
-            robot.run(2.0)  # until the battery has spoken
             if not server.server_is_ready():
                 print(printed(workspace, program.lines))
                 return robot
             places = len(route_of(path.with_suffix('.yaml')))
-            goal = send_goal(session, server, places)
+            for _ in range(GOALS):  # refused, as long as the battery has not spoken
+                goal = send_goal(session, server, places)
+                if goal is None or goal.accepted:
+                    break
+                robot.run(0.1)
             if goal is None or not goal.accepted:
                 print('The goal is refused.' if goal else 'The goal gets no answer.')
                 return robot

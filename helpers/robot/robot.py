@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
+from itertools import cycle
 
 import numpy as np
 from builtin_interfaces.msg import Time as Stamp
@@ -426,14 +427,23 @@ def type_name(kind: type) -> str:
 
 def work(*executors: Executor) -> None:
     """Do all that is ready in the executors, in their order, until nothing is."""
-    worked = True
-    while worked:
-        worked = False
-        for executor in executors:
-            try:
-                handler, _, _ = executor.wait_for_ready_callbacks(timeout_sec=0)
-            except TimeoutException:
-                continue
-            handler()
-            handler.result()
-            worked = True
+    done = 0  # so many, one after the other, have nothing to do
+    for executor in cycle(executors):
+        if work_alone(executor):
+            done = 0
+        done += 1
+        if done == len(executors):
+            return
+
+
+def work_alone(executor: Executor) -> bool:
+    """Do all that is ready in an executor. Return whether there was something."""
+    worked = False
+    while True:
+        try:
+            handler, _, _ = executor.wait_for_ready_callbacks(timeout_sec=0)
+        except TimeoutException:
+            return worked
+        handler()
+        handler.result()
+        worked = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -58,19 +59,28 @@ def callbacks_at_once(make: Callable[[], tuple]) -> int:
     return count
 
 
-def cpu_of_spin(executor: str) -> float:
+def cpu_of_spin(*executors: str) -> dict[str, float]:
     """Return the CPU time (s) of two seconds of `spin()` in which nothing happens.
 
-    The executor, by its name, spins in a program of its own, which is killed.
+    Each executor, given by its name, spins in a program of its own. They spin at the same time, and
+    are killed.
     """
-    command = [sys.executable, '-c', PROGRAM.format(executor=executor)]
-    with subprocess.Popen(command, env=os.environ | ALONE, stdout=subprocess.PIPE) as program:
-        try:
+    programs = {}
+    with contextlib.ExitStack() as stack:
+        for executor in executors:
+            command = [sys.executable, '-c', PROGRAM.format(executor=executor)]
+            program = subprocess.Popen(command, env=os.environ | ALONE, stdout=subprocess.PIPE)
+            programs[executor] = stack.enter_context(program)
+            stack.callback(program.kill)
+        for program in programs.values():
             program.stdout.readline()
-            process = psutil.Process(program.pid)
-            before = process.cpu_times()
-            time.sleep(SPIN_S)
-            after = process.cpu_times()
-        finally:
-            program.kill()
-    return after.user + after.system - before.user - before.system
+        before = {executor: _cpu_s(program) for executor, program in programs.items()}
+        time.sleep(SPIN_S)
+        return {
+            executor: _cpu_s(program) - before[executor] for executor, program in programs.items()
+        }
+
+
+def _cpu_s(program: subprocess.Popen) -> float:
+    times = psutil.Process(program.pid).cpu_times()
+    return times.user + times.system

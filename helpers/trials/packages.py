@@ -85,7 +85,7 @@ def make_three_changes(workspace: Workspace) -> tuple[set[str], set[str]]:
     for file in files.values():
         (install / file).unlink(missing_ok=True)
     at_once = in_effect()
-    workspace.build('brake_tools', 'brake', symlink_install=True)
+    workspace.build('brake', symlink_install=True)  # the change of brake_tools is A
     built = in_effect()
     workspace.write(setup, before)
     return at_once, built
