@@ -37,3 +37,10 @@ def test_a_program_loads_no_tables_pictures_or_replays(module):
     assert module in loaded
     assert HEAVY.intersection(loaded) == set()
     assert len(loaded) <= MOST_MODULES
+
+
+@pytest.mark.parametrize('module', ['helpers.checks', 'helpers.robot_view', 'helpers.replay'])
+def test_a_first_cell_loads_no_tables(module):
+    command = [sys.executable, '-c', NEW_MODULES, module]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert {'matplotlib', 'pandas'}.intersection(json.loads(done.stdout)) == set()

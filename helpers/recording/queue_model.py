@@ -14,12 +14,15 @@ import heapq
 import math
 import numbers
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from helpers.notebook import check_count, shown
 from helpers.recording.table import check_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 # A worker may be late, on a busy machine. It may not rest for this part of a callback, and for as
 # long as callbacks and timers of the same run were late.
@@ -37,6 +40,8 @@ def predict(
 
     Raises ValueError for a count below 1, no period, or a negative time of a callback.
     """
+    import pandas as pd  # loaded when a table is made: it takes 0.2 s
+
     period = _nanoseconds('period_s', period_s, least=1e-9)
     callback = _nanoseconds('callback_s', callback_s, least=0)
     for name, value in (('depth', depth), ('threads', threads), ('messages', messages)):
@@ -143,6 +148,8 @@ def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
 
 
 def _losses(table: pd.DataFrame, depth: int) -> pd.DataFrame:
+    import pandas as pd
+
     seq = table['seq'].astype('Int64')
     losses = pd.DataFrame({'seq': table['seq'], 'pushed_out_by': seq.shift(-depth)})
     losses['queue_after'] = seq.shift(-1).astype(str) + ' to ' + seq.shift(-depth).astype(str)
@@ -217,6 +224,8 @@ def _too_many_at_once(heard: pd.DataFrame, threads: int) -> list[str]:
 
 def _rests(table: pd.DataFrame, heard: pd.DataFrame, depth: int, threads: int) -> list[str]:
     """Return when a worker was free for long while messages waited that were then pushed out."""
+    import pandas as pd
+
     published = table['published_s'].to_numpy()
     lost = np.flatnonzero(table['started_s'].isna())
     lost = lost[lost + depth < len(table)]

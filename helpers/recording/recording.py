@@ -9,11 +9,14 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import pandas as pd
 from rclpy.service import Service
 
 from helpers.recording.table import RUN_COLUMNS
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def number_of(message) -> int:
@@ -201,6 +204,8 @@ class Recording:
 
         Raises ValueError if two messages have the same sequence number.
         """
+        import pandas as pd  # loaded when a table is made: it takes 0.2 s
+
         published = pd.DataFrame(self._all_published(), columns=['seq', 'published_s'])
         heard = pd.DataFrame(
             [(run.seq, run.started_s, run.finished_s, run.thread) for run in list(self._heard)],
@@ -307,6 +312,8 @@ class CallbackRecording:
         `seq` counts from 0, the times are seconds since the first start of all, and a callback has
         `published_s` equal to `started_s`. The threads have the same names in all tables.
         """
+        import pandas as pd
+
         zero, names = self.zero_and_threads()
         return {
             name: pd.DataFrame(

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
-
-import pandas as pd
+from typing import TYPE_CHECKING
 
 from helpers.notebook import check_columns, column_of_numbers
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RUN_COLUMNS = ['seq', 'published_s', 'started_s', 'finished_s', 'thread']
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import heapq
 import math
-from typing import NamedTuple
-
-import pandas as pd
+from typing import TYPE_CHECKING, NamedTuple
 
 from helpers.recording import take_bounds
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ARRIVE, TAKE, END = 'arrive', 'take', 'end'
 

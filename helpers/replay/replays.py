@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from html import escape
+from typing import TYPE_CHECKING
 from urllib.parse import quote
-
-import pandas as pd
 
 from helpers.notebook import check_count, shown
 from helpers.recording import check_table, thread_order
 from helpers.replay.events import ARRIVE, END, TAKE, events
 from helpers.replay.script import attribute, javascript, script, style
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 KINDS = ARRIVE, TAKE, END, 'go'  # as walk.js numbers them
 EXCLUSIVE, REENTRANT = 'mutually exclusive', 'reentrant'
