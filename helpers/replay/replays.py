@@ -171,7 +171,7 @@ def replay(
         workers = f'{len(names)} threads, a {group} group'
     end = 'Some were lost' if lost else 'None was lost'
     if not any(event.do == TAKE for event in steps):
-        end = 'None was heard'
+        end = 'None was received'
     summary = f'{len(table)} messages, depth {depth}, {workers}. {end}.'
     return Replay((Run('', summary, lost, setup, moves),))
 
