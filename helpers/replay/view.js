@@ -29,7 +29,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew, counts)
   }
   const time = element('span', { class: 'replay-time' });
   const circle = run.end && ring();
-  const svg = counts && typeof timeline !== 'undefined' ? timeline(record, [from, until], image.alt) : drawing(image);
+  const svg = counts && typeof timeline !== 'undefined' ? timeline(record, [from, until]) : drawing(image);
   const cursor = svg.querySelector('.cursor');
   const later = isNew && rect('later', { y: svg.dataset.top, height: svg.dataset.row * svg.dataset.rows.split(',').length });
   if (later) svg.append(later);

@@ -1,7 +1,7 @@
 // The time axis below a lane: when each message was published, which one had a callback, and when one
 // was pushed out. A line leads from the callback of now to the moment at which its message was made.
 // What it has in its dataset is what view.js wants of a picture of a run.
-function timeline({ setup: { callbacks: [{ depth }] }, moves }, [from, until], words) {
+function timeline({ setup: { callbacks: [{ depth }] }, moves }, [from, until]) {
   const [LEFT, RIGHT, ROW] = [92, 20, 28];
   const WIDTH = matchMedia('(max-width: 600px)').matches ? 420 : 720; // narrower there, not smaller
   const wide = WIDTH - LEFT - RIGHT;
@@ -51,5 +51,5 @@ function timeline({ setup: { callbacks: [{ depth }] }, moves }, [from, until], w
   const looks = { class: 'timeline', viewBox: `0 0 ${WIDTH} ${bottom + 32}`, 'font-size': 16, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' };
   Object.entries(looks).forEach(([key, one]) => svg.setAttribute(key, one));
   Object.assign(svg.dataset, { wide, left: LEFT, row: ROW, top: 6, rows: ',,' });
-  return seen(svg, words);
+  return seen(svg, 'A time axis: when each message was published, which one had a callback, and when one was lost.');
 }
