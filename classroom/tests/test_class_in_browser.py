@@ -14,7 +14,6 @@ LESSON = path_of('lose_messages').name
 NAMES = {'ada': 41, 'bob': 14, 'cyd': 14}
 CELLS = nbformat.read(ROOT / 'notebooks' / LESSON, as_version=4).cells
 [GUESS] = [i for i, cell in enumerate(CELLS) if 'my_guess = guess(' in cell.source]
-[COMPARED] = [i for i, cell in enumerate(CELLS) if 'my_guess, ' in cell.source]
 QUESTION = re.search(r"guess\('(.*)', ", CELLS[GUESS].source)[1]
 # The line for the wall, and the address of the page.
 STARTED = r"(join_class\('.*', '.*'\))[\s\S]*?(http://localhost:\d+/\w+/)[\s\S]*Ctrl\+C"
@@ -114,7 +113,7 @@ sys.stdin.read()
             lab_page(presenter, 'class_deck', DeckPage) as deck,
         ):
             deck.present(LESSON)
-            deck.walk_to(GUESS)
+            deck.walk_to(deck.find('my_guess = guess('))
             assert 'guessed\n' in iter(ada.stdout.readline, '')
             frame = deck.page.frame_locator('#deck-guesses')
             frame.get_by_text('1 of 1 have answered').wait_for()
@@ -130,6 +129,13 @@ sys.stdin.read()
                 " && document.querySelector('#deck-guesses').clientHeight > 80"
             )
             deck.screenshot('class_deck_shown')
+            # Its picture draws the class, so bars are left out.
+            deck.write(f'from helpers.checks import guess\n{CELLS[GUESS].source}')
+            deck.run_here()
+            deck.page.keyboard.press('Escape')
+            deck.page.locator('.deck-on .guess .class circle').wait_for()
+            frame.locator('.bars').wait_for(state='hidden')
+            deck.screenshot('class_deck_drawn')
             deck.page.keyboard.press('j')
             deck.page.frame_locator('#deck-joins').get_by_text(started[1]).wait_for()
             deck.screenshot('class_deck_joins')
@@ -137,6 +143,6 @@ sys.stdin.read()
             assert deck.page.locator('#deck-joins').count() == 0
             deck.press('Home')
             assert deck.page.locator('#deck-guesses').count() == 0
-            deck.walk_to(COMPARED)
+            deck.walk_to(deck.find('my_guess, '))
             frame.locator('.bars').wait_for()
             deck.screenshot('class_deck_compared')
