@@ -29,7 +29,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew, counts)
   }
   const time = element('span', { class: 'replay-time' });
   const circle = run.end && ring();
-  const svg = drawing(image);
+  const svg = counts && typeof timeline !== 'undefined' ? timeline(record, [from, until]) : drawing(image);
   const cursor = svg.querySelector('.cursor');
   const later = isNew && rect('later', { y: svg.dataset.top, height: svg.dataset.row * svg.dataset.rows.split(',').length });
   if (later) svg.append(later);
@@ -53,6 +53,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew, counts)
     const part = Math.min(Math.max((us / 1e6 - from) / (until - from), 0), 1);
     const at = part * svg.dataset.wide;
     cursor.setAttribute('transform', `translate(${at.toFixed(1)})`);
+    svg.now?.(us);
     if (later) place(later, { x: +svg.dataset.left + at, width: svg.dataset.wide - at + 4 });
   }
 

@@ -101,7 +101,8 @@ function ringAt(svg, { x, y, yaw }, r) {
 }
 
 function floor(run, record, svg) {
-  legible(svg);
+  let labelled = () => {};
+  legible(svg, () => labelled());
   const find = name => svg.querySelector(`.${name}`);
   find('all').setAttribute('stroke-opacity', '.3');
   const radius = +find('robot').querySelector('circle').getAttribute('r');
@@ -111,6 +112,9 @@ function floor(run, record, svg) {
   const cross = ({ x, y, yaw }) => `M${(x + radius * Math.cos(yaw)).toFixed(3)} ${(y + radius * Math.sin(yaw)).toFixed(3)}`
     + `m${-arm} ${-arm}l${2 * arm} ${2 * arm}m0 ${-2 * arm}l${-2 * arm} ${2 * arm}`;
   let [seconds, hits] = [0, 0];
+  // Places to which it has come are filled.
+  const places = [...svg.querySelectorAll('.place')].map(ring => [ring, ...['cx', 'cy', 'r'].map(name => +ring.getAttribute(name))]);
+  const came = (till, cx, cy, r) => record.poses.some(([x, y], i) => i <= till && Math.hypot(x - cx, y - cy) < r);
   const wide = svg.viewBox.baseVal.width;
   const ghost = document.createElementNS(svg.namespaceURI, 'text');
   ghost.setAttribute('class', 'ghost');
@@ -148,7 +152,9 @@ function floor(run, record, svg) {
     find('fan').setAttribute('d', now.fan);
     const r = radius;
     find('old').setAttribute('d', now.old && `${now.old}M${now.was.x - r} ${now.was.y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`);
-    label(now, r);
+    labelled = () => label(now, r);
+    labelled();
+    places.forEach(([ring, ...place]) => ring.setAttribute('fill-opacity', came(now.till, ...place) ? 0.35 : 0));
     const bumped = record.bumps.filter(at => at <= ms);
     if (plays && bumped.length > hits) ringAt(svg, now, radius);
     if (bumped.length !== hits || seconds !== Math.floor(ms / 1000) || !plays) {
