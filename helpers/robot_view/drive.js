@@ -102,7 +102,10 @@ function ringAt(svg, { x, y, yaw }, r) {
 
 function floor(run, record, svg) {
   let labelled = () => {};
-  legible(svg, () => labelled());
+  legible(svg, () => {
+    halves = {};
+    labelled();
+  });
   const find = name => svg.querySelector(`.${name}`);
   find('all').setAttribute('stroke-opacity', '.3');
   const radius = +find('robot').querySelector('circle').getAttribute('r');
@@ -120,12 +123,14 @@ function floor(run, record, svg) {
   ghost.setAttribute('class', 'ghost');
   svg.append(ghost);
 
-  // What the dashed robot is, beside it: the real age of what the brake acts on.
+  // What the dashed robot is, beside it: the real age of what the brake acts on. To measure a text lays
+  // out the page, so one of each length is measured.
+  let halves = {};
   function label({ old, was, age }, r) {
     ghost.textContent = old ? `the brake sees this, ${age.toFixed(1)} s ago` : '';
     if (!old) return;
     const { x, y } = new DOMPoint(was.x, was.y + 1.3 * r).matrixTransform(find('robot').parentNode.transform.baseVal.consolidate().matrix);
-    const half = ghost.getComputedTextLength() / 2;
+    const half = (halves[ghost.textContent.length] ??= ghost.getComputedTextLength() / 2);
     ghost.setAttribute('x', Math.min(Math.max(x, half + 8), wide - half - 8).toFixed(1));
     ghost.setAttribute('y', record.strip ? 26 : Math.max(y - 6, 30).toFixed(1));
   }
@@ -167,7 +172,6 @@ function floor(run, record, svg) {
     time.textContent = `${(ms / 1000).toFixed(2)} s`;
     robot.textContent = `${v.toFixed(2)} m/s, ${w.toFixed(2)} rad/s`;
     told.textContent = now.told;
-    return run.says(position);
   }
 
   const node = element('div', { class: record.strip ? 'replay-floor replay-lane' : 'replay-floor' }, ...(record.name ? [element('b', {}, record.name)] : []), ...(record.label ? [element('b', { class: 'replay-label' }, record.label)] : []), svg,
