@@ -452,7 +452,8 @@ async function showGuesses({ model, node }, place) {
   const reached = address && (await fetch(address, { mode: 'no-cors' }).catch(() => null));
   if (!reached || place !== shownPlace) return;
   document.getElementById('deck-guesses')?.remove(); // of a second call
-  const src = `${address}#cell=${model.id}`;
+  const dark = document.body.dataset.jpThemeLight === 'false' ? '&dark' : '';
+  const src = `${address}#cell=${model.id}${dark}`;
   node.append(element('iframe', { id: 'deck-guesses', title: 'Guesses of the class', src }));
 }
 
