@@ -92,20 +92,22 @@ def _draw_gaps(ax: Axes, table: pd.DataFrame, title: str, depth: int, scale: flo
     """Draw the marks and what surrounds them. `scale` is the area of a mark."""
     heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
     scale *= min(1.0, max(0.2, 60 / len(table)))  # many marks must be smaller to stay apart
-    waits = {'color': WAITING, 'alpha': 0.5, 'lw': 1.2, 'zorder': 1}
+    # Lines of many messages fill the ground: they are pale there, and the crosses stand out.
+    part = min(1.0, 15 / len(table))
+    waits = {'color': WAITING, 'alpha': 0.5 * part, 'lw': 1.2, 'zorder': 1}
     ax.hlines(heard.seq, heard.published_s, heard.started_s, **waits)
     ax.margins(x=0.04, y=0.09)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     lost_at = _pushed_out(table, depth)[lost.index].fillna(lost.published_s)
     ax.hlines(lost.seq, lost.published_s, lost_at, **waits)
-    dotted = {'color': LOST, 'lw': 0.9, 'ls': ':', 'zorder': 1}
+    dotted = {'color': LOST, 'alpha': part, 'lw': 0.9, 'ls': ':', 'zorder': 1}
     ax.vlines(lost_at, lost.seq, table.seq.shift(-depth)[lost.index], **dotted)
     small = {'s': 14 * scale, 'color': WAITING, 'zorder': 2, 'label': f'published {len(table)}'}
     large = {'s': 52 * scale, 'color': HEARD, 'zorder': 3, 'label': f'received {len(heard)}'}
     handles = [
         ax.scatter(table.published_s, table.seq, **small),
         ax.scatter(heard.started_s, heard.seq, **large),
-        crosses(ax, lost_at, lost.seq, f'{_unheard(table)} {len(lost)}', scale),
+        crosses(ax, lost_at, lost.seq, f'{_unheard(table)} {len(lost)}', max(scale, 0.8 * part**0.5)),
     ]
     label_axes(ax, title, TIME_LABEL, 'sequence number', handles)
 
