@@ -107,7 +107,9 @@ def _draw_gaps(ax: Axes, table: pd.DataFrame, title: str, depth: int, scale: flo
     handles = [
         ax.scatter(table.published_s, table.seq, **small),
         ax.scatter(heard.started_s, heard.seq, **large),
-        crosses(ax, lost_at, lost.seq, f'{_unheard(table)} {len(lost)}', max(scale, 0.8 * part**0.5)),
+        crosses(
+            ax, lost_at, lost.seq, f'{_unheard(table)} {len(lost)}', max(scale, 0.8 * part**0.5)
+        ),
     ]
     label_axes(ax, title, TIME_LABEL, 'sequence number', handles)
 
