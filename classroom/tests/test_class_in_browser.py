@@ -131,7 +131,7 @@ sys.stdin.read()
             )
             deck.screenshot('class_deck_shown')
             # Its picture draws the class, so bars are left out.
-            deck.write(f'from helpers.checks import guess\n{CELLS[GUESS].source}')
+            deck.write(f'from helpers.checks import guess\n{GUESS.source}')
             deck.run_here()
             deck.page.keyboard.press('Escape')
             deck.page.locator('.deck-on .guess .class circle').wait_for()
