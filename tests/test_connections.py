@@ -31,7 +31,7 @@ def test_a_node_without_an_executor():
         spin(session, talker)
         session.wait_until(lambda: recording.published == 4)
         assert said_by(recording.wait_until_complete, 4) == [
-            'Published 4, heard 0.',
+            'Published 4, received 0.',
             'The node minimal_subscriber is in no executor: executor.add_node(...) is missing.',
         ]
 
@@ -43,7 +43,7 @@ def test_a_name_with_a_capital():
         spin(session, talker, listener)
         session.wait_until(lambda: recording.published == 4)
         assert said_by(recording.wait_until_complete, 4) == [
-            'Published 4, heard 0.',
+            'Published 4, received 0.',
             'The topic /Topic has a subscription (minimal_subscriber) and no publisher. '
             'Nearly the same name: /topic.',
             'The topic /topic has a publisher (minimal_publisher) and no subscription. '

@@ -39,7 +39,7 @@ def test_this_machine_is_ready():
     assert (answer.returncode, answer.stderr) == (0, ''), answer.stdout
     assert answer.stdout.endswith('\n\nThis machine is ready: 5 of 5 required checks are ok.\n')
     assert row_of(answer.stdout, 'rclpy') == 'rclpy ok 7.1.6'
-    assert ' itself ok rmw_fastrtps_cpp: heard after ' in row_of(answer.stdout, 'one message')
+    assert ' itself ok rmw_fastrtps_cpp: received after ' in row_of(answer.stdout, 'one message')
     assert row_of(answer.stdout, 'domain').endswith(', discovery LOCALHOST')
     assert row_of(answer.stdout, 'C++ compiler').startswith('C++ compiler ok ')
 

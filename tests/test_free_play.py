@@ -39,4 +39,4 @@ def test_what_is_drawn_is_the_prediction(script, drawn):
         table['started_s'].dropna().tolist()
     )
     heard = table['started_s'].notna().sum()
-    assert script.call('told', messages).startswith(f'{heard} of 41 messages are heard.')
+    assert script.call('told', messages).startswith(f'{heard} of 41 messages are received.')

@@ -3,9 +3,10 @@
 import asyncio
 
 import nbformat
+from ipykernel.ipkernel import IPythonKernel
 from nbformat.v4 import new_code_cell, new_notebook, new_output
 
-from helpers.notebook.fresh import AS_SAVED, MARK, FreshLessons
+from helpers.notebook.fresh import AS_SAVED, LANGUAGE, MARK, FreshLessons
 
 ANSWER = new_output('stream', text='The answer is 3.\n')
 
@@ -24,3 +25,8 @@ def test_saved_outputs_are_hidden_and_own_ones_stay(tmp_path):
     asyncio.run(manager.save({'type': 'notebook', 'content': opened}, 'lesson.ipynb'))
     again = asyncio.run(manager.get('lesson.ipynb'))['content']
     assert again.cells[0].outputs == [ANSWER]
+
+
+def test_a_lesson_that_nobody_has_touched_is_not_unsaved():
+    # JupyterLab would write what the kernel says into it.
+    assert IPythonKernel.language_info == LANGUAGE

@@ -127,7 +127,7 @@ def test_descriptions_do_not_move_between_runs(slow, parallel, draw):
 
 def test_what_no_lesson_shows_in_words(parallel):
     unheard = table_of([np.nan] * 12)
-    assert 'None was heard: a cross marks when' in said(plots.sequence_gaps, unheard)
+    assert 'None was received: a cross marks when' in said(plots.sequence_gaps, unheard)
     assert 'No two callbacks overlap.' in said(plots.timeline, unheard)
     assert 'None is pushed out.' in said(plots.queue_length, parallel, 10)
 
@@ -139,9 +139,9 @@ def test_marks_stand_where_the_table_says(slow, parallel):
     ax = plots.sequence_gaps(slow)
     lost, heard = slow[slow.started_s.isna()], slow[slow.started_s.notna()]
     points = points_of(ax)
-    assert legend_of(ax) == list(points) == ['published 41', 'heard 20', 'lost 21']
+    assert legend_of(ax) == list(points) == ['published 41', 'received 20', 'lost 21']
     np.testing.assert_allclose(points['published 41'], slow[['published_s', 'seq']])
-    np.testing.assert_allclose(points['heard 20'], heard[['started_s', 'seq']])
+    np.testing.assert_allclose(points['received 20'], heard[['started_s', 'seq']])
     pushed_out_s = slow.published_s.shift(-10)[lost.index]
     np.testing.assert_allclose(points['lost 21'], np.column_stack([pushed_out_s, lost.seq]))
     waits = [[(p, q), (s, q)] for q, p, s, *_ in heard.itertuples(index=False)]
@@ -181,8 +181,8 @@ def test_two_runs_beside_each_other(slow, parallel):
     left, right = figure.axes
     assert left.get_title(loc='left') == 'one thread: 21 of 41 lost'
     assert right.get_title(loc='left') == 'four: none lost'
-    assert legend_of(right) == ['published 15', 'heard 15', 'lost 0']
-    assert len(points_of(left)['heard 20']) == 20
+    assert legend_of(right) == ['published 15', 'received 15', 'lost 0']
+    assert len(points_of(left)['received 20']) == 20
     assert left.get_xlim() == right.get_xlim()
     assert left.get_ylim() == right.get_ylim()
     figure.canvas.draw()

@@ -7,7 +7,7 @@ import nbformat
 import pytest
 
 from helpers.checks import compare_prediction, guess, progress
-from helpers.checks.portrait import KEPT, portrait
+from helpers.checks.portrait import KEPT, Map, portrait
 from helpers.checks.tasks import Tasks
 
 
@@ -265,8 +265,13 @@ def test_the_pictures_have_words_and_a_lesson_with_its_link(asked):
     asked.level('How old <is> it?', 2.0, 12.0)
     asked.choice('Does it build?', 'no', True)
     lines = progress.lines_of(KEPT)
-    html = portrait(progress.with_tasks(), lines)._repr_html_()
+    known = progress.with_tasks()
+    solved = {lesson.name: [1] for lesson in known}
+    seen = Map(known, solved, 'a table\n5 of 9 tasks.', portrait(known, lines))
+    html = seen.html()
     assert 'href="92_lose_them.ipynb"' in html
+    assert html.count(', solved">') == len(known)
+    assert '5 of 9 tasks.' in html
     assert '<title>How old &lt;is&gt; it? You said 2, and it was 12.</title>' in html
     assert '<title>Does it build? You said no, and it was yes.</title>' in html
 

@@ -289,7 +289,7 @@ def test_last_messages_that_were_never_heard():
     assert (explanation.lost, explanation.explained) == (2, 0)
     assert explanation.losses[['pushed_out_by', 'queue_after']].isna().all(axis=None)
     assert explanation.contradictions[-1] == (
-        'Message 19 was never heard, and fewer than 10 newer ones came to push it out.'
+        'Message 19 was never received, and fewer than 10 newer ones came to push it out.'
     )
 
 

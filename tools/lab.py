@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from jupyter_core.paths import jupyter_config_dir, jupyter_data_dir, jupyter_runtime_dir
+from jupyterlab_server.workspaces_handler import WorkspacesManager
 
 from helpers.machine import OWNED, sentence_about
 
@@ -20,6 +21,15 @@ ROOT = Path(__file__).resolve().parents[1]
 PLAIN = 'jupyter_server.services.contents.largefilemanager.AsyncLargeFileManager'
 NOTES = '/* The notes for the instructor. */'  # from here on, for students only
 FIRST = 'lab/tree/notebooks/00_start_here.ipynb'
+# How JupyterLab looks the first time: the page has the whole window, and the sidebar is closed.
+WORKSPACE = {
+    'layout-restorer:data': {
+        'main': {'dock': None},
+        'left': {'collapsed': True, 'visible': True},
+        'right': {'collapsed': True, 'visible': True},
+        'relativeSizes': [0, 1, 0],
+    }
+}
 
 
 def parser(description: str) -> argparse.ArgumentParser:
@@ -108,6 +118,10 @@ def _write_settings(name: str, settings: dict[str, dict], notes: bool) -> Path:
         file = folder / '@jupyterlab' / f'{plugin}.jupyterlab-settings'
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(values))
+    workspaces = config / 'lab' / 'workspaces'
+    if not any(workspaces.glob('default-*')):  # else somebody has arranged it
+        workspace = {'data': WORKSPACE, 'metadata': {'id': 'default'}}
+        WorkspacesManager(str(workspaces)).save('default', json.dumps(workspace))
     custom = config / 'custom' / 'custom.css'
     custom.parent.mkdir(parents=True, exist_ok=True)
     css = Path(__file__).with_name('lab.css').read_text()

@@ -1,7 +1,8 @@
 // Shows what the server sends. What students wrote is put into the page as text, never as HTML.
 //
-// #wall shows how to join only. #cell=ID shows the guesses of one cell, for a slide, which says 'show'
-// to have its button pressed, and 'drawn' or 'bars': whether it draws them itself.
+// #wall shows how to join only. #cell=ID shows the guesses of one cell, for a slide, on a dark one
+// #cell=ID&dark. The slide says 'show' to have its button pressed, and 'drawn' or 'bars': whether it
+// draws them itself.
 
 const find = id => document.getElementById(id);
 let drawn = false; // by the slide
@@ -74,7 +75,8 @@ function end() {
 
 function show(state) {
   if (state.over) return end();
-  const [, cell] = location.hash.match(/^#cell=(.*)/) ?? [];
+  const [, cell, dark] = location.hash.match(/^#cell=([\w-]+)(&dark)?/) ?? [];
+  document.documentElement.style.colorScheme = cell ? (dark ? 'dark' : 'light') : '';
   document.body.className = cell ? `slide${drawn ? ' drawn' : ''}` : location.hash === '#wall' ? 'wall' : '';
   find('trouble').textContent = '';
   const { planned, own, all, gone } = state;
@@ -121,12 +123,17 @@ function show(state) {
   find('joins').textContent = state.joins.join('\n');
   const here = location.href.replace(/[?#].*/, '');
   find('slides').textContent = state.secret && `Slides on your machine: make present LESSON=02 CLASS=${here}${state.secret}/`;
-  if (cell) { // to the deck, which draws the numbers into the picture
-    const values = guesses.map(({ question, values = [] }) => ({ question, values }));
-    parent.postMessage({ height: document.documentElement.offsetHeight, guesses: values }, '*');
-  }
+  if (cell) tellDeck(guesses);
   if (shown.notes !== state.notes) find('notes').innerHTML = shown.notes = state.notes; // the lesson's
 }
+
+// The deck draws the numbers into the picture.
+let told;
+function tellDeck(guesses) {
+  told = guesses.map(({ question, values = [] }) => ({ question, values }));
+  parent.postMessage({ height: document.documentElement.offsetHeight, guesses: told }, '*');
+}
+new ResizeObserver(() => told && tellDeck(told)).observe(document.documentElement);
 
 const live = new EventSource(address('live'));
 let last;

@@ -68,7 +68,8 @@ def _lines(cell: NotebookNode) -> int:
 def folded(cell: NotebookNode) -> bool:
     """Return whether a slide shows of a cell only the first line and the outputs.
 
-    So it is with what was folded in the lesson, with imports, and with functions that help.
+    So it is with what was folded in the lesson, with imports and names that are given beside them,
+    and with functions that help.
     """
     if cell.cell_type != 'code' or WRITTEN & tags(cell):
         return False
@@ -78,5 +79,5 @@ def folded(cell: NotebookNode) -> bool:
         kinds = {type(statement) for statement in ast.parse(cell.source).body}
     except SyntaxError:  # a magic command
         return False
-    helps = kinds <= {ast.Import, ast.ImportFrom} or ast.FunctionDef in kinds
-    return bool(kinds) and helps and kinds <= {*HELPERS}
+    helps = kinds & {ast.Import, ast.ImportFrom, ast.FunctionDef}
+    return bool(helps) and kinds <= {*HELPERS}

@@ -130,6 +130,13 @@ sys.stdin.read()
                 " && document.querySelector('#deck-guesses').clientHeight > 80"
             )
             deck.screenshot('class_deck_shown')
+            # Its picture draws the class, so bars are left out.
+            deck.write(f'from helpers.checks import guess\n{GUESS.source}')
+            deck.run_here()
+            deck.page.keyboard.press('Escape')
+            deck.page.locator('.deck-on .guess .class circle').wait_for()
+            frame.locator('.bars').wait_for(state='hidden')
+            deck.screenshot('class_deck_drawn')
             deck.page.keyboard.press('j')
             deck.page.frame_locator('#deck-joins').get_by_text(started[1]).wait_for()
             deck.screenshot('class_deck_joins')

@@ -82,6 +82,8 @@ def test_the_rule(cells, types):
     [
         (code(1, jupyter=FOLDED), True),
         (new_code_cell('import math\nfrom pathlib import Path'), True),
+        (new_code_cell('from helpers.workspace import Workspace\nhere = Workspace("a")'), True),
+        (new_code_cell('limit = 1'), False),
         (new_code_cell('import math\nmath.pi'), False),
         (new_code_cell('%%write setup.py\nimport math'), False),
         (new_code_cell('LIMIT = 1\n\n\ndef wait():\n    run()'), True),

@@ -1,4 +1,4 @@
-"""A portrait of a student's intuition: each guess against what came out, a row for each lesson.
+"""A map of what a student has done, and a portrait of the intuition: guesses against what came out.
 
 `compare_prediction` keeps a guess in the file of the progress, as a line `gap LESSON {...}`: what
 was asked, what was said, what came out, whether it was right, and for a number its axis.
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 KEPT = 'gap'  # begins the line of a guess that was compared
 ENOUGH = 3  # so many guesses say something, fewer are chance
+LEFT = 'style="text-align:left"'
 WIDE, HIGH, EDGE = 64, 24, 6  # px, of the picture of one guess
 
 
@@ -70,16 +71,56 @@ class Portrait:
             words.append(f'You were right most often in {best}, least in {worst}.')
         return ' '.join(words)
 
-    def _repr_html_(self) -> str:
-        rows = [
-            f'<tr><th scope="row" style="text-align:left"><a href="{escape(lesson.file)}">'
-            f'{lesson.number} {escape(lesson.title_or_name)}</a></th>'
-            f'<td style="text-align:left">{"".join(map(_picture, self.guesses[lesson.name]))}</td>'
-            '</tr>'
-            for lesson in self.known
-        ]
-        key = 'A ring is your guess, a bar is what came out.'
-        return f'<table>{"".join(rows)}</table><p>{key} {escape(str(self))}</p>'
+    def pictures(self, lesson: str) -> str:
+        """Return the guesses of a lesson as small pictures."""
+        return ''.join(map(_picture, self.guesses.get(lesson, ())))
+
+
+@dataclass(frozen=True)
+class Map:
+    """All lessons, with their links, their tasks, and the guesses that were compared.
+
+    `text` says the same of the tasks; `solved` holds the numbers of those that are, by lesson.
+    """
+
+    known: Collection[Lesson]
+    solved: Mapping[str, Collection[int]]
+    text: str
+    portrait: Portrait | None
+
+    def __str__(self) -> str:
+        return f'{self.text}\n{self.portrait}' if self.portrait else self.text
+
+    def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
+        return {'text/plain': str(self), 'text/html': self.html()}
+
+    def html(self) -> str:
+        heads = ['lesson', 'tasks', *(['guesses'] if self.portrait else [])]
+        rows = [f'<tr>{"".join(f"<th {LEFT}>{head}</th>" for head in heads)}</tr>']
+        for lesson in self.known:
+            link = f'<a href="{escape(lesson.file)}">{lesson.number} '
+            cells = [f'<th scope="row" {LEFT}>{link}{escape(lesson.title_or_name)}</a></th>']
+            cells.append(f'<td {LEFT}>{self._tasks(lesson)}</td>')
+            if self.portrait:
+                cells.append(f'<td {LEFT}>{self.portrait.pictures(lesson.name)}</td>')
+            rows.append(f'<tr>{"".join(cells)}</tr>')
+        key = 'A full square is a task that is solved, a star one beyond the core.'
+        if self.portrait:
+            key += f' A ring is your guess, a bar is what came out. {self.portrait}'
+        total = self.text.splitlines()[-1]
+        return f'<table>{"".join(rows)}</table><p>{escape(f"{total} {key}")}</p>'
+
+    def _tasks(self, lesson: Lesson) -> str:
+        """Return a sign for each task, with its title."""
+        signs = []
+        for task in lesson.tasks:
+            done = task.number in self.solved[lesson.name]
+            sign = ('★' if done else '☆') if task.star else ('■' if done else '□')
+            says = f'Task {task.number}: {task.title}{", solved" if done else ""}'
+            colour = f'color:{GREEN}' if done else 'opacity:.6'
+            signs.append(f'<span style="{colour}" title="{escape(says)}">{sign}</span>')
+        count = f'{len(self.solved[lesson.name])} of {len(lesson.tasks)} are solved'
+        return f'<span role="img" aria-label="{count}">{" ".join(signs)}</span>'
 
 
 def portrait(known: Iterable[Lesson], lines: Iterable[str]) -> Portrait | None:

@@ -24,7 +24,7 @@ from IPython.display import display
 from jupyter_core.paths import jupyter_data_dir
 
 from helpers import notebook as text
-from helpers.checks.portrait import KEPT, portrait
+from helpers.checks.portrait import KEPT, Map, portrait
 from helpers.lesson import (
     FOLDER,
     Lesson,
@@ -145,7 +145,7 @@ def about(task: str) -> list[str]:
 
 
 def show() -> None:
-    """Print for each lesson which tasks are solved, and show the portrait of the guesses.
+    """Show for each lesson which tasks are solved, and each guess against what came out.
 
     Where progress cannot be kept, it says why.
     """
@@ -156,9 +156,8 @@ def show() -> None:
         except OSError as error:
             why = f'Your progress is not kept, because {path} cannot be used: {error.strerror}.'
             print(*text.wrap(why), sep='\n')
-    print(table(known, lines))
-    if seen := portrait(known, lines):
-        display(seen)
+    solved = {lesson.name: _solved(lesson, lines) for lesson in known}
+    display(Map(known, solved, table(known, lines), portrait(known, lines)))
 
 
 def total() -> str:
@@ -187,9 +186,9 @@ def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
     """Return a row for each lesson, and a line with the sum; `solved` holds lines of the file."""
     rows, sums = [['lesson', 'solved', 'open']], [0, 0]
     for lesson in known:
-        lines = zip(lesson.tasks, _lines_of(lesson), strict=True)
-        left = [task.number for task, line in lines if line not in solved]
-        done = len(lesson.tasks) - len(left)
+        own = _solved(lesson, solved)
+        left = [task.number for task in lesson.tasks if task.number not in own]
+        done = len(own)
         sums = [sums[0] + done, sums[1] + len(lesson.tasks)]
         words = f'task{"s" * (len(left) > 1)} {_runs(left)}' if left else ''
         borrowed = [
@@ -203,6 +202,12 @@ def table(known: Iterable[Lesson], solved: Collection[str] = ()) -> str:
             [f'{lesson.number} {lesson.title_or_name}', f'{done} of {len(lesson.tasks)}', words]
         )
     return f'{text.table(rows)}\n{sums[0]} of {sums[1]} tasks are solved.'
+
+
+def _solved(lesson: Lesson, lines: Collection[str]) -> list[int]:
+    """Return the numbers of the tasks that are solved."""
+    tasks = zip(lesson.tasks, _lines_of(lesson), strict=True)
+    return [task.number for task, line in tasks if line in lines]
 
 
 def _lines_of(lesson: Lesson) -> list[str]:

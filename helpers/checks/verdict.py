@@ -16,7 +16,7 @@ import html
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 
-from helpers.notebook import wrap
+from helpers.notebook import LOOK, wrap
 
 KEY = 'ros2_notebooks'
 SAME, LONG = 'the same', 40
@@ -24,7 +24,7 @@ AGAIN, BELOW = 'Try again.', 'Try again, or go on with the solution below.'
 CARD = 'border-left:4px solid {};padding:.1em .8em;margin:.2em 0;line-height:1.45'
 TITLE = 'display:inline;font:inherit;margin:0;padding:0'
 INDENTED, FAINT = 'margin-left:1.5em', 'font-weight:normal;margin-left:1em;opacity:.75'
-GREEN, AMBER = '#2e7d32', '#b26a00'
+GREEN, AMBER = LOOK['robot'], LOOK['waiting']
 
 
 @dataclass

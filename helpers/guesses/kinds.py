@@ -30,8 +30,6 @@ class Level:
     unit: str = ''
     marks: Mapping[str, float] = field(default_factory=dict)
 
-    scripts = (HERE / 'level.js', HERE / 'options.js')
-
     def __post_init__(self) -> None:
         if not self.low < self.high:
             raise ValueError(f'An axis goes up, and this one from {self.low} to {self.high}.')
@@ -43,6 +41,10 @@ class Level:
     @property
     def is_whole(self) -> bool:
         return isinstance(self.low, int) and isinstance(self.high, int)
+
+    @property
+    def scripts(self) -> tuple[Path, ...]:
+        return (HERE / 'level.js', HERE / 'options.js') if self.are_few else (HERE / 'level.js',)
 
     @property
     def are_few(self) -> bool:

@@ -36,10 +36,11 @@ const optionsKind = (() => {
     const node = element('div', { class: 'guess-options', role: one ? 'radiogroup' : 'group', 'aria-label': label, onkeydown }, ...buttons);
     const press = places => buttons.forEach((button, place) => button.setAttribute('aria-checked', places.includes(place)));
 
-    // Those of a class who have chosen each, a dot for a student, and of many a dot for several:
-    // `values` are their words, none at all before they are shown. Dots of what is right light up.
-    function count(values) {
-      const each = Math.ceil(values.length / DOTS);
+    // Those of a class who have chosen each, a dot for a student, and in a large class a dot for
+    // several: `values` are their words, none at all before they are shown. Dots of what is right
+    // light up.
+    function count(values, size = values.length) {
+      const each = Math.ceil(size / DOTS);
       buttons.forEach((button, place) => {
         const students = values.filter(value => isSame(value, names[place])).length;
         button.querySelector('.guess-class')?.remove();
@@ -112,7 +113,7 @@ const optionsKind = (() => {
     if (record.table) table(shown.node, record.table, names, outcome?.table);
     let now = null;
     // A list that is empty says none of them. An option that is the text of a number comes as one.
-    classOf(record, values => shown.count(values.flatMap(value => ([].concat(value).length ? value : ['none of them'])).map(String)));
+    classOf(record, values => shown.count(values.flatMap(value => ([].concat(value).length ? value : ['none of them'])).map(String), values.length));
 
     function choose(place) {
       if (one) return set(place);

@@ -128,11 +128,11 @@ def check_message() -> Check:
         return Check(name, f'{rmw}: {str(error).splitlines()[0]}', to_do)
     except Exception as error:  # whatever the RMW raises is what was found
         return Check(name, _last_line(str(error)), 'see "It does not work" in environment.md')
-    return Check(name, f'{rmw}: heard after {took_s * 1000:.1f} ms')
+    return Check(name, f'{rmw}: received after {took_s * 1000:.1f} ms')
 
 
 def _seconds_to_hear() -> float:
-    """Publish one message in a session of its own, and return when it was heard, in seconds."""
+    """Publish one message in a session of its own, and return when it was received, in seconds."""
     from rclpy.executors import SingleThreadedExecutor
     from rclpy.node import Node
     from rclpy.qos import DurabilityPolicy, QoSProfile

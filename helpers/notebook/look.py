@@ -5,4 +5,4 @@ from pathlib import Path
 
 LOOK_FILE = Path(__file__).with_suffix('.css')
 LOOK_CSS = LOOK_FILE.read_text()
-LOOK = dict(re.findall(r'--look-(\w+): ([^;]+);', LOOK_CSS))
+LOOK = dict(re.findall(r'--look-([\w-]+): ([^;]+);', LOOK_CSS))

@@ -92,20 +92,24 @@ def _draw_gaps(ax: Axes, table: pd.DataFrame, title: str, depth: int, scale: flo
     """Draw the marks and what surrounds them. `scale` is the area of a mark."""
     heard, lost = table[table.started_s.notna()], table[table.started_s.isna()]
     scale *= min(1.0, max(0.2, 60 / len(table)))  # many marks must be smaller to stay apart
-    waits = {'color': WAITING, 'alpha': 0.5, 'lw': 1.2, 'zorder': 1}
+    # Lines of many messages fill the ground: they are pale there, and the crosses stand out.
+    part = min(1.0, 15 / len(table))
+    waits = {'color': WAITING, 'alpha': 0.5 * part, 'lw': 1.2, 'zorder': 1}
     ax.hlines(heard.seq, heard.published_s, heard.started_s, **waits)
     ax.margins(x=0.04, y=0.09)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     lost_at = _pushed_out(table, depth)[lost.index].fillna(lost.published_s)
     ax.hlines(lost.seq, lost.published_s, lost_at, **waits)
-    dotted = {'color': LOST, 'lw': 0.9, 'ls': ':', 'zorder': 1}
+    dotted = {'color': LOST, 'alpha': part, 'lw': 0.9, 'ls': ':', 'zorder': 1}
     ax.vlines(lost_at, lost.seq, table.seq.shift(-depth)[lost.index], **dotted)
     small = {'s': 14 * scale, 'color': WAITING, 'zorder': 2, 'label': f'published {len(table)}'}
-    large = {'s': 52 * scale, 'color': HEARD, 'zorder': 3, 'label': f'heard {len(heard)}'}
+    large = {'s': 52 * scale, 'color': HEARD, 'zorder': 3, 'label': f'received {len(heard)}'}
     handles = [
         ax.scatter(table.published_s, table.seq, **small),
         ax.scatter(heard.started_s, heard.seq, **large),
-        crosses(ax, lost_at, lost.seq, f'{_unheard(table)} {len(lost)}', scale),
+        crosses(
+            ax, lost_at, lost.seq, f'{_unheard(table)} {len(lost)}', max(scale, 0.8 * part**0.5)
+        ),
     ]
     label_axes(ax, title, TIME_LABEL, 'sequence number', handles)
 
@@ -301,7 +305,7 @@ def latency(table: pd.DataFrame, period_s: float) -> Axes:
 
     ax = new_axes()
     delay_ms = 1000 * (heard.started_s - heard.published_s)
-    look = {'color': HEARD, 'ms': 7, 'lw': 1.5, 'label': f'heard {len(heard)}'}
+    look = {'color': HEARD, 'ms': 7, 'lw': 1.5, 'label': f'received {len(heard)}'}
     handles = ax.plot(heard.published_s, delay_ms, 'o-', **look)
     highest = max(delay_ms.max(), 1.0) if len(heard) else 1.0
     if len(lost):
@@ -320,11 +324,11 @@ def latency(table: pd.DataFrame, period_s: float) -> Axes:
     right.spines['right'].set_visible(True)
     describe(
         ax,
-        'One dot for each message that was heard: how long it waited. The axis on the right counts '
-        f'it in periods of the publisher. {_loss_in_words(table, "crosses at the bottom")}',
+        'One dot for each message that was received: how long it waited. The axis on the right '
+        f'counts it in periods of the publisher. {_loss_in_words(table, "crosses at the bottom")}',
     )
     if heard.empty:
-        say(ax, 'no message was heard')
+        say(ax, 'no message was received')
     return ax
 
 
@@ -348,12 +352,12 @@ def _loss_in_words(table: pd.DataFrame, marks: str) -> str:
     lost = table.started_s.isna()
     if not lost.any():
         return 'None was lost.'
-    return f'{"None was heard" if lost.all() else "Some were lost"}: {marks}.'
+    return f'{"None was received" if lost.all() else "Some were lost"}: {marks}.'
 
 
 def _unheard(table: pd.DataFrame) -> str:
     """Name the messages without a callback. If none was heard, they may wait, or never come."""
-    return 'lost' if table.started_s.notna().any() else 'not heard'
+    return 'lost' if table.started_s.notna().any() else 'not received'
 
 
 def _overlap_in_words(bars: pd.DataFrame) -> str:

@@ -20,9 +20,9 @@ HEARD, LOST, WAITING, ROBOT, INK, PALE = (
 # One look for each of several lines: all differ in colour, and in how they are dashed.
 LINE_LOOKS = (
     {'color': ROBOT, 'ls': '-'},
-    {'color': '#8f63c9', 'ls': (0, (5, 2))},
+    {'color': LOOK['second'], 'ls': (0, (5, 2))},
     {'color': INK, 'ls': (0, (1, 1.2))},
-    {'color': '#c2477f', 'ls': (0, (5, 2, 1, 2))},
+    {'color': LOOK['third'], 'ls': (0, (5, 2, 1, 2))},
 )
 plt.rcParams.update(
     dict.fromkeys(('figure.facecolor', 'axes.facecolor', 'savefig.facecolor'), 'none')

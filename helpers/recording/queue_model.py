@@ -141,8 +141,8 @@ def explain(table: pd.DataFrame, depth: int, threads: int) -> Explanation:
     losses = _losses(table, depth)
     for seq in losses.loc[losses['pushed_out_by'].isna(), 'seq']:
         contradictions.append(
-            f'Message {seq} was never heard, and fewer than {named_depth} newer ones came to push '
-            'it out.'
+            f'Message {seq} was never received, and fewer than {named_depth} newer ones came to '
+            'push it out.'
         )
     return Explanation(len(table), losses, contradictions)
 

@@ -190,7 +190,7 @@ class Recording:
             return (self._finished[-1].seq - self._published[0][0] + 1) / messages
 
         def status() -> str:
-            return f'Published {self.published}, heard {self.heard}.'
+            return f'Published {self.published}, received {self.heard}.'
 
         current_session().wait_until(complete, timeout_s, progress, status)
 

@@ -27,10 +27,12 @@ function drawing(image) {
 }
 
 // Its letters have 16 units, and never less than 14 pixels, however small it is shown.
-function legible(svg) {
+function legible(svg, then = () => {}) {
   new ResizeObserver(() => {
     const scale = svg.isConnected && svg.getScreenCTM()?.a;
-    if (scale) svg.style.setProperty('--letters', `${Math.max(16, 14 / scale).toFixed(1)}px`);
+    if (!scale) return;
+    svg.style.setProperty('--letters', `${Math.max(16, 14 / scale).toFixed(1)}px`);
+    then();
   }).observe(svg);
   return svg;
 }

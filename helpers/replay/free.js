@@ -28,5 +28,5 @@ function predicted({ period, callback, depth, threads, exclusive }) {
 function told(messages) {
   const heard = messages.filter(({ by }) => by === undefined);
   const oldest = Math.max(...heard.map(({ arrived, left }) => left - arrived));
-  return `${heard.length} of ${MESSAGES} messages are heard. The oldest waits ${oldest.toFixed(2)} s.`;
+  return `${heard.length} of ${MESSAGES} messages are received. The oldest waits ${oldest.toFixed(2)} s.`;
 }

@@ -123,8 +123,8 @@ def _depth(depth: int) -> Variant:
         {1: 3, 2: 2, 4: 0}[depth],
         {
             1: 'Only one can wait, so each new message pushes out the one before it.',
-            2: 'Two can wait: one more than with depth 1 is heard, and later. Try depth 4.',
-            4: 'All six are heard, because no more came. The last one waits longest: a deeper '
+            2: 'Two can wait: one more than with depth 1 is received, and later. Try depth 4.',
+            4: 'All six are received, because no more came. The last one waits longest: a deeper '
             'queue does not make the callback faster.',
         }[depth],
         f"self.create_subscription(String, 'topic', self.listener_callback, {depth})",

@@ -174,7 +174,7 @@ function queueModel() {
       says = `${who} gives ${now.unlock} back.`;
     } else if (now.set !== undefined) {
       state.values[now.set] = 1;
-      says = `${who} is heard: from now on, a look sees ${now.set}.`;
+      says = `${who} is received: from now on, a look sees ${now.set}.`;
     } else if (now.says !== undefined) {
       says = `${who} ${now.says}.`;
     } else if (now.client !== undefined) {

@@ -94,12 +94,15 @@ class Replay:
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         starts, ends = zip(*(run.span_s for run in self.runs), strict=True)
         span_s = min(starts), max(ends)  # pictures beside each other share their time
-        of_queues = [run for run in self.runs if run.setup]
+        # Below a lane a script draws the time axis: a picture of its queue would say it again.
+        in_lane = any(getattr(run, 'as_lane', False) for run in self.runs)
+        drawn_runs = [run for run in self.runs if not (in_lane and run.setup)]
+        of_queues = [run for run in drawn_runs if run.setup]
         asked = [{**run.record(), 'time': run.time_label} for run in of_queues]
         at_s = max((run.telling_s for run in self.runs if not run.setup), default=None)
         drawn = iter(javascript('pictures', asked, span_s, at_s))
         figures = ''.join(
-            figure(run, next(drawn) if run.setup else run.picture()) for run in self.runs
+            figure(run, next(drawn) if run.setup else run.picture()) for run in drawn_runs
         )
         # Each file once, those of the queues first.
         ordered = sorted(self.runs, key=lambda run: not run.setup)
@@ -173,7 +176,7 @@ def replay(
         workers = f'{len(names)} threads, a {group} group'
     end = 'Some were lost' if lost else 'None was lost'
     if not any(event.do == TAKE for event in steps):
-        end = 'None was heard'
+        end = 'None was received'
     summary = f'{len(table)} messages, depth {depth}, {workers}. {end}.'
     return Replay((Run('', summary, lost, setup, moves),))
 

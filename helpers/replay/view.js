@@ -29,7 +29,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew, counts)
   }
   const time = element('span', { class: 'replay-time' });
   const circle = run.end && ring();
-  const svg = drawing(image);
+  const svg = counts && typeof timeline !== 'undefined' ? timeline(record, [from, until]) : drawing(image);
   const cursor = svg.querySelector('.cursor');
   const later = isNew && rect('later', { y: svg.dataset.top, height: svg.dataset.row * svg.dataset.rows.split(',').length });
   if (later) svg.append(later);
@@ -38,13 +38,12 @@ function panel(run, record, image, [from, until], grouped, short, isNew, counts)
     row(name || 'time', time), ...rows, ...(circle ? [circle.node] : []), element('div', { class: 'replay-picture' }, svg));
 
   return { node, draw(position, us) {
-    const { state, says } = run.seek(position);
+    const { state } = run.seek(position);
     const now = run.circle?.(position) ?? { stuck: [] };
-    draw(state, now.stuck);
     count.firstChild.textContent = `${state.lost.length} lost`;
     circle?.draw(now, run.end);
     point(us ?? 1e6 * state.now);
-    return run.says?.(position) ?? says;
+    draw(state, now.stuck);
   }, point, timeAt, light };
 
   // Put the clock and the cursor to a time.
@@ -53,6 +52,7 @@ function panel(run, record, image, [from, until], grouped, short, isNew, counts)
     const part = Math.min(Math.max((us / 1e6 - from) / (until - from), 0), 1);
     const at = part * svg.dataset.wide;
     cursor.setAttribute('transform', `translate(${at.toFixed(1)})`);
+    svg.now?.(us);
     if (later) place(later, { x: +svg.dataset.left + at, width: svg.dataset.wide - at + 4 });
   }
 
@@ -178,13 +178,9 @@ function show(root, record) {
     fresh = false;
     position = Math.min(Math.max(to, 0), last);
     if (plays) tell(from);
-    const texts = panels.map((one, i) => {
-      const still = plays && !one.draw.always && counts[i][from] === counts[i][position];
-      return still ? one.point(us) : one.draw(counts[i][position], us ?? steps[position - 1]?.us ?? 0, plays);
-    });
     if (!plays || position === last) {
       const { who } = steps.slice(0, position).findLast(({ told }) => told) ?? {};
-      const text = texts[who] ?? (who === undefined ? '' : sentence(who, counts[who][position]));
+      const text = who === undefined ? '' : sentence(who, counts[who][position]);
       // A text that is set again is read out again.
       const now = (position === last && outcome()) || (text ? named(who, text) : 'Nothing has happened yet. Step: →');
       if (says.textContent !== now) says.textContent = now;
@@ -193,6 +189,12 @@ function show(root, record) {
     slider.setAttribute('aria-valuetext', `step ${position} of ${last}`);
     back.disabled = position === 0;
     forth.disabled = position === last;
+    // The last thing: a board looks where its messages are, and the page is laid out for that once.
+    panels.forEach((one, i) => {
+      const still = plays && !one.draw.always && counts[i][from] === counts[i][position];
+      if (still) one.point(us);
+      else one.draw(counts[i][position], us ?? steps[position - 1]?.us ?? 0, plays);
+    });
     requestAnimationFrame(keepHeight); // when the page is laid out anyway
     if (position === last) {
       root.classList.remove('replay-new');

@@ -15,7 +15,7 @@ from typing import Protocol
 from helpers.notebook import hear_while_a_cell_runs, somebody_watches
 from helpers.replay import script, style
 from helpers.robot import Robot
-from helpers.robot_view.picture import DRIVE_CSS
+from helpers.robot_view.picture import DRIVE_CSS, PLACE_M
 from helpers.ros import current_session
 
 BY_HAND_JS = Path(__file__).with_name('by_hand.js')
@@ -28,7 +28,6 @@ SPEEDS = {
     'left': (0.0, TURN),
     'right': (0.0, -TURN),
 }
-NEAR_M = 0.45  # so near, the robot is at a place, as on the site
 HELP = 'Hold a button, or click here and hold an arrow key. End ends the drive, as Interrupt does.'
 
 
@@ -54,7 +53,7 @@ class Tour:
         news = [
             name
             for name, place in self.places.items()
-            if name not in self.reached and math.dist(place, (x, y)) < NEAR_M
+            if name not in self.reached and math.dist(place, (x, y)) < PLACE_M
         ]
         self.reached += news
         return bool(news)

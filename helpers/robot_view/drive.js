@@ -101,7 +101,11 @@ function ringAt(svg, { x, y, yaw }, r) {
 }
 
 function floor(run, record, svg) {
-  legible(svg);
+  let labelled = () => {};
+  legible(svg, () => {
+    halves = {};
+    labelled();
+  });
   const find = name => svg.querySelector(`.${name}`);
   find('all').setAttribute('stroke-opacity', '.3');
   const radius = +find('robot').querySelector('circle').getAttribute('r');
@@ -111,17 +115,22 @@ function floor(run, record, svg) {
   const cross = ({ x, y, yaw }) => `M${(x + radius * Math.cos(yaw)).toFixed(3)} ${(y + radius * Math.sin(yaw)).toFixed(3)}`
     + `m${-arm} ${-arm}l${2 * arm} ${2 * arm}m0 ${-2 * arm}l${-2 * arm} ${2 * arm}`;
   let [seconds, hits] = [0, 0];
+  // Places to which it has come are filled.
+  const places = [...svg.querySelectorAll('.place')].map(ring => [ring, ...['cx', 'cy', 'r'].map(name => +ring.getAttribute(name))]);
+  const came = (till, cx, cy, r) => record.poses.some(([x, y], i) => i <= till && Math.hypot(x - cx, y - cy) < r);
   const wide = svg.viewBox.baseVal.width;
   const ghost = document.createElementNS(svg.namespaceURI, 'text');
   ghost.setAttribute('class', 'ghost');
   svg.append(ghost);
 
-  // What the dashed robot is, beside it: the real age of what the brake acts on.
+  // What the dashed robot is, beside it: the real age of what the brake acts on. To measure a text lays
+  // out the page, so one of each length is measured.
+  let halves = {};
   function label({ old, was, age }, r) {
     ghost.textContent = old ? `the brake sees this, ${age.toFixed(1)} s ago` : '';
     if (!old) return;
     const { x, y } = new DOMPoint(was.x, was.y + 1.3 * r).matrixTransform(find('robot').parentNode.transform.baseVal.consolidate().matrix);
-    const half = ghost.getComputedTextLength() / 2;
+    const half = (halves[ghost.textContent.length] ??= ghost.getComputedTextLength() / 2);
     ghost.setAttribute('x', Math.min(Math.max(x, half + 8), wide - half - 8).toFixed(1));
     ghost.setAttribute('y', record.strip ? 26 : Math.max(y - 6, 30).toFixed(1));
   }
@@ -148,7 +157,9 @@ function floor(run, record, svg) {
     find('fan').setAttribute('d', now.fan);
     const r = radius;
     find('old').setAttribute('d', now.old && `${now.old}M${now.was.x - r} ${now.was.y}a${r} ${r} 0 1 0 ${2 * r} 0a${r} ${r} 0 1 0 ${-2 * r} 0`);
-    label(now, r);
+    labelled = () => label(now, r);
+    labelled();
+    places.forEach(([ring, ...place]) => ring.setAttribute('fill-opacity', came(now.till, ...place) ? 0.35 : 0));
     const bumped = record.bumps.filter(at => at <= ms);
     if (plays && bumped.length > hits) ringAt(svg, now, radius);
     if (bumped.length !== hits || seconds !== Math.floor(ms / 1000) || !plays) {
@@ -161,7 +172,6 @@ function floor(run, record, svg) {
     time.textContent = `${(ms / 1000).toFixed(2)} s`;
     robot.textContent = `${v.toFixed(2)} m/s, ${w.toFixed(2)} rad/s`;
     told.textContent = now.told;
-    return run.says(position);
   }
 
   const node = element('div', { class: record.strip ? 'replay-floor replay-lane' : 'replay-floor' }, ...(record.name ? [element('b', {}, record.name)] : []), ...(record.label ? [element('b', { class: 'replay-label' }, record.label)] : []), svg,

@@ -20,6 +20,7 @@ WIDTH, HEIGHT, MARGIN = 720, 400, 2  # pixels, at most
 SMALLEST = 9  # pixels: the robot's radius on a large floor
 BEAMS = 40  # of a scan, in a picture
 WALL_M = 0.15  # of an outer wall
+PLACE_M = 0.45  # so near, the robot is at a place
 LANE_M, WORDS_M = 0.5, 0.26  # of a lane: to each side of the robot, and beyond for words
 DRIVE_CSS = Path(__file__).with_name('drive.css')
 ROBOT, WAITING, LOST = LOOK['robot'], LOOK['waiting'], LOOK['lost']
@@ -151,7 +152,9 @@ def _floor(floor: Floor, scale: float) -> str:
     names = ''.join(
         f'<text transform="translate({x:g} {y:g}) scale({1 / scale:.5f} '
         f'-{1 / scale:.5f})" text-anchor="middle" dy=".35em" fill="currentColor" '
-        f'font-size="16">{escape(name)}</text>'
+        f'font-size="16">{escape(name)}</text><circle class="place" cx="{x:g}" cy="{y:g}" '
+        f'r="{PLACE_M}" fill="{ROBOT}" fill-opacity="0" stroke="{ROBOT}" stroke-width="2" '
+        'stroke-dasharray="4 4" vector-effect="non-scaling-stroke"/>'
         for name, (x, y) in floor.places.items()
     )
     return (

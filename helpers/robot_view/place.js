@@ -78,7 +78,7 @@ const placeKind = (() => {
       ghosts.childNodes.forEach(ghost => {
         const isRight = outcome && gap(record, +ghost.dataset.at, outcome).right;
         ghost.setAttribute('fill', isRight ? 'var(--look-robot)' : 'var(--look-you)');
-        ghost.setAttribute('fill-opacity', isRight ? 1 : 0.35);
+        ghost.setAttribute('fill-opacity', isRight ? 1 : 0.6);
       });
     }
 

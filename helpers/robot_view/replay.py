@@ -27,6 +27,7 @@ from helpers.robot_view.scans import ScanRecording
 if TYPE_CHECKING:
     from helpers.robot_view.place import Place
 
+HERE = Path(__file__).parent
 # What a notebook keeps of a drive, at most: so it stays below 60 kB.
 POSES, SCANS, COMMANDS, EVENTS = 400, 50, 150, 50
 EVERY_S = 0.1  # a pose
@@ -52,7 +53,8 @@ class Drive:
     def scripts(self) -> tuple[Path, ...]:
         """The files that step through it."""
         guessed = (*self.guess.kind.scripts, MEMORY) if self.guess else ()
-        return (*guessed, Path(__file__).with_name('drive.js'))
+        beside = (HERE / 'timeline.js',) if self.recording and self.as_lane else ()
+        return (*guessed, HERE / 'drive.js', *beside)
 
     @property
     def styles(self) -> tuple[Path, ...]:

@@ -1,12 +1,14 @@
 """Guesses that one makes in a picture: by keys, with a finger, in JupyterLab and without it."""
 
 import nbformat
+import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from support.lab_page import WIDER, printed
 
 from helpers.guesses import Gap, Guess, Level, Options, kind_of
-from helpers.robot import CORRIDOR
-from helpers.robot_view import Place
+from helpers.robot import CORRIDOR, DriveRecord
+from helpers.robot.record import Step
+from helpers.robot_view import Place, replay_drive
 from tools.lessons.clean import EXPLAINS, NOTEBOOK_METADATA
 
 PLACE = Guess('Where does it end?', Place(CORRIDOR, 0.6))
@@ -18,6 +20,8 @@ ROWS = Guess('How many are lost?', kind_of({'depth 1': range(4), 'depth 2': rang
 FEW = Guess('How many threads?', kind_of(range(1, 5), unit='threads'))
 CELLS = {'one thread': {'exclusive': 'A', 'reentrant': 'B'}, 'two': {'exclusive': 'C'}}
 TICKS = Guess('Which lose none?', kind_of(CELLS))
+# What the deck tells the pictures of a slide: what the class has guessed.
+TELL = "told => document.dispatchEvent(new CustomEvent('class', { detail: told }))"
 
 
 def group(page, guess):
@@ -78,9 +82,7 @@ def test_a_row_for_each_thing_and_none_of_the_options(phone, artefacts):
         {'question': ROWS.question, 'values': [['depth 1: 3', 'depth 2: 0']] * 2},
         {'question': ANY.question, 'values': [['A', 'B'], ['B'], []]},
     ]
-    page.evaluate(
-        "told => document.dispatchEvent(new CustomEvent('class', { detail: told }))", told
-    )
+    page.evaluate(TELL, told)
     shown = page.locator('[data-class]').evaluate_all(
         'nodes => nodes.map(one => `${one.ariaLabel ?? one.textContent} ${one.dataset.class}`)'
     )
@@ -110,21 +112,52 @@ def test_cells_of_the_coming_table_are_ticked(phone, artefacts):
     page.screenshot(path=artefacts / 'guess_ticks.png', full_page=True)
 
 
-def test_a_class_lights_up_where_it_was_right(phone):
-    level = Guess(LEVEL.question, LEVEL.kind)
-    page = phone(Gap(level, {'at': 14, 'tolerance': 2}), Gap(ONE, {'at': 0}))
-    told = [
-        {'question': LEVEL.question, 'values': [14, 14, 16, 40]},
-        {'question': ONE.question, 'values': ['yes', 'no', 'yes']},
-    ]
-    page.evaluate(
-        "told => document.dispatchEvent(new CustomEvent('class', { detail: told }))", told
+def lights(page, selector):
+    """Return whether each dot of the class lights up."""
+    return page.locator(selector).evaluate_all(
+        "dots => dots.map(dot => Boolean(dot.closest('.right, .guess-true')))"
     )
-    assert says(page, LEVEL) == 'It is 14 messages.'  # nobody has guessed here
-    assert group(page, LEVEL).locator('.class circle').count() == 4
-    assert group(page, LEVEL).locator('.class .right').count() == 3
-    assert group(page, ONE).locator('.guess-true .guess-class i').count() == 2
-    assert group(page, ONE).locator('.guess-class i').count() == 3
+
+
+@pytest.mark.parametrize(
+    ('guess', 'outcome', 'values', 'right'),
+    [
+        (LEVEL, {'at': 14, 'tolerance': 0}, [14] * 12 + [41] * 18, 12),
+        (FEW, {'at': 2, 'tolerance': 0}, [2] * 11 + [4] * 19, 11),
+        (ONE, {'at': 0}, ['yes'] * 10 + ['no'] * 20, 10),
+        (OPTIONS, {'at': [0, 1, 2]}, [['0', '1', '2']] * 9 + [['2', '3', '4']] * 21, 3 * 9 + 21),
+        (ROWS, {'at': [3, 0]}, [['depth 1: 3', 'depth 2: 1']] * 30, 30),
+        (TICKS, {'at': [1]}, [['B']] * 8 + [['A', 'C']] * 22, 8),
+    ],
+    ids=['level', 'few', 'choose', 'pick', 'rows', 'tick'],
+)
+def test_thirty_ghosts_of_which_those_who_were_right_light_up(phone, guess, outcome, values, right):
+    page = phone(Guess(guess.question, guess.kind))
+    page.evaluate(TELL, [{'question': guess.question, 'values': values}])
+    dots = '.class circle, .guess-class i'
+    each = lights(page, dots)
+    # A dot for each student, wherever one has put something.
+    assert len(each) == sum(len(one) if isinstance(one, list) else 1 for one in values)
+    assert not any(each)  # nothing tells before the run
+    page = phone(Gap(Guess(guess.question, guess.kind), outcome))
+    page.evaluate(TELL, [{'question': guess.question, 'values': values}])
+    assert sum(lights(page, dots)) == right
+    assert not page.evaluate(WIDER)
+
+
+def test_thirty_robots_light_up_if_the_real_one_stands_where_they_are(phone):
+    # It ends 0.5 m before the wall.
+    poses = [Step(0.0, 1.25, 1.25, 0.0, 0.5, 0.0), Step(6.0, 4.0, 1.25, 0.0, 0.0, 0.0)]
+    page = phone(replay_drive(DriveRecord(CORRIDOR, poses=poses), guess=PLACE))
+    values = [0.5] * 7 + [0.9] * 23
+    page.evaluate(TELL, [{'question': PLACE.question, 'values': values}])
+    robots = page.locator('.class circle')
+    looks = "robots => robots.map(one => one.getAttribute('fill'))"
+    assert robots.count() == 30
+    assert robots.evaluate_all(looks).count('var(--look-robot)') == 7
+    page.locator('.replay').focus()
+    page.keyboard.press('Home')
+    assert robots.evaluate_all(looks) == ['var(--look-you)'] * 30
 
 
 def test_a_finger_puts_the_robot_there(file_page, tmp_path):

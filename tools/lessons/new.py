@@ -107,8 +107,12 @@ def plan_to_remove(lesson: str, root: Path) -> Plan:
     texts = {path: text for path, text in tables.texts_of(root).items() if path not in removed}
     texts |= tables.updated(texts)
     code = {path: text for path, text in _code(root).items() if path not in removed}
+    # The map of progress in notebook 00 links each lesson, and its next run makes it anew.
+    start = _path(chosen(START, root / 'notebooks')[0].stem)
+    cells = nbformat.reads(texts[start], as_version=4).cells
+    linking = texts | {start: '\n'.join(cell.source for cell in cells)}
     link, name = re.compile(rf'\b\d\d_{old[3:]}\b'), re.compile(rf'\b(?:\d\d_)?{old[3:]}\b')
-    named = [path for path, text in texts.items() if link.search(text)]
+    named = [path for path, text in linking.items() if link.search(text)]
     if named := sorted({*named, *(path for path, text in code.items() if name.search(text))}):
         raise ValueError(
             f'{", ".join(named)}: these files name {old[3:]}. Take it out there, then try again.'

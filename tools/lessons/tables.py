@@ -106,7 +106,8 @@ def needs_run(lessons: list[Lesson]) -> bool:
     start = [lesson for lesson in lessons if lesson.number == START]
     return any(
         'progress.show()' in cell.source
-        and table not in ''.join(output.get('text', '') for output in cell.outputs)
+        and table
+        not in ''.join(output.get('data', {}).get('text/plain', '') for output in cell.outputs)
         for lesson in start
         for cell in lesson.code_cells()
     )

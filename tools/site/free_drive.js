@@ -95,10 +95,7 @@ function show(root) {
   const rings = {};
   let robot, path, before, seconds, reached, hits, best;
 
-  for (const [name, [cx, cy]] of Object.entries(floor.places)) {
-    rings[name] = ringOf(svg, { class: 'drive-place', cx, cy, r: NEAR });
-    picture.insertBefore(rings[name], find('fan'));
-  }
+  Object.keys(floor.places).forEach((name, i) => (rings[name] = svg.querySelectorAll('.place')[i]));
 
   // All from the start; also the first time.
   function begin() {

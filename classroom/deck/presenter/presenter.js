@@ -14,6 +14,7 @@ const TWICE_MS = 2000; // I I, 0 0, R R and Escape Escape come within this time
 const SAVE_MS = 300;
 // Of the letters of a slide: what does not fit in the smallest ones is scrolled.
 const SCALES = { texts: [1.6, 1.45, 1.3, 1.15, 1, 0.95, 0.9], code: [1.25, 1.1, 1, 0.95, 0.9] };
+const LOG = [12, 54]; // more lines, of fewer letters each: half a slide is wide enough for them
 const FIGURES = [42, 38, 34, 30]; // how high a picture is that makes room, in the unit of deck.css
 const TYPED = 'textarea, select, [contenteditable], input:not([type=range], [type=number], [type=button])';
 // What works with the focus in a replay, a level or a list, too: its other keys are its own.
@@ -316,6 +317,9 @@ function update() {
   if (about) void showGuesses(about, place);
 }
 
+// Whether a text has many lines, and short ones.
+const isLong = text => text.split('\n').length > LOG[0] && text.split('\n').every(row => row.length <= LOG[1]);
+
 // The letters are as large as the slide has room for. If there is none even for small ones, code that
 // has run makes room for what came out: see deck-tight in deck.css. What grows below comes into view.
 function fit() {
@@ -324,7 +328,10 @@ function fit() {
   const on = widgets.filter(cell => cell.node.classList.contains('deck-on'));
   const isText = ({ model, inputHidden }) => model.type !== 'code' || (inputHidden && !model.outputs?.length);
   const hasCode = !on.every(isText);
-  for (const { node: cell } of on) cell.classList.toggle('deck-drives', cell.querySelectorAll('.replay:has(.replay-floor)').length > 1);
+  for (const { node: cell } of on) {
+    cell.classList.toggle('deck-drives', cell.querySelectorAll('.replay:has(.replay-floor)').length > 1);
+    for (const log of cell.querySelectorAll('.jp-OutputArea-output > pre')) log.classList.toggle('deck-long', isLong(log.textContent));
+  }
   let room = 0;
   viewportNode.style.marginTop = 0;
   const least = SCALES.code.at(-1);
@@ -452,7 +459,8 @@ async function showGuesses({ model, node }, place) {
   const reached = address && (await fetch(address, { mode: 'no-cors' }).catch(() => null));
   if (!reached || place !== shownPlace) return;
   document.getElementById('deck-guesses')?.remove(); // of a second call
-  const src = `${address}#cell=${model.id}`;
+  const dark = document.body.dataset.jpThemeLight === 'false' ? '&dark' : '';
+  const src = `${address}#cell=${model.id}${dark}`;
   node.append(element('iframe', { id: 'deck-guesses', title: 'Guesses of the class', src }));
 }
 

@@ -17,10 +17,10 @@ PAIRS = {
     'ink': ('#4a5460', '#b4bec9'),
     'way': ('#eff1f3', '#242a31'),
     'wall': ('#6b7681', '#7f8b97'),
-    'heard': (LOOK['heard'], '#3ea0df'),
+    'heard': (LOOK['heard'], LOOK['heard-night']),
     'lost': ('#b34a00', '#ff9350'),
     'waiting': ('#855d00', '#e3b040'),
-    'good': ('#00734f', '#2fbd8d'),
+    'good': (LOOK['robot-letters'], '#2fbd8d'),
 }
 STYLE = """
 svg{color-scheme:light dark;font:16px system-ui,'Segoe UI',Roboto,'Noto Sans',sans-serif}
