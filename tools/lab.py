@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import NoReturn
 
 from jupyter_core.paths import jupyter_config_dir, jupyter_data_dir, jupyter_runtime_dir
-from jupyterlab_server.workspaces_handler import WorkspacesManager
 
 from helpers.machine import OWNED, sentence_about
 
@@ -120,6 +119,8 @@ def _write_settings(name: str, settings: dict[str, dict], notes: bool) -> Path:
         file.write_text(json.dumps(values))
     workspaces = config / 'lab' / 'workspaces'
     if not any(workspaces.glob('default-*')):  # else somebody has arranged it
+        from jupyterlab_server.workspaces_handler import WorkspacesManager  # slow, and once
+
         workspace = {'data': WORKSPACE, 'metadata': {'id': 'default'}}
         WorkspacesManager(str(workspaces)).save('default', json.dumps(workspace))
     custom = config / 'custom' / 'custom.css'
