@@ -7,7 +7,7 @@ import math
 import os
 import signal
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from geometry_msgs.msg import TwistStamped
@@ -191,12 +191,9 @@ def ended_by(workspace: Workspace, end: str, halt: bool = False) -> Ended:
             for name, words in options.items()
         }
 
-        def is_there():
-            return client.count_publishers('cmd_vel') == 1 + halt
-
         if halt:
             _wait_until_it_misses(session, client, programs['guard'])
-        _begin_to_drive(session, robot, server, [*programs.values()], is_there)
+        _begin_to_drive(session, robot, server, [*programs.values()])
         since_s = robot.t_s
         if end in SIGNALS:
             os.kill(programs['patrol'].pid, SIGNALS[end])
@@ -266,13 +263,12 @@ def _begin_to_drive(
     robot: Robot,
     server: ActionClient,
     programs: Sequence[Process],
-    is_there: Callable[[], bool] = lambda: True,
 ) -> None:
     """Send goals until the robot drives. Raises RuntimeError with the last line if it does not."""
     start = robot.pose
 
     def drives():
-        if is_there() and server.server_is_ready() and robot.pose.x == start.x:
+        if server.server_is_ready() and robot.pose.x == start.x:
             send_goal(session, server, 1)  # refused, as long as its sensors have not spoken
         return robot.record.poses[-1].v > 0.15
 
