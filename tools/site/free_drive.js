@@ -9,7 +9,6 @@ const PAD = [ // a button: what it holds, its face, its name
   [['ArrowDown'], '▼', 'back'], [['ArrowRight'], '▶', 'right'],
 ];
 const BEAMS = 61;
-const NEAR = 0.45; // m: so near, the robot is at a place
 
 // The body of helpers/robot/body.py: a disc among walls [x0, y0, x1, y1], in steps of 0.02 s.
 function body({ walls, start: [x, y, yaw], limits: [radius, acceleration, turning, seconds] }) {
@@ -154,7 +153,7 @@ function show(root) {
     const { now } = robot;
     if (isOver()) return;
     const news = Object.entries(floor.places).filter(([name, [x, y]]) =>
-      !reached.includes(name) && Math.hypot(x - now.x, y - now.y) < NEAR);
+      !reached.includes(name) && Math.hypot(x - now.x, y - now.y) < rings[name].r.baseVal.value); // m
     for (const [name, [x, y]] of news) {
       reached.push(name);
       rings[name].classList.add('drive-done');
