@@ -116,6 +116,19 @@ def test_later_tasks_follow_a_new_one():
 
 
 @pytest.mark.parametrize(
+    'points',
+    ['', 'from helpers.checks.points import all_of, needs\n',
+     'from helpers.checks.points import all_of, expect, needs\n'],
+)  # fmt: skip
+def test_a_new_judge_has_the_import_that_it_needs(points):
+    source = f'{points}from helpers.checks.tasks import Tasks\n\n\ndef it_was_here():\n    pass\n'
+    lines = task.with_judge(source, 'count_them', 'it_was_here').splitlines()
+    assert lines[1] == 'from helpers.checks.tasks import Tasks'
+    names = lines[0].removeprefix('from helpers.checks.points import ').split(', ')
+    assert names == (['all_of', 'expect', 'needs'] if points else ['expect'])
+
+
+@pytest.mark.parametrize(
     ('arguments', 'sentence'),
     [
         ([''], 'Name the lesson: make task LESSON=01 AFTER=3'),

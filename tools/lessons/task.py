@@ -39,8 +39,7 @@ JUDGE = """
 @tasks.add
 def {name}(largest):
     def returns(right, *numbers):
-        found = largest([*numbers])
-        return found == right or f'for {{[*numbers]}} it returns {{found}}'
+        return expect(largest([*numbers]), right, f'of {{[*numbers]}} it returns')
 
     return [
         ('it finds the largest in the middle', lambda: returns(7, 3, 7, 5), 'Try max(...).'),
@@ -102,7 +101,17 @@ def with_judge(source: str, name: str, before: str) -> str:
         )
     lines = source.splitlines(keepends=True)
     lines.insert(ends[0], JUDGE.format(name=name))
-    return ''.join(lines)
+    return _importing_expect(''.join(lines))
+
+
+def _importing_expect(source: str) -> str:
+    """Return a module of judges with the import that the new judge needs."""
+    found = re.search(r'(?<=^from helpers\.checks\.points import )[\w, ]+$', source, re.MULTILINE)
+    if not found:
+        tasks = 'from helpers.checks.tasks import'
+        return source.replace(tasks, f'from helpers.checks.points import expect\n{tasks}', 1)
+    names = ', '.join(sorted({'expect', *found[0].split(', ')}))
+    return source[: found.start()] + names + source[found.end() :]
 
 
 def _judges_with(lesson: str, task: str, root: Path) -> Path:
