@@ -104,11 +104,15 @@ test-browser: ## test JupyterLab and the site in Chromium
 
 test-classroom: ## test slides, class page, handout, update and grading
 	@tools/set_up.sh browser
-	@$(PYTHON) -m pytest -n 2 $(slow) --ignore classroom/tests/hub classroom/tests $(PYTEST_ARGS)
+	@$(PYTHON) -m pytest -n 2 $(slow) --ignore classroom/tests/hub --ignore classroom/tests/containers classroom/tests $(PYTEST_ARGS)
 
-test-hub: set_up ## test a hub and a container with a class of twelve, and its logins
+test-hub: set_up ## test a hub with a class of twelve, and its logins
 	@tools/set_up.sh browser && tools/set_up.sh logins && { classroom/hub/set_up.sh || echo 'LEFT OUT: the hub.'; }
 	@$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 classroom/tests/hub $(PYTEST_ARGS)
+
+test-containers: set_up ## test the image, a class of twelve in containers, grading in containers, as root
+	@tools/set_up.sh browser && { classroom/hub/set_up.sh || echo 'LEFT OUT: the hub.'; }
+	@$(PYTHON) -m pytest -n 0 -rsP -o faulthandler_timeout=1200 classroom/tests/containers $(PYTEST_ARGS)
 
 soak: set_up ## run the notebooks in hard conditions, as root: CONDITIONS="idle busy", LESSON=02
 	@tests/soak/run.sh "$(CONDITIONS)" "$(LESSON)"
@@ -135,11 +139,11 @@ set_up:
 	@tools/set_up.sh $(groups)
 
 # What these commands need besides what a learner needs: groups of pyproject.toml.
-test test-ros2 test-tools test-packages test-answers mutants ordeal test-browser test-classroom test-hub notebooks lesson task soak left-out bench lint: groups := test
+test test-ros2 test-tools test-packages test-answers mutants ordeal test-browser test-classroom test-hub test-containers notebooks lesson task soak left-out bench lint: groups := test
 test-browser test-classroom: set_up
 licences: groups := test browser site hub logins licences
 
-.PHONY: help lab present slides class test test-ros2 test-tools test-packages test-answers mutants ordeal test-browser test-classroom test-hub image lab-container hub handout grade collect syllabus exam update notebooks \
+.PHONY: help lab present slides class test test-ros2 test-tools test-packages test-answers mutants ordeal test-browser test-classroom test-hub test-containers image lab-container hub handout grade collect syllabus exam update notebooks \
 	lesson task site soak left-out bench release lint lock licences clean set_up
 
 # Notebooks mostly wait, so more of them than cores run at once. A notebook stays in one worker. None

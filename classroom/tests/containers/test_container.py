@@ -1,4 +1,4 @@
-"""The image of the lessons, used: `make test-hub`."""
+"""The image of the lessons, used: `make test-containers`."""
 
 import contextlib
 import shutil

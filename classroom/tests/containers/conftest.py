@@ -1,4 +1,4 @@
-"""The image of the lessons, built once for all tests of `make test-hub`.
+"""The image of the lessons, built once for all tests of `make test-containers`.
 
 Its base is Debian from debootstrap, because a machine without a registry of images runs this, too.
 If podman, debootstrap, the rights or the network cannot be had, this says so and is left out.
