@@ -22,7 +22,7 @@ HALL_LANE = LANE._replace(wall_m=7.5)  # of the floor that set_parameters draws
 STOPS_M = 0.4  # where the robot of the program stands
 STYLE = """
 .window{fill:COLOUR(way);stroke:COLOUR(wall);stroke-opacity:.5}
-.typed,.printed,.fault{font:21px ui-monospace,'SF Mono','DejaVu Sans Mono',Consolas,monospace;
+.typed,.printed{font:21px ui-monospace,'SF Mono','DejaVu Sans Mono',Consolas,monospace;
 white-space:pre}
 .typed{font-weight:bold}
 """
@@ -31,8 +31,8 @@ white-space:pre}
 def terminal_picture(lesson: Lesson, lines: list[str | tuple[str, str]]) -> str:
     """Return a terminal in which one line after the other gets its full colour.
 
-    A line is what somebody types, or (cell, beginning): the lines that this cell has printed and
-    that begin so. What is not there any more raises ValueError.
+    A line is what somebody types, or (cell, beginning): the sentences that this cell has printed
+    and that begin so. What is not there any more raises ValueError.
     """
     shown = []
     for line in lines:
@@ -40,13 +40,12 @@ def terminal_picture(lesson: Lesson, lines: list[str | tuple[str, str]]) -> str:
             shown.append(('typed ink', line))
             continue
         cell_id, beginning = line
-        printed = text_of(lesson, cell_id).splitlines()
-        found = [text for text in printed if text.startswith(beginning)]
+        # A line of two sentences would be too long, and the second one may tell too much.
+        printed = text_of(lesson, cell_id).replace('. ', '.\n').splitlines()
+        found = [('printed ink', text) for text in printed if text.startswith(beginning)]
         if not found:
             raise ValueError(f'{cell_id} of {lesson.name} prints no {beginning!r} any more.')
-        # A line of two sentences would be too long for the picture.
-        for text in '\n'.join(found).replace('. ', '.\n').splitlines():
-            shown.append(('fault lost' if 'assert' in text else 'printed ink', text))
+        shown += found
     every_s = PLAYS_S / len(shown)
     shown = [
         (f'{kind} later" style="animation-delay:{i * every_s:.2f}s', text)
