@@ -14,8 +14,8 @@ fail() {
 }
 
 # Which lessons and packages an image holds: its label is the checksum of what went into it.
-inside=$(find LICENSE pyproject.toml helpers notebooks tools classroom -type f \
-    ! -path "classroom/hub/*" ! -path "classroom/tests/*" ! -path '*/__pycache__/*' ! -path '*/.ipynb_checkpoints/*' -exec cksum {} + | LC_ALL=C sort | cksum | tr ' ' -)
+inside=$(find LICENSE pyproject.toml helpers ros2 notebooks tools classroom -type f \
+    ! -path "ros2/tests/*" ! -path "classroom/hub/*" ! -path "classroom/tests/*" ! -path '*/__pycache__/*' ! -path '*/.ipynb_checkpoints/*' -exec cksum {} + | LC_ALL=C sort | cksum | tr ' ' -)
 [ "${1-}" != label ] || exec echo "$inside"
 
 container=${CONTAINER:-$(command -v podman || command -v docker || true)}

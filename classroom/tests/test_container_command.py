@@ -48,6 +48,34 @@ def run(tmp_path):
     return run
 
 
+def label(folder):
+    command = [folder / 'classroom/container/run.sh', 'label']
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def test_a_label_changes_with_all_that_an_image_gets(tmp_path):
+    ignored = (ROOT / '.dockerignore').read_text(encoding='utf-8').splitlines()
+    inside = [line[1:] for line in ignored if line.startswith('!')]
+    script = 'classroom/container/run.sh'
+    for name in [*inside, script]:
+        if (ROOT / name).is_dir():
+            (tmp_path / name).mkdir(parents=True)
+            (tmp_path / name / 'a_file').touch()
+        else:
+            (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, tmp_path / name)
+    before = label(tmp_path)
+    for name in inside:
+        changed = tmp_path / name
+        changed = changed / 'a_file' if changed.is_dir() else changed
+        changed.write_text('changed')
+        assert (after := label(tmp_path)) != before, name
+        before = after
+    (tmp_path / 'ros2/tests').mkdir()
+    (tmp_path / 'ros2/tests/a_test.py').touch()
+    assert label(tmp_path) == before
+
+
 @pytest.mark.parametrize('what', ['image', 'lab'])
 def test_no_command(run, what):
     done = run(what)

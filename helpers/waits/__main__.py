@@ -65,7 +65,7 @@ def main(arguments: list[str]) -> None:
         print(ask_kernel(*arguments[1:]))
         return
     if not arguments or arguments[0].startswith('-'):
-        sys.exit('Use: python3 -m waits PROGRAM [ARGUMENTS ...], or --kernel [CONNECTION_FILE]')
+        sys.exit('Use: python3 -m waits PROGRAM [ARGUMENTS ...]')
     if Path(arguments[0]).name.startswith('python') and len(arguments) > 1:
         arguments = arguments[1:]  # `ros2 run --prefix` may name the interpreter, too
     try:

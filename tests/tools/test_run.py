@@ -68,6 +68,30 @@ def test_what_is_cleaned():
     assert why.metadata.editable is False
 
 
+def test_a_lesson_is_made_from_its_own_judges(tmp_path):
+    judges = tmp_path / 'helpers/checks/lessons'
+    files = [judges / 'build_it/parts.py', judges / 'build_it/whole.py', judges / 'try_it.py']
+    for file in [*files, tmp_path / 'helpers/checks/tasks.py', tmp_path / 'helpers/robot/body.py']:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text('')
+    files[1].write_text('import helpers.robot\n')
+    code = 'from helpers.checks.lessons.{} import check'
+    lessons = [
+        new_notebook(cells=[new_code_cell(code.format(name))]) for name in ('build_it', 'try_it')
+    ]
+
+    def digests():
+        return [outputs.made_from(lesson, tmp_path) for lesson in lessons]
+
+    before = digests()
+    assert ['helpers/robot' in made for made in before] == [True, False]
+    for file, changed in ((files[0], [True, False]), (files[2], [False, True])):
+        file.write_text('NEW = 1\n')
+        after = digests()
+        assert [one != two for one, two in zip(before, after, strict=True)] == changed
+        before = after
+
+
 @pytest.mark.parametrize(
     ('sources', 'limit', 'why'),
     [

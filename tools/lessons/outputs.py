@@ -33,6 +33,7 @@ from nbformat import NotebookNode
 from helpers.lesson import called, tags
 from tools.lessons.clean import MADE_FROM
 from tools.lessons.comparison import compared
+from tools.lessons.new import judges_of
 
 CHECKS, COMMAND, OTHERS = 'helpers/checks', 'ros2', 'other versions'
 TEXT_ONLY = {CHECKS, COMMAND, OTHERS}
@@ -187,8 +188,7 @@ def _without_counts(cell: NotebookNode) -> list[dict]:
 def _helpers(cells: list[NotebookNode], root: Path) -> Digests:
     code = '\n'.join(cell.source for cell in cells)
     checks = root / 'helpers' / 'checks'
-    judges = [checks / 'lessons' / f'{name}.py' for name in sorted({*JUDGES.findall(code)})]
-    judges = [judge for judge in judges if judge.exists()]
+    judges = [file for name in sorted({*JUDGES.findall(code)}) for file in judges_of(name, root)]
     found: set[str] = set()
     # What the judges import counts, because lessons take from them more than `check`. What the rest
     # of helpers/checks imports makes no output.
@@ -205,7 +205,8 @@ def _helpers(cells: list[NotebookNode], root: Path) -> Digests:
         if (folder := root / 'helpers' / name).is_dir()
     }
     if checks.name in found and checks.is_dir():
-        shared = [file for file in _files(checks) if file.parent.name != 'lessons']
+        lessons = checks / 'lessons'
+        shared = [file for file in _files(checks) if lessons not in file.parents]
         digests[CHECKS] = _digest_of_files([*shared, *judges])
     if (command := root / 'ros2' / 'ros2_command').is_dir():
         digests[COMMAND] = _digest_of_files(_files(command))
