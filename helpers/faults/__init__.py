@@ -21,12 +21,11 @@ from helpers.faults.cases import (
     Case,
     Fault,
     Mend,
-    forget,
     mend_in_words,
     read,
     take,
 )
-from helpers.faults.drives import FRESH_S, OTHER, SEEN, Drive, drive
+from helpers.faults.drives import FRESH_S, OTHER, drive
 from helpers.faults.robots import (
     CORE,
     OTHERS,
@@ -64,13 +63,10 @@ __all__ = [
     'NAME',
     'FILE',
     'OTHER',
-    'SEEN',
     'Case',
-    'Drive',
     'Fault',
     'Mend',
     'drive',
-    'forget',
     'mend_in_words',
     'take',
 ]

@@ -44,9 +44,7 @@ def with_mentions(text: str, lessons: Iterable[Lesson], here: Lesson | None = No
         said, target = link['text'], ''
         if link['name']:
             target = f'{link["folder"]}{lesson.number}_{lesson.name}{link["ending"]}'
-            said = re.sub(
-                r'^((?:[Ll]essons? )?|.* of lesson )\d\d\b', rf'\g<1>{lesson.number}', said
-            )
+            said = OF_LESSON.sub(rf'\g<1>{lesson.number}', said)
         if link['task']:
             task = next((t for t in lesson.tasks if slug(t.title) == link['title']), None)
             if task is None:

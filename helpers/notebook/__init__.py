@@ -11,7 +11,7 @@ MODULES = {
     'fresh': ('AS_SAVED', 'MARK'),
     'interrupts': ('at_each_signal', 'run_command', 'uninterrupted'),
     'kernel': ('can_ask', 'hear_while_a_cell_runs'),
-    'look': ('LOOK', 'LOOK_CSS', 'LOOK_FILE'),
+    'look': ('LOOK', 'LOOK_CSS'),
     'names': ('names_of',),
     'on_demand': ('load_on_demand',),
     'own_code': ('is_students', 'own_line', 'places'),

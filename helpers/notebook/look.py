@@ -3,6 +3,5 @@
 import re
 from pathlib import Path
 
-LOOK_FILE = Path(__file__).with_suffix('.css')
-LOOK_CSS = LOOK_FILE.read_text()
+LOOK_CSS = Path(__file__).with_suffix('.css').read_text()
 LOOK = dict(re.findall(r'--look-([\w-]+): ([^;]+);', LOOK_CSS))

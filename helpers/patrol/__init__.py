@@ -10,7 +10,6 @@ a cable is unplugged, the laser is blind, a program is ended.
 """
 
 from helpers.patrol.drives import (
-    CABLES,
     CIRCLE,
     CUT,
     DEGREES,
@@ -38,7 +37,6 @@ from helpers.patrol.program import PACKAGE, SIM, action, module, route_of
 
 __all__ = [
     'ALL_END',
-    'CABLES',
     'CELLAR',
     'CIRCLE',
     'CLOSE',

@@ -2,7 +2,7 @@
 
 from helpers.ros.connections import NOT_OF_A_LESSON, nearly
 from helpers.ros.conversions import START_NS, STATUS, quaternion, seconds_of, stamp_of, yaw_of
-from helpers.ros.domain import change_domain_id, one_process_at_a_time, remove_dead_segments
+from helpers.ros.domain import change_domain_id, remove_dead_segments
 from helpers.ros.executors import spin_each, spun
 from helpers.ros.program import run_program
 from helpers.ros.session import (
@@ -27,7 +27,6 @@ __all__ = [
     'graph_environment',
     'leave_ros',
     'nearly',
-    'one_process_at_a_time',
     'quaternion',
     'remove_dead_segments',
     'ros_session',

@@ -135,7 +135,7 @@ def _enders_of(
         for frame in activity.own:
             if not _is(change, frame.f_code):
                 continue
-            if activity is waiter and frame is not None:
+            if activity is waiter:
                 if change.line > frame.f_lineno or _in_loop(frame, change.line):
                     stop = Blocker(
                         'itself',
