@@ -185,8 +185,15 @@ const placeKind = (() => {
       bracket.setAttribute('d', `${end(from)}${end(to)}${path([from, to])}`);
       far.textContent = `${wide.toFixed(2)} m`;
       const middle = [(from[0] + to[0]) / 2, (from[1] + to[1]) / 2];
-      const beside = (x > 0 ? 28 : -28) / scale; // above the line
-      at(number, record.plane ? [middle[0] - beside * y, middle[1] + beside * x] : along((real + now) / 2, side + 0.1));
+      if (!record.plane) {
+        at(number, along((real + now) / 2, side + 0.1));
+        return;
+      }
+      // Above a flat line, and else to the right of it, where the line is not.
+      const flat = Math.abs(y) < 0.3 * Math.abs(x);
+      far.setAttribute('text-anchor', flat ? 'middle' : 'start');
+      far.setAttribute('dy', flat ? '-0.5em' : x * y > 0 ? '1em' : '-0.2em');
+      at(number, [middle[0] + (flat ? 0 : 9 / scale), middle[1]]);
     }
 
     // What came out, if no drive shows it: the path, and where it ends.
