@@ -1,5 +1,6 @@
 """What a reader reads about a guess."""
 
+import math
 import os
 from html import unescape
 
@@ -12,8 +13,8 @@ from helpers.checks import guess
 from helpers.checks.guesses import NO_GUESS, compare_prediction
 from helpers.checks.progress import FILE_VARIABLE
 from helpers.guesses import Level
-from helpers.robot import CORRIDOR, EMPTY, DriveRecord
-from helpers.robot.record import Event, Step
+from helpers.robot import CORRIDOR, EMPTY, ROOMS, DriveRecord, Floor, Pose
+from helpers.robot.record import Command, Event, Step
 
 QUESTION = 'How many of 41 messages are heard?'
 
@@ -93,6 +94,7 @@ def test_an_outcome_of_no_known_kind_is_refused(capsys):
 
 END = 'Where does it end?'
 ROWS = {'lost': range(3), 'it stops': bool}
+POINT = {'on': ROOMS, 'point': True}
 
 
 def asked(capsys, *typed, **on):
@@ -146,6 +148,11 @@ def test_several_options_are_typed_in_any_form(capsys, typed):
         ({'on': ('A', 'B')}, 'C', "'C' is none of the options."),
         ({'on': range(9), 'several': 3}, [1, 2], 'These are 2, and 3 are asked for.'),
         ({'on': ROWS}, [1], '[1] is no answer for 2 rows.'),
+        (POINT, 'far', "'far' is no point. Typed in place of the dots: (x, y) in metres"),
+        (POINT, (1.0, True), '(1.0, True) is no point.'),
+        (POINT, (1.0, 2.0, 3.0), '(1.0, 2.0, 3.0) is no point.'),
+        (POINT, (1.0, math.nan), '(1.0, nan) is no point.'),
+        (POINT, (99.0, 0.0), '(99.0, 0.0) is not on this floor.'),
         (
             {'on': ROWS},
             [3, True],
@@ -157,6 +164,37 @@ def test_a_wrong_form_is_said_at_once(capsys, on, typed, why):
     made, printed = asked(capsys, typed, **on)
     assert made.value is None
     assert why in printed.replace('\n', ' ')
+
+
+@pytest.mark.parametrize(
+    'typed',
+    [
+        (1.5, -0.5),
+        '1.5, -0.5',
+        '1,5 -0,5',
+        'x 1.5 m, y -0.5 m',
+        {'y': -0.5, 'x': '1.5 m'},
+        np.array([1.5, -0.5]),
+    ],
+)
+def test_a_point_is_typed_in_any_form(capsys, typed):
+    made, printed = asked(capsys, typed, **POINT)
+    assert made.value == [1.5, -0.5]
+    assert printed.endswith('You say: it is 1.50 m ahead of the robot, 0.50 m to its right.\n')
+
+
+def test_two_numbers_are_a_point_too():
+    assert guess(END, 2, 0, **POINT).said() == 'it is 2.00 m ahead of the robot.'
+    assert guess(END, '0,0', **POINT).said() == 'it is where the robot is.'
+    assert guess(END, '2,1', **POINT).value == [2.0, 1.0]
+
+
+def test_x_is_ahead_of_the_robot_wherever_it_looks():
+    turned = Floor((), (4.0, 4.0), Pose(1.0, 1.0, math.pi / 2))
+    kind = guess(END, ..., on=turned, point=True).kind
+    assert kind.on_floor(2.0, 0.5) == pytest.approx((0.5, 3.0))
+    with pytest.raises(ValueError, match='not on this floor'):
+        kind.read((2.0, 1.5))
 
 
 def test_options_stand_at_their_points():
@@ -174,15 +212,18 @@ def test_what_may_be_answered_is_visible_before(capsys):
         assert made.kind.forms in unescape(made._repr_mimebundle_()['text/html'])
 
 
-def drive(*rows, bump_s=None):
+def drive(*rows, bump_s=None, **others):
     """Return a drive in the corridor, (t, x, v) of each step."""
     poses = [Step(t_s, x, 1.25, 0.0, v, 0.0) for t_s, x, v in rows]
     events = [] if bump_s is None else [Event(bump_s, 'bump', 'It hit something.')]
-    return DriveRecord(CORRIDOR, poses=poses, events=events)
+    return DriveRecord(CORRIDOR, poses=poses, **{'events': events} | others)
 
 
 HIT = drive((0, 1.25, 0.5), (6, 4.39, 0.5), bump_s=6)  # the wall is at 4.5
 STOOD = drive((0, 1.25, 0.5), (6, 4.0, 0.0))
+TOLD = [Command(1.0, 0.5, 0.0)]
+WATCHDOG = [Event(1.5, 'watchdog', 'No command came for 0.5 s: it stops.')]
+LATE = drive((0, 1.25, 0.5), (6, 4.0, 0.0), commands=TOLD, events=WATCHDOG)
 
 
 @pytest.mark.parametrize(
@@ -193,6 +234,12 @@ STOOD = drive((0, 1.25, 0.5), (6, 4.0, 0.0))
         (0.5, STOOD, 'Right: it stands 0.50 m before the wall.'),
         (0.9, STOOD, 'It stands 0.50 m before the wall, 0.40 m further than you said.'),
         ('wall', STOOD, 'It stands 0.50 m before the wall, 0.39 m short of what you said.'),
+        (
+            0.5,
+            LATE,
+            'Right: it stands 0.50 m before the wall. '
+            'After the last command it drove on for 0.5 s: 0.5 s × 0.5 m/s = 0.25 m.',
+        ),
         # So near, and yet it hit: that is another answer.
         (0.15, HIT, 'It is in the wall, 0.04 m further than you said.'),
     ],
@@ -201,6 +248,9 @@ def test_the_gap_to_a_drive_is_one_sentence(capsys, typed, record, said):
     made, _ = asked(capsys, typed, on=CORRIDOR)
     compare_prediction(END, made, record)
     assert capsys.readouterr().out.splitlines()[-1].strip() == said
+
+
+SIDE = 'It is 2.00 m ahead of the robot, 1.00 m to its right'
 
 
 @pytest.mark.parametrize(
@@ -213,6 +263,9 @@ def test_the_gap_to_a_drive_is_one_sentence(capsys, typed, record, said):
         ({'on': bool}, 'yes', np.bool_(False), 'It is no: you said yes.'),
         ({'on': ('A', 'B', 'C'), 'several': True}, {'A', 'B'}, {'B'}, 'It is B: you said A, B.'),
         ({'on': ('A', 'B', 'C'), 'several': True}, set(), set(), 'Right: none.'),
+        (POINT, (2, 0), [(0, 0), (2, -1)], f'{SIDE}: 1.00 m from your point.'),
+        (POINT, (2, -0.8), np.array([2, -1]), f'{SIDE}: 0.20 m from your point.'),
+        (POINT, (2, -0.95), (2, -1), f'Right: i{SIDE[1:]}.'),
         ({'on': ROWS}, [1, 'no'], [2, False], 'lost is 2, and you said 1.'),
         ({'on': ROWS}, [2, 'no'], {'lost': 2, 'it stops': False}, 'Right: lost: 2, it stops: no.'),
     ],
@@ -242,6 +295,35 @@ def test_without_a_student_the_answer_is_words_that_never_move(capsys, monkeypat
     for record, answer in ((HIT, 'in the wall'), (STOOD, 'before the wall')):
         compare_prediction(END, made, record)
         assert capsys.readouterr().out == f'{END}\n  The answer is {answer}.\n'
+
+
+@pytest.mark.parametrize(
+    ('end', 'said'),
+    [
+        ((2.0, -1.0), 'ahead of the robot, to its right'),
+        ((-2.0, 0.2), 'behind the robot'),
+        ((0.1, 1.0), 'to its left'),
+        ((0.1, 0.2), 'where the robot is'),
+    ],
+)
+def test_without_a_student_a_point_is_on_a_side_of_the_robot(capsys, monkeypatch, end, said):
+    monkeypatch.setattr('helpers.checks.guesses._has_student', lambda: False)
+    shown = []
+    monkeypatch.setattr('helpers.checks.guesses.display', shown.append)
+    made, _ = asked(capsys, ..., **POINT)
+    compare_prediction(END, made, [(0.0, 0.0), end], tolerance=0.3)
+    # The site has its picture, through which the browser draws what was guessed there.
+    assert str(shown[0]) == f'  The answer is {said}.'
+    html = unescape(shown[0]._repr_mimebundle_()['text/html'])
+    assert '"path":[[0.0,0.0],' in html
+
+
+def test_a_line_on_the_way_has_a_name_and_the_way_a_start():
+    kind = guess(END, ..., on=CORRIDOR, start=Pose(2.5, 1.25, 0.0), marks={'it breaks': 1.0}).kind
+    assert kind.ahead_m == 2.0
+    assert (kind.record()['line'], kind.record()['label']) == (1.0, 'it breaks')
+    assert ' A line, it breaks, is 1 m before the wall.' in kind.words()
+    assert guess(END, ..., on=CORRIDOR, line_m=0.6).kind.record()['label'] == 'limit: 0.6 m'
 
 
 def test_a_floor_without_a_wall_takes_no_place():

@@ -9,6 +9,7 @@ import pytest
 from helpers.checks import compare_prediction, guess, progress
 from helpers.checks.portrait import KEPT, Map, portrait
 from helpers.checks.tasks import Tasks
+from helpers.robot import EMPTY
 
 
 def notebook(title, *tasks):
@@ -264,6 +265,8 @@ def test_a_question_that_was_answered_again_counts_once(asked, capsys):
 def test_the_pictures_have_words_and_a_lesson_with_its_link(asked):
     asked.level('How old <is> it?', 2.0, 12.0)
     asked.choice('Does it build?', 'no', True)
+    made = guess('Where is it?', (1.0, 0.5), on=EMPTY, point=True)
+    compare_prediction('Where is it?', made, (2.0, -0.5))
     lines = progress.lines_of(KEPT)
     known = progress.with_tasks()
     solved = {lesson.name: [1] for lesson in known}
@@ -274,6 +277,10 @@ def test_the_pictures_have_words_and_a_lesson_with_its_link(asked):
     assert '5 of 9 tasks.' in html
     assert '<title>How old &lt;is&gt; it? You said 2, and it was 12.</title>' in html
     assert '<title>Does it build? You said no, and it was yes.</title>' in html
+    point = html.partition('<title>Where is it? You said 1.0, 0.5, and it was 2.0, -0.5.</title>')[
+        2
+    ]
+    assert '<circle cx="42.4" cy="12.9" r="3"' in point
 
 
 def test_a_line_that_was_not_written_to_its_end_is_passed_over(asked, kept, capsys):

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import threading
 from html import unescape
 from pathlib import Path
 from types import SimpleNamespace
@@ -21,7 +22,7 @@ from helpers.robot import CORRIDOR, EMPTY, ROOMS, DriveRecord, Pose, Robot
 from helpers.robot.body import Body
 from helpers.robot.record import Command, Event, Scan, Step
 from helpers.robot.sensors import Sensors
-from helpers.robot_view import drive_by_hand, replay_drive, watch
+from helpers.robot_view import Place, drive_by_hand, replay_drive, watch
 from helpers.robot_view.by_hand import Tour
 from helpers.robot_view.live import LiveView
 from helpers.robot_view.scans import ScanRecording
@@ -238,6 +239,36 @@ def test_a_scan_of_just_before_the_recording_has_the_time_of_the_robot():
     assert begun_s == pytest.approx(first.t_s)
     assert (table['published_s'] <= table['started_s']).all()
     assert recording.table().equals(recording.table())
+
+
+def test_a_callback_that_does_not_return_is_why_it_hit_the_wall(script):
+    held = threading.Event()
+    with ros_session() as session:
+        robot, node = Robot(CORRIDOR, start=Pose(3.9, 1.25, 0.0)), Node('brake')
+        scans = node.create_subscription(LaserScan, 'scan', lambda scan: held.wait(60), 1)
+        recording = ScanRecording(robot, scans)
+        session.spin(spun(node))
+        session.wait_until(lambda: recording.heard == 1)
+        robot.drive(0.25, 0.0, 5.0)
+        held.set()
+    shown = replay_drive(robot.record, recording)
+    [run, _] = shown.runs
+    assert re.fullmatch(
+        r'The robot hit the wall: the callback had not returned for \d\.\d s\.', run.headline
+    )
+    ended = run.ended(Place(CORRIDOR))
+    assert re.fullmatch(
+        r'The callback had not returned for ([\d.]+) s: \1 s × 0.25 m/s = [\d.]+ m\.',
+        ended['cause'],
+    )
+    # So one sees which scan it works on, and how old that is.
+    record = record_of(shown)
+    [[began, seq, made], *_] = record['works']
+    bump = record['bumps'][0]
+    [seen] = script(record, [bump])['seen']
+    assert seen['age'] == pytest.approx((bump - made) / 1000)
+    assert made == pytest.approx(1000 * robot.record.scans[seq].t_s, abs=1)
+    assert began < bump
 
 
 # In a kernel

@@ -52,6 +52,7 @@ from helpers.notebook import BEGIN_EMPTY, somebody_watches, wrap
 
 if TYPE_CHECKING:
     from helpers.guesses import Guess, Kind
+    from helpers.robot import Pose
 
 __all__ = ['guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand']
 
@@ -117,6 +118,8 @@ def guess(
     unit: str = '',
     line_m: float | None = None,
     marks: Mapping[str, float | tuple[float, float]] | None = None,
+    start: Pose | None = None,
+    point: bool = False,
 ) -> object:
     """Return the answer that a student gives to a question; `...` if there is none yet.
 
@@ -127,7 +130,9 @@ def guess(
     `on` is what one answers on, and then the cell shows it, and the result is a `Guess`, which
     changes with what one sets there, or what one types in place of the dots:
 
-    - a floor: your robot stands where you put it, in front of a wall; `line_m` (m) draws a line;
+    - a floor: your robot stands where you put it, in front of a wall, on its way from `start`;
+      `line_m` (m) draws a line, or one of `marks` that has a name;
+    - a floor, and `point`: a point (x ahead of the robot, y to its left, in m), beside `marks`;
     - a range, or a pair such as (0, 2) with a `unit`: a line on an axis, which also shows `marks`;
     - `bool`, a tuple, or a dict of words and values: options, of which one is chosen, `several`
       (True), or just so many (a number); they stand at the points (x, y in m) of `marks`;
@@ -136,7 +141,8 @@ def guess(
     What is no answer gets a sentence at once. Raises TypeError for another `on`.
     """
     if on is not None:
-        return _guess_on(_kind(on, several, unit, line_m, marks), question, *(answers or [...]))
+        kind = _kind(on, several, unit, line_m, marks, start, point)
+        return _guess_on(kind, question, *(answers or [...]))
     if len(answers) != 1:
         print(*wrap(ONE_ANSWER), sep='\n')
         return ...
@@ -156,6 +162,8 @@ def _kind(
     unit: str,
     line_m: float | None,
     marks: Mapping[str, float | tuple[float, float]] | None,
+    start: Pose | None,
+    point: bool,
 ) -> Kind:
     # Slow to load, and most guesses have no floor.
     from helpers.guesses import kind_of
@@ -163,9 +171,14 @@ def _kind(
 
     if not isinstance(on, Floor):
         return kind_of(on, several, unit, marks)
-    from helpers.robot_view import Place
+    from helpers.robot_view import Place, Point
 
-    return Place(on, line_m)
+    if point:
+        return Point(on, marks or {})
+    if marks:
+        [(line, line_m)] = marks.items()
+        return Place(on, line_m, start, line)
+    return Place(on, line_m, start)
 
 
 def _guess_on(kind: Kind, question: str, *answers: object) -> Guess:

@@ -49,10 +49,10 @@ def compare_prediction(
     its own unit. Choose it wide enough for the slowest machine: then the verdict stays the same.
     The right answer is then printed for a student only, not in a run without one.
 
-    For a guess that was made in a picture, `outcome` is what its kind compares: the robot, a
-    number, or what came out of the options. The gap is shown there, in one sentence. If cells of a
-    table were ticked, `table` is what has come into them: texts by the options, or by row and
-    column, which may be more than were asked about.
+    For a guess that was made in a picture, `outcome` is what its kind compares: the robot, a point
+    or the path to it (n, 2), a number, or what came out of the options. The gap is shown there, in
+    one sentence. If cells of a table were ticked, `table` is what has come into them: texts by the
+    options, or by row and column, which may be more than were asked about.
 
     `because` is a sentence that explains the outcome. It is printed after any guess. If there is no
     guess yet, a student is asked for one; a run without a student, as in CI, prints the answer. A
@@ -119,7 +119,7 @@ def _compare(
         if _has_student() and not in_class:
             print(f'  No guess yet. {guess.kind.asks} Then run this cell again.')
             return
-        if table is not None or (in_class and guess.run is None):
+        if table is not None or 'path' in outcome or (in_class and guess.run is None):
             display(Gap(guess, outcome))
         elif answer := guess.kind.answer(outcome):
             print(f'  The answer is {answer}.')

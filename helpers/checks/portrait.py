@@ -1,7 +1,8 @@
 """A map of what a student has done, and a portrait of the intuition: guesses against what came out.
 
 `compare_prediction` keeps a guess in the file of the progress, as a line `gap LESSON {...}`: what
-was asked, what was said, what came out, whether it was right, and for a number its axis.
+was asked, what was said, what came out, whether it was right, for a number its axis, and of points
+where they are on their floor.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ WIDE, HIGH, EDGE = 64, 24, 6  # px, of the picture of one guess
 def line_of(lesson: str, guess: Guess, outcome: Mapping) -> str:
     """Return the line that keeps a guess of this lesson, and what came out."""
     kind, said, was = guess.kind, guess.value, outcome['at']
-    if kind.axis is None:
+    shares = [kind.share(said), kind.share(was)] if hasattr(kind, 'share') else None
+    if kind.axis is None and shares is None:
         said, was = kind.told(said), kind.told(was)
     kept = {
         'asked': guess.question,
@@ -36,6 +38,7 @@ def line_of(lesson: str, guess: Guess, outcome: Mapping) -> str:
         'was': was,
         'right': guess.gap(outcome)['right'],
         'axis': kind.axis,
+        **({'shares': shares} if shares else {}),
     }
     return f'{KEPT} {lesson} {json.dumps(kept, ensure_ascii=False)}'
 
@@ -106,7 +109,7 @@ class Map:
             rows.append(f'<tr>{"".join(cells)}</tr>')
         key = 'A full square is a task that is solved, a star one beyond the core.'
         if self.portrait:
-            key += f' A ring is your guess, a bar is what came out. {self.portrait}'
+            key += f' A ring is your guess, a bar or a dot is what came out. {self.portrait}'
         total = self.text.splitlines()[-1]
         return f'<table>{"".join(rows)}</table><p>{escape(f"{total} {key}")}</p>'
 
@@ -141,7 +144,7 @@ def portrait(known: Iterable[Lesson], lines: Iterable[str]) -> Portrait | None:
 
 
 def _picture(one: Mapping) -> str:
-    """Return a small SVG: the guess is a ring, what came out is a bar; or a tick, or a cross."""
+    """Return a small SVG: a ring for the guess, a bar or a dot for what came out; or a tick."""
     says = f'{one["asked"]} You said {_written(one["said"])}, and it was {_written(one["was"])}.'
     color = GREEN if one['right'] else AMBER
     if one['axis']:
@@ -153,6 +156,17 @@ def _picture(one: Mapping) -> str:
             f'<path d="M{was} 4V{HIGH - 4}" stroke="{color}" stroke-width="4"/>'
             f'<circle cx="{said}" cy="{middle}" r="5" fill="none" stroke="{color}" '
             'stroke-width="2"/>'
+        )
+        wide = WIDE
+    elif one.get('shares'):
+        (x, y), (real_x, real_y) = (
+            (_at(right, 0, 1), round(HIGH - 3 - up * (HIGH - 6), 1)) for right, up in one['shares']
+        )
+        drawn = (
+            f'<path d="M1 1H{WIDE - 1}V{HIGH - 1}H1z" fill="none" stroke="currentColor" '
+            f'opacity=".4"/><path d="M{x} {y}L{real_x} {real_y}" stroke="{color}" '
+            f'stroke-width="2"/><circle cx="{real_x}" cy="{real_y}" r="3" fill="{color}"/>'
+            f'<circle cx="{x}" cy="{y}" r="5" fill="none" stroke="{color}" stroke-width="2"/>'
         )
         wide = WIDE
     else:

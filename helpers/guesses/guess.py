@@ -128,7 +128,8 @@ class Gap:
             return {'text/plain': str(self), 'text/html': html}
         record = attribute({**guess.record(), 'outcome': dict(self.outcome)})
         svg = guess.kind.picture()
-        figure = picture_of(svg, f'{guess.question} {guess.kind.words()}') if svg else ''
+        words = f'{guess.question} {guess.kind.words()} {" ".join(str(self).split())}'
+        figure = picture_of(svg, words) if svg else ''
         look = style(CSS, rows=False)
         html = (
             f'<div class="replay guess" data-guess={record}>{look}'

@@ -6,6 +6,7 @@ from helpers.recording.recording import (
     CallbackRecording,
     CallbackRun,
     Recording,
+    at_once_with,
     most_at_once,
 )
 from helpers.recording.table import RUN_COLUMNS, check_table, thread_order
@@ -16,6 +17,7 @@ __all__ = [
     'CallbackRecording',
     'CallbackRun',
     'Recording',
+    'at_once_with',
     'check_table',
     'explain',
     'most_at_once',

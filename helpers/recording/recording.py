@@ -378,3 +378,15 @@ def most_at_once(table: pd.DataFrame) -> int:
     """Return the largest number of callbacks in a recording that ran at the same time."""
     begun, ended = table['started_s'].dropna(), table['finished_s'].dropna()
     return max(int(((begun <= time_s) & (ended > time_s)).sum()) for time_s in begun)
+
+
+def at_once_with(table: pd.DataFrame, seq: int) -> set[int]:
+    """Return the messages whose callbacks ran at the same time as that of `seq`, with itself.
+
+    Raises ValueError if this one had no callback.
+    """
+    heard = table.dropna(subset='started_s')
+    begun, ended = heard['started_s'], heard['finished_s'].fillna(math.inf)
+    [row] = heard.index[heard['seq'] == seq]
+    at_once = (begun < ended[row]) & (ended > begun[row])
+    return {*heard.loc[at_once, 'seq'].tolist()}

@@ -2,8 +2,9 @@
 
 // Return what walk.js returns of a run: times, seek, scan. And `told`, which steps say something.
 // In a drive that still goes on, the rows of `record` grow, and `took` is the scan that a callback has.
+// `works` are the callbacks of a node that commands nothing itself.
 function drive(record, root) {
-  const { step, poses, commands, scans, events, bumps, guess, strip = Infinity, outcome: said } = record;
+  const { step, poses, commands, scans, events, bumps, guess, strip = Infinity, works = [], outcome: said } = record;
   const kept = guess && memory(root, guess);
   const turn = w => (w ? ` and ${w.toFixed(2)} rad/s` : '');
   const speed = ([, v, w]) => `${v.toFixed(2)} m/s${turn(w)}`;
@@ -58,9 +59,10 @@ function drive(record, root) {
     const till = Math.min(ms, decided());
     const command = latest(commands, till);
     // Not each scan is saved: the time of the one that it acts on is that of the command, less its age.
-    const has = record.took ?? command?.[3] ?? -1;
+    const work = latest(works, till);
+    const has = record.took ?? work?.[1] ?? command?.[3] ?? -1;
     const taken = has < 0 ? undefined : scans.findLast(([, seq]) => seq <= has);
-    const seen = taken && (record.took === undefined ? command[0] - command[4] : taken[0]);
+    const seen = taken && (record.took === undefined ? work?.[2] ?? command[0] - command[4] : taken[0]);
     const now = latest(scans, ms);
     return {
       ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(seen), age: taken && (till - seen) / 1000,

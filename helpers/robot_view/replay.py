@@ -33,6 +33,8 @@ POSES, SCANS, COMMANDS, EVENTS = 400, 50, 150, 50
 EVERY_S = 0.1  # a pose
 NEAR_M = 2.0  # so near, a robot stands before what it sees
 TIMES = ['published_s', 'started_s', 'finished_s']
+HELD_S = 0.5  # a callback that runs longer than this is worth a sentence
+LATE_S = 0.3  # so is a command that was the last one for longer
 TIME_LABEL = "time since the robot's start (s)"
 
 
@@ -134,6 +136,7 @@ class Drive:
                 [round(1000 * event.t_s), event.text] for event in self.record_.events[:EVENTS]
             ],
             'bumps': [round(1000 * bump.t_s) for bump in bumps(self.record_)],
+            **({'works': works} if (works := self.works()) else {}),
         }
 
     def _guessed(self) -> dict:
@@ -142,10 +145,58 @@ class Drive:
     @property
     def headline(self) -> str:
         """What came out, and why, if one knows which scan the robot acted on."""
-        what, acted = outcome(self.record_), self.acted_on()
-        if acted is None:
-            return what
-        return f'{what.partition(" after ")[0].rstrip(".")}: the scan was {acted[0]:.1f} s old.'
+        what = outcome(self.record_)
+        because = ''
+        if (acted := self.acted_on()) is not None:
+            because = f'the scan was {acted[0]:.1f} s old.'
+        elif self.held_s is not None:
+            because = f'the callback had not returned for {self.held_s:.1f} s.'
+        return f'{what.partition(" after ")[0].rstrip(".")}: {because}' if because else what
+
+    @property
+    def held_s(self) -> float | None:
+        """For how long (s) a callback had not returned when the robot hit something, if it had not.
+
+        None, too, if the node commands the robot itself: then its last command says more.
+        """
+        for bump in bumps(self.record_)[:1]:
+            began = [at_s for at_s, end_s, _ in self._callbacks() if at_s <= bump.t_s < end_s]
+            if began and bump.t_s - began[0] > HELD_S:
+                return bump.t_s - began[0]
+        return None
+
+    def _callbacks(self) -> list[tuple[float, float, int]]:
+        """Return of each callback when it began and ended (s), and its scan.
+
+        Only of a node that does not command the robot itself: commands of others say nothing of it.
+        """
+        recording = self.recording
+        if recording is None or recording.sent:
+            return []
+        table = recording.table().dropna(subset='started_s')
+        table[TIMES] += recording.started_s - self.record_.started_s
+        ends_s = table['finished_s'].fillna(math.inf)
+        return list(zip(table['started_s'], ends_s, table['seq'], strict=True))
+
+    def works(self) -> list[list[int]]:
+        """Return of each callback [when it began, its scan, when that was made], in ms."""
+        scans = self.record_.scans
+        return [
+            [round(1000 * began), seq, round(1000 * scans[seq].t_s)]
+            for began, _, seq in self._callbacks()
+        ]
+
+    def late_s(self) -> tuple[float, float] | None:
+        """Return how long (s) the robot drove on after its last command, and how fast (m/s).
+
+        That is until it hit something, or its watchdog stopped it. None if it was not late.
+        """
+        stops = [event for event in self.record_.events if event.kind == 'watchdog']
+        for end in bumps(self.record_)[:1] or stops[-1:]:
+            before = [command for command in self.record_.commands if command.t_s <= end.t_s]
+            if before and before[-1].v and end.t_s - before[-1].t_s > LATE_S:
+                return end.t_s - before[-1].t_s, before[-1].v
+        return None
 
     def acted_on(self) -> tuple[float, float] | None:
         """Return the age (s) of the scan that decided the end, and the speed until then (m/s).
@@ -172,14 +223,15 @@ class Drive:
         hit = bumps(self.record_)
         x, y, _ = place(self.record_, hit[0].t_s if hit else self.span_s[1])
         what = ahead_of(self.record_, x, y)
-        cause, acted = '', self.acted_on()
-        if acted is not None:
-            age_s, speed = round(acted[0], 1), round(acted[1], 2)
+        cause = ''
+        if (acted := self.acted_on()) is not None:
             did = 'acted' if hit else 'braked'
-            cause = (
-                f'It {did} on a scan that was {age_s:g} s old: '
-                f'{age_s:g} s × {speed:g} m/s = {age_s * speed:.2g} m.'
-            )
+            cause = f'It {did} on a scan that was {_times(*acted, "s old")}'
+        elif self.held_s is not None:
+            speed = next(row.v for row in reversed(self.record_.poses) if row.v)
+            cause = f'The callback had not returned for {_times(self.held_s, speed)}'
+        elif (late := self.late_s()) is not None:
+            cause = f'After the last command it drove on for {_times(*late)}'
         at = RADIUS_M if hit else round(guessed.distance_m(x, y), 2)
         return {'at': at, 'hit': bool(hit), 'what': what, 'cause': cause}
 
@@ -256,6 +308,12 @@ def replay_drive(
     words = called + words[0].upper() + words[1:]
     run = replace(run, summary=words, time_label=TIME_LABEL, after_s=after_s)
     return Replay((drive, run))
+
+
+def _times(seconds: float, speed: float, unit: str = 's') -> str:
+    """Return how far one comes in some seconds: `1.2 s old: 1.2 s × 0.5 m/s = 0.6 m.`"""
+    seconds, speed = round(seconds, 1), round(speed, 2)
+    return f'{seconds:g} {unit}: {seconds:g} s × {speed:g} m/s = {seconds * speed:.2g} m.'
 
 
 def rays(scan: Scan) -> tuple[float, float, list[int]]:

@@ -6,12 +6,13 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 from support.lab_page import WIDER, printed
 
 from helpers.guesses import Gap, Guess, Level, Options, kind_of
-from helpers.robot import CORRIDOR, DriveRecord
+from helpers.robot import CORRIDOR, ROOMS, DriveRecord
 from helpers.robot.record import Step
-from helpers.robot_view import Place, replay_drive
+from helpers.robot_view import Place, Point, replay_drive
 from tools.lessons.clean import EXPLAINS, NOTEBOOK_METADATA
 
 PLACE = Guess('Where does it end?', Place(CORRIDOR, 0.6))
+POINT = Guess('Where is it?', Point(ROOMS, {'GPS': (3.0, 0.0)}))
 LEVEL = Guess('How many are received?', Level(0, 41, 'messages'))
 OPTIONS = Guess('Which three wait?', Options({str(n): n for n in range(5)}, 3))
 ONE = Guess('Does it stop?', Options({'yes': True, 'no': False}))
@@ -127,9 +128,15 @@ def lights(page, selector):
         (ONE, {'at': 0}, ['yes'] * 10 + ['no'] * 20, 10),
         (OPTIONS, {'at': [0, 1, 2]}, [['0', '1', '2']] * 9 + [['2', '3', '4']] * 21, 3 * 9 + 21),
         (ROWS, {'at': [3, 0]}, [['depth 1: 3', 'depth 2: 1']] * 30, 30),
+        (
+            POINT,
+            {'at': [2, 1], 'path': [[2, 1]], 'tolerance': 0.3},
+            [[2, 1]] * 7 + [[2, 0]] * 23,
+            7,
+        ),
         (TICKS, {'at': [1]}, [['B']] * 8 + [['A', 'C']] * 22, 8),
     ],
-    ids=['level', 'few', 'choose', 'pick', 'rows', 'tick'],
+    ids=['level', 'few', 'choose', 'pick', 'rows', 'point', 'tick'],
 )
 def test_thirty_ghosts_of_which_those_who_were_right_light_up(phone, guess, outcome, values, right):
     page = phone(Guess(guess.question, guess.kind))
@@ -137,7 +144,8 @@ def test_thirty_ghosts_of_which_those_who_were_right_light_up(phone, guess, outc
     dots = '.class circle, .guess-class i'
     each = lights(page, dots)
     # A dot for each student, wherever one has put something.
-    assert len(each) == sum(len(one) if isinstance(one, list) else 1 for one in values)
+    many = guess is not POINT
+    assert len(each) == sum(len(one) if many and isinstance(one, list) else 1 for one in values)
     assert not any(each)  # nothing tells before the run
     page = phone(Gap(Guess(guess.question, guess.kind), outcome))
     page.evaluate(TELL, [{'question': guess.question, 'values': values}])
@@ -158,6 +166,51 @@ def test_thirty_robots_light_up_if_the_real_one_stands_where_they_are(phone):
     page.locator('.replay').focus()
     page.keyboard.press('Home')
     assert robots.evaluate_all(looks) == ['var(--look-you)'] * 30
+
+
+def test_a_point_on_a_floor_by_keys(phone, artefacts):
+    page = phone(POINT)
+    assert says(page, POINT) == POINT.kind.asks
+    point = group(page, POINT).get_by_role('slider')
+    assert point.get_attribute('aria-valuetext') == 'not yet'
+    assert group(page, POINT).get_by_text('GPS', exact=True).is_visible()
+    point.focus()
+    page.keyboard.press('Home')
+    assert says(page, POINT) == 'You say: it is where the robot is.'
+    for key in ['ArrowRight'] * 4 + ['ArrowDown'] * 2 + ['ArrowUp'] * 3:
+        page.keyboard.press(key)
+    said = 'it is 0.20 m ahead of the robot, 0.05 m to its left.'
+    assert says(page, POINT) == f'You say: {said}'
+    assert point.get_attribute('aria-valuetext') == said
+    for _ in range(40):
+        page.keyboard.press('ArrowLeft')  # not beyond the wall
+    assert says(page, POINT) == 'You say: it is 0.90 m behind the robot, 0.05 m to its left.'
+    page.wait_for_function("() => localStorage.getItem('guess: Where is it?') === '[-0.9,0.05]'")
+    assert not page.evaluate(WIDER)
+    page.screenshot(path=artefacts / 'guess_point.png', full_page=True)
+    # The answer, saved without a guess, is drawn through that of the browser.
+    out = {'at': [2.17, -1.25], 'path': [[0, 0], [2.17, -1.25]], 'tolerance': 0.3}
+    page = phone(Gap(POINT, out))
+    page.evaluate("() => localStorage.setItem('guess: Where is it?', '[2.0, 0.0]')")
+    page.reload()
+    answer = 'It is 2.17 m ahead of the robot, 1.25 m to its right'
+    assert says(page, POINT) == f'{answer}: 1.26 m from your point.'
+    assert group(page, POINT).locator('.gap').get_attribute('d')
+    assert group(page, POINT).locator('.came-path').get_attribute('d') == 'M1.250 1.750L3.420 0.500'
+    group(page, POINT).locator('svg').click()  # it is over
+    assert says(page, POINT) == f'{answer}: 1.26 m from your point.'
+    assert not page.evaluate(WIDER)
+    page.screenshot(path=artefacts / 'guess_point_gap.png', full_page=True)
+    page.evaluate('() => localStorage.clear()')
+    page.reload()
+    assert says(page, POINT) == f'{answer}.'
+    assert not group(page, POINT).locator('.you').is_visible()
+
+
+def test_guess_and_drive_beside_each_other_are_no_wider_than_a_phone(phone):
+    poses = [Step(0.0, 1.25, 1.25, 0.0, 0.5, 0.0), Step(6.0, 4.0, 1.25, 0.0, 0.0, 0.0)]
+    page = phone(PLACE, replay_drive(DriveRecord(CORRIDOR, poses=poses), guess=PLACE))
+    assert not page.evaluate(WIDER)
 
 
 def test_a_finger_puts_the_robot_there(file_page, tmp_path):

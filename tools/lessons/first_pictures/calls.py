@@ -26,7 +26,7 @@ STYLE = f"""
 
 def call_picture(lesson: Lesson, cell_id: str) -> str:
     """Return a drive until a moment after the brake has asked: whether it stops is a guess."""
-    (run,) = runs_of(output_of(lesson, cell_id))
+    run, *_ = runs_of(output_of(lesson, cell_id))
     asks_s = next(t_s for t_s, x in way_of(run) if x >= lanes.WALL_M - LIMIT_M)
     way = [(t_s * ASKS_S / asks_s, x) for t_s, x in way_of(run, asks_s)]
     robot, css = LANE.robot('r', [*way, (PLAYS_S, x_at(run, asks_s + LOOK_S))])
