@@ -362,3 +362,26 @@ def test_the_next_kernel_knows_what_was_guessed(tmp_path):
     assert printed('...') == '1.5'
     assert printed('...', lesson='06_call_a_service_from_a_callback') == 'None'
     assert printed('...', ROS2_NOTEBOOKS_BEGIN_EMPTY='yes') == 'None'  # in front of a class
+
+
+KINDS = [
+    (CORRIDOR, {}, 1.5),
+    (EMPTY, {'point': True}, (1.0, -0.5)),
+    (range(9), {}, 3),
+    (('a', 'b', 'c'), {'several': True}, ['a', 'c']),
+    ({'first': ('a', 'b'), 'second': ('a', 'b')}, {}, ['a', 'b']),
+]
+
+
+@pytest.mark.parametrize(('on', 'more', 'typed'), KINDS)
+def test_what_is_kept_is_known_again_unless_it_fits_another_kind_only(
+    tmp_path, monkeypatch, on, more, typed
+):
+    """A question may get another kind between two releases."""
+    monkeypatch.setenv(FILE_VARIABLE, str(tmp_path / 'progress.txt'))
+    monkeypatch.setenv('JPY_SESSION_NAME', 'notebooks/05_keep_what_is_fresh.ipynb')
+    monkeypatch.setattr('helpers.checks.classroom.somebody_watches', lambda: True)
+    made = guess('What is it?', typed, on=on, **more)
+    assert guess('What is it?', ..., on=on, **more).value == made.value
+    others = [guess('What is it?', ..., on=one, **its_own) for one, its_own, _ in KINDS]
+    assert [one.value for one in others if one.kind != made.kind] == [None] * (len(KINDS) - 1)

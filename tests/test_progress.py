@@ -7,7 +7,7 @@ import nbformat
 import pytest
 
 from helpers.checks import compare_prediction, guess, progress
-from helpers.checks.portrait import KEPT, Map, portrait
+from helpers.checks.portrait import Map, portrait
 from helpers.checks.tasks import Tasks
 from helpers.robot import EMPTY
 
@@ -267,10 +267,10 @@ def test_the_pictures_have_words_and_a_lesson_with_its_link(asked):
     asked.choice('Does it build?', 'no', True)
     made = guess('Where is it?', (1.0, 0.5), on=EMPTY, point=True)
     compare_prediction('Where is it?', made, (2.0, -0.5))
-    lines = progress.lines_of(KEPT)
+    gaps = progress.gaps_in(progress.lines_of(progress.GAP))
     known = progress.with_tasks()
     solved = {lesson.name: [1] for lesson in known}
-    seen = Map(known, solved, 'a table\n5 of 9 tasks.', portrait(known, lines))
+    seen = Map(known, solved, 'a table\n5 of 9 tasks.', portrait(known, gaps))
     html = seen.html()
     assert 'href="92_lose_them.ipynb"' in html
     assert html.count(', solved">') == len(known)

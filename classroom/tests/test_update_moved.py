@@ -192,7 +192,8 @@ def test_progress_and_guesses_are_those_of_the_lesson_of_today(tmp_path, monkeyp
     lines = [f'{BUILD} 14', f'{BUILD} the_guard', f'{BUILD} the_job', f'{BUILD} no_such_task']
     lines += [
         f'{progress.BORROWED} {BUILD} install_it',
-        f'{progress.KEPT} {BUILD} {json.dumps(gap)}',
+        f'{progress.GUESS} {BUILD} {json.dumps(["Which ends?", "options", 4])}',
+        f'{progress.GAP} {BUILD} {json.dumps(gap)}',
     ]
     (tmp_path / 'progress.txt').write_text('\n'.join(lines) + '\n')
     monkeypatch.setenv(progress.FILE_VARIABLE, str(tmp_path / 'progress.txt'))
@@ -204,11 +205,14 @@ def test_progress_and_guesses_are_those_of_the_lesson_of_today(tmp_path, monkeyp
     assert progress.total() == '3 of 3 tasks'
     known = progress.with_tasks()
     found = progress.in_their_lessons(lines, known)
-    assert found[-1].startswith(f'{progress.KEPT} {PUT} ')
-    assert found[-2] == f'{progress.BORROWED} {PUT} install_it'
+    assert found[-1].startswith(f'{progress.GAP} {PUT} ')
+    assert found[-2].startswith(f'{progress.GUESS} {PUT} ')
+    assert found[-3] == f'{progress.BORROWED} {PUT} install_it'
     assert found[3] == lines[3]
     assert progress.solved_of(known[0]) == {'the_job'}
     assert progress.solved_of(known[1]) == {'install_it', 'the_guard'}
+    monkeypatch.setenv('JPY_SESSION_NAME', PUT_PATH)
+    assert progress.kept_guess('Which ends?', 'options') == 4
 
 
 CELLS = [f'cell{i}' for i in range(6)]

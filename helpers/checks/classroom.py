@@ -56,7 +56,6 @@ if TYPE_CHECKING:
 
 __all__ = ['guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand']
 
-GUESSED = 'guess'  # begins a line of the progress file; no lesson has a name of one word
 HUB_VARIABLE = 'ROS2_NOTEBOOKS_CLASS'  # on a JupyterHub: the address of its class
 JOINED_FOR_S = 12 * 3600  # a class that was not left is forgotten, so that nothing is sent at home
 ADDRESS = re.compile(r'(https?://)?[\w.-]+(:\d+)?(/[\w./-]*)?')
@@ -188,7 +187,9 @@ def _guess_on(kind: Kind, question: str, *answers: object) -> Guess:
     typed = answers[0] if len(answers) == 1 else list(answers)
     made, wrong = Guess(question, kind), ''
     if typed is None or typed is ...:
-        made.value = _kept(question) if somebody_watches() else None
+        # A class sees no old one.
+        remembers = somebody_watches() and not os.environ.get(BEGIN_EMPTY)
+        made.value = progress.kept_guess(question, _word_of(kind)) if remembers else None
     else:
         try:
             made.value = kind.read(typed)
@@ -205,23 +206,12 @@ def _guess_on(kind: Kind, question: str, *answers: object) -> Guess:
 
 def _keep(made: Guess) -> None:
     """Keep what was guessed, for the next kernel, and tell the class."""
-    if lesson := progress.this_lesson():
-        progress.add(f'{GUESSED} {lesson} {json.dumps([made.question, made.value])}')
+    progress.keep_guess(made.question, _word_of(made.kind), made.value)
     _tell('guess', question=made.question, value=made.kind.told(made.value))
 
 
-def _kept(question: str) -> object:
-    """Return what was guessed before in this lesson, None for nothing. A class sees no old one."""
-    begins = f'{GUESSED} {progress.this_lesson()} '
-    if os.environ.get(BEGIN_EMPTY):
-        return None
-    found = None
-    for line in progress.lines_of(GUESSED):
-        with suppress(ValueError):
-            if line.startswith(begins):
-                asked, value = json.loads(line[len(begins) :])
-                found = value if asked == question else found
-    return found
+def _word_of(kind: Kind) -> str:
+    return type(kind).__name__.lower()
 
 
 def join_class(address: str = '', code: str = '', name: str = '') -> None:

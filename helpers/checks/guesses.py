@@ -19,7 +19,7 @@ from IPython import get_ipython
 from IPython.display import display
 
 from helpers.checks import classroom, progress
-from helpers.checks.portrait import line_of
+from helpers.checks.portrait import record_of
 from helpers.notebook import BEGIN_EMPTY, can_ask
 
 if TYPE_CHECKING:
@@ -125,8 +125,7 @@ def _compare(
             print(f'  The answer is {answer}.')
     else:
         display(Gap(guess, outcome))
-        if lesson := progress.this_lesson():
-            progress.add(line_of(lesson, guess, outcome))
+        progress.keep_gap(record_of(guess, outcome))
         classroom.tell_outcome(question, guess.kind.told(_plain(outcome['at'])))
     if because:
         print(f'  {because}')

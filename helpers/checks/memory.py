@@ -20,7 +20,6 @@ from helpers.checks import progress
 from helpers.notebook import wrap
 
 FILE = Path(__file__).with_name('questions.yaml')
-MARK = 'memory'  # begins a line of the progress file; no lesson has a name of one word
 HOW = "Write 'A', 'B' or 'C' in place of the three dots, and run the cell again."
 
 
@@ -110,16 +109,12 @@ def place(lesson: str, step: int) -> str:
 
 
 def missed() -> dict[str, str]:
-    """Return the questions that are still to be answered, and in which lesson each was missed.
-
-    A line is `memory NAME LESSON` after a wrong answer, and `memory NAME` after the right one.
-    """
+    """Return the questions that are still to be answered, and in which lesson each was missed."""
     found: dict[str, str] = {}
-    for line in progress.lines_of(MARK):
-        name, *lesson = line.split()[1:3] or ['']
+    for name, lesson in progress.memories():
         found.pop(name, None)
         if lesson and name in questions():
-            found[name] = lesson[0]
+            found[name] = lesson
     return found
 
 
@@ -143,6 +138,6 @@ def _keep(name: str, right: bool, again: dict[str, str]) -> None:
     """Keep a miss, and forget it after a right answer in another lesson."""
     here = progress.this_lesson()
     if here and not right and again.get(name) != here:
-        progress.add(f'{MARK} {name} {here}')
+        progress.keep_memory(name, here)
     elif here and right and again.get(name, here) != here:
-        progress.add(f'{MARK} {name}')
+        progress.keep_memory(name)

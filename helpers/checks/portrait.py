@@ -1,15 +1,12 @@
 """A map of what a student has done, and a portrait of the intuition: guesses against what came out.
 
-`compare_prediction` keeps a guess in the file of the progress, as a line `gap LESSON {...}`: what
-was asked, what was said, what came out, whether it was right, for a number its axis, and of points
-where they are on their floor.
+`compare_prediction` keeps a guess in the file of the progress: what was asked, what was said, what
+came out, whether it was right, for a number its axis, and of points where they are on their floor.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
@@ -20,19 +17,18 @@ if TYPE_CHECKING:
     from helpers.guesses import Guess
     from helpers.lesson import Lesson
 
-KEPT = 'gap'  # begins the line of a guess that was compared
 ENOUGH = 3  # so many guesses say something, fewer are chance
 LEFT = 'style="text-align:left"'
 WIDE, HIGH, EDGE = 64, 24, 6  # px, of the picture of one guess
 
 
-def line_of(lesson: str, guess: Guess, outcome: Mapping) -> str:
-    """Return the line that keeps a guess of this lesson, and what came out."""
+def record_of(guess: Guess, outcome: Mapping) -> dict:
+    """Return what is kept of a guess, and of what came out."""
     kind, said, was = guess.kind, guess.value, outcome['at']
     shares = [kind.share(said), kind.share(was)] if hasattr(kind, 'share') else None
     if kind.axis is None and shares is None:
         said, was = kind.told(said), kind.told(was)
-    kept = {
+    return {
         'asked': guess.question,
         'said': said,
         'was': was,
@@ -40,7 +36,6 @@ def line_of(lesson: str, guess: Guess, outcome: Mapping) -> str:
         'axis': kind.axis,
         **({'shares': shares} if shares else {}),
     }
-    return f'{KEPT} {lesson} {json.dumps(kept, ensure_ascii=False)}'
 
 
 @dataclass(frozen=True)
@@ -126,20 +121,10 @@ class Map:
         return f'<span role="img" aria-label="{count}">{" ".join(signs)}</span>'
 
 
-def portrait(known: Iterable[Lesson], lines: Iterable[str]) -> Portrait | None:
-    """Return the portrait that lines of the progress make, or None if no guess was compared.
-
-    Of each question the newest guess counts. A line that cannot be read is passed over.
-    """
-    found: dict[str, dict[str, dict]] = {}
-    for line in lines:
-        if line.startswith(f'{KEPT} '):
-            with suppress(ValueError):
-                _, lesson, text = line.split(' ', 2)
-                one = json.loads(text)
-                found.setdefault(lesson, {})[one['asked']] = one
-    known = [lesson for lesson in known if lesson.name in found]
-    guesses = {lesson.name: found[lesson.name].values() for lesson in known}
+def portrait(known: Iterable[Lesson], gaps: Mapping[str, Mapping[str, Mapping]]) -> Portrait | None:
+    """Return the portrait that records make, by lesson and question, or None if there is none."""
+    known = [lesson for lesson in known if lesson.name in gaps]
+    guesses = {lesson.name: gaps[lesson.name].values() for lesson in known}
     return Portrait(known, guesses) if known else None
 
 

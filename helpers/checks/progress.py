@@ -1,13 +1,20 @@
 """The student's own progress: which tasks are solved, kept on this computer only.
 
-`checks.check` records each task that passes, and `show` prints the table. The file has one line for
-each task, such as `lose_messages be_the_queue`: the names of the lesson and of the task, and no
-numbers, which change when a lesson or a task is added before them. Lines of version 0.3 had a
-number, and are read as the task that had it then; a task that has moved to another lesson is read
-as one of that. What `checks.remember` keeps are lines that begin
-with `memory`; `borrowed lose_messages be_the_queue` is a task that a student has gone on without,
-which is not solved by that. Lines that begin with `gap` are those of `checks.portrait`. Lines are
-only ever added, so kernels that write at once lose nothing.
+`checks.check` records each task that passes, and `show` prints the table. This module alone writes
+and reads the file. Each of its lines is of one kind:
+
+    LESSON TASK             a task that is solved: `lose_messages be_the_queue`
+    LESSON TASK WORD        about what it was, each time that it differs: the robot of lesson 19
+    borrowed LESSON TASK    a task that a student has gone on without, which is not solved by that
+    guess LESSON [QUESTION, KIND, VALUE]    in JSON, as it was guessed
+    gap LESSON {...}        in JSON: a guess against what came out, see `portrait.record_of`
+    memory NAME LESSON      a question of `checks.memory` with a wrong answer; without LESSON it was
+                            right after that
+
+Names have no numbers, which change when a lesson or a task is added before them. Lines of version
+0.3 had a number, and are read as the task that had it then; a task or a guess that has moved to
+another lesson is read as one of that. Lines are only ever added, so kernels that write at once lose
+nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +22,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -24,7 +31,7 @@ from IPython.display import display
 from jupyter_core.paths import jupyter_data_dir
 
 from helpers import notebook as text
-from helpers.checks.portrait import KEPT, Map, portrait
+from helpers.checks.portrait import Map, portrait
 from helpers.lesson import (
     FOLDER,
     Lesson,
@@ -35,7 +42,8 @@ from helpers.lesson import (
     paths,
 )
 
-BORROWED = 'borrowed'  # begins the line of a task that a student has gone on without
+# The first words of lines. No lesson has a name of one word.
+BORROWED, GAP, GUESS, MEMORY = 'borrowed', 'gap', 'guess', 'memory'
 IS_GRADED = 'ROS2_NOTEBOOKS_GRADED'  # a variable of the environment: nothing can be borrowed
 FILE_VARIABLE = 'ROS2_NOTEBOOKS_PROGRESS'  # names another file; empty: no progress is kept
 LESSON = re.compile(r'(?:^|/)\d\d_(\w+)\.ipynb$')
@@ -108,6 +116,69 @@ def lines_of(first_word: str) -> list[str]:
     return []
 
 
+def keep_borrowed(lesson: str, task: str) -> None:
+    """Keep that a student has gone on without this task."""
+    add(f'{BORROWED} {lesson} {task}')
+
+
+def keep_guess(question: str, kind: str, value: object) -> None:
+    """Keep what was guessed in the running lesson, for the next kernel."""
+    if lesson := this_lesson():
+        add(f'{GUESS} {lesson} {json.dumps([question, kind, value])}')
+
+
+def kept_guess(question: str, kind: str) -> object:
+    """Return what was guessed last in the running lesson, None for nothing.
+
+    A question that has another kind today, after an update, was not answered.
+    """
+    here, found = this_lesson(), None
+    for line in lines_of(GUESS):
+        with suppress(ValueError, TypeError, IndexError):
+            _, lesson, text = line.split(' ', 2)
+            asked, *rest = json.loads(text)
+            if (
+                asked == question
+                and rest[0] == kind
+                and here in (lesson, _home_of(lesson, question))
+            ):
+                found = rest[1]
+    return found
+
+
+def _home_of(lesson: str, question: str) -> str:
+    return home_of_guess(lesson, question, outlines(folder()))
+
+
+def keep_gap(record: Mapping) -> None:
+    """Keep a guess of the running lesson against what came out."""
+    if lesson := this_lesson():
+        add(f'{GAP} {lesson} {json.dumps(record, ensure_ascii=False)}')
+
+
+def gaps_in(lines: Iterable[str]) -> dict[str, dict[str, dict]]:
+    """Return by lesson and question the newest record of each guess that was compared."""
+    found: dict[str, dict[str, dict]] = {}
+    for line in lines:
+        if line.startswith(f'{GAP} '):
+            with suppress(ValueError, KeyError, TypeError):
+                _, lesson, text = line.split(' ', 2)
+                record = json.loads(text)
+                found.setdefault(lesson, {})[record['asked']] = record
+    return found
+
+
+def keep_memory(question: str, lesson: str = '') -> None:
+    """Keep in which lesson a question was missed, or, without a lesson, that it was right."""
+    add(' '.join(filter(None, (MEMORY, question, lesson))))
+
+
+def memories() -> list[tuple[str, str]]:
+    """Return these questions and lessons, the oldest first."""
+    words = [line.split()[1:3] for line in lines_of(MEMORY)]
+    return [(*found, '')[:2] for found in words if found]
+
+
 def solved_of(lesson: Lesson) -> set[str]:
     """Return the names of the tasks of a lesson that are solved."""
     return _names_of(lesson, f'{lesson.name} ')
@@ -157,7 +228,7 @@ def show() -> None:
             why = f'Your progress is not kept, because {path} cannot be used: {error.strerror}.'
             print(*text.wrap(why), sep='\n')
     solved = {lesson.name: _solved(lesson, lines) for lesson in known}
-    display(Map(known, solved, table(known, lines), portrait(known, lines)))
+    display(Map(known, solved, table(known, lines), portrait(known, gaps_in(lines))))
 
 
 def total() -> str:
@@ -251,8 +322,10 @@ def in_their_lessons(lines: Iterable[str], known: Iterable[Lesson]) -> list[str]
     for line in lines:
         words = line.split(' ', 2)
         with suppress(ValueError, IndexError, KeyError, TypeError):
-            if words[0] == KEPT:
+            if words[0] == GAP:
                 words[1] = home_of_guess(words[1], json.loads(words[2])['asked'], known)
+            elif words[0] == GUESS:
+                words[1] = home_of_guess(words[1], json.loads(words[2])[0], known)
             elif words[0] == BORROWED:
                 words[1] = home_of_task(words[1], words[2], known)
             else:

@@ -238,7 +238,7 @@ class Tasks:
         with capture_output():
             self._run(task, shell.transform_cell(code), BORROWED)
         attempt.stands_in = 'borrowed'
-        progress.add(f'{progress.BORROWED} {self.lesson_name} {task}')
+        progress.keep_borrowed(self.lesson_name, task)
         text = (
             f'Task {judge.number} is borrowed, not solved: what the next steps need is in place. '
             'When you have another idea, run your own cell and its check again.'
