@@ -1,8 +1,9 @@
 // A state of model.js as lists that can be read. A message moves from where it was before.
 
-import { element, isCalm, row } from './element.js';
+import { element, row } from './element.js';
 import { keep } from './keep.js';
 import { model } from './model.js';
+import { isCalm } from './motion.js';
 
 const MOST = 27; // of the messages of a list
 const PLACES = 40; // free ones that are drawn

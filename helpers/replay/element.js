@@ -44,12 +44,6 @@ export function legible(svg, then = () => {}) {
   return svg;
 }
 
-// Whether the reader wants no motion. To ask the page for it would lay it out.
-const calm = matchMedia('(prefers-reduced-motion: reduce)');
-let isStill = calm.matches;
-calm.onchange = () => { isStill = calm.matches; };
-export const isCalm = () => isStill;
-
 // Give what is played a frame, a name and keys. What is typed in it is no command of JupyterLab, but for
 // what leads out of it or runs the cell. `onKey` gets a key and its target, and returns whether it did
 // something.

@@ -30,7 +30,10 @@ def short(css: str) -> str:
 
 @cache
 def source(file: str | Path) -> str:
-    """Return a file without comments, needless spaces, and what makes it a module."""
+    """Return a file without comments, needless spaces, and what makes it a module.
+
+    rjsmin does not know a template inside of another one: it takes blanks out of it.
+    """
     path = HERE / file
     text = path.read_text()
     if path.suffix != '.js':

@@ -1,7 +1,17 @@
 // A floor as picture.py has drawn it, and what moves on it: the one picture of a replay, of the drive that
 // goes on, and of free drive. With a guess of a place comes place.js.
 
-import { element, isCalm, legible, row, shape } from '../replay/element.js';
+import { element, legible, row, shape } from '../replay/element.js';
+import { isCalm } from '../replay/motion.js';
+
+// A ring that grows around a place, to a radius (m).
+function ringAt(metres, x, y, radius, stroke) {
+  if (isCalm()) return;
+  const looks = { fill: 'none', stroke, 'stroke-width': 3, 'vector-effect': 'non-scaling-stroke' };
+  const ring = shape('circle', { class: 'ring', cx: x, cy: y, r: radius, ...looks });
+  metres.append(ring);
+  ring.animate([{ r: 0.3 * radius, opacity: 1 }, { r: radius, opacity: 0.2 }], 400).finished.finally(() => ring.remove());
+}
 
 // Return `draw(ms, plays)`, which puts all to a time of the run, and returns what is seen then, and
 // `flash(x, y, colour)`, which lets a ring grow around a place (m). `run` is what drive.js returns of the
@@ -27,14 +37,7 @@ export function floor(svg, run, record) {
   const front = ({ x, y, yaw }) => [x + r * Math.cos(yaw), y + r * Math.sin(yaw)];
   const cross = ([x, y]) => `M${x.toFixed(3)} ${y.toFixed(3)}m${-arm} ${-arm}l${2 * arm} ${2 * arm}m0 ${-2 * arm}l${-2 * arm} ${2 * arm}`;
 
-  function flash(x, y, stroke) {
-    if (isCalm()) return;
-    const most = 30 / (scale * inPixels.a);
-    const looks = { fill: 'none', stroke, 'stroke-width': 3, 'vector-effect': 'non-scaling-stroke' };
-    const ring = shape('circle', { class: 'ring', cx: x, cy: y, r: most, ...looks });
-    robot.parentNode.append(ring);
-    ring.animate([{ r: 0.3 * most, opacity: 1 }, { r: most, opacity: 0.2 }], 400).finished.finally(() => ring.remove());
-  }
+  const flash = (x, y, stroke) => ringAt(robot.parentNode, x, y, 30 / (scale * inPixels.a), stroke);
 
   // Places to which it has come are filled.
   function fill(place) {

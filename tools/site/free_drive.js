@@ -25,7 +25,8 @@ const bumped = count => (count ? `with ${count} ${count > 1 ? 'bumps' : 'bump'}`
 function said(places, reached, bumps, seconds, best) {
   const left = Object.keys(places).sort().filter(name => !reached.includes(name));
   if (!reached.length) return bumps ? `A bump. Come to ${list(left)}.` : HELLO;
-  if (left.length) return `${list(reached)} ${reached.length > 1 ? 'are' : 'is'} done, ${list(left)} to go${bumps ? `, ${bumped(bumps)}` : ''}.`;
+  const tells = bumps ? ', ' + bumped(bumps) : '';
+  if (left.length) return `${list(reached)} ${reached.length > 1 ? 'are' : 'is'} done, ${list(left)} to go${tells}.`;
   const next = bumps ? 'Now without a bump?' : best < seconds ? `Your best is ${best.toFixed(1)} s.` : 'Your best so far. Faster?';
   return `${list([...reached].sort())} in ${seconds.toFixed(1)} s, ${bumped(bumps)}. ${next}`;
 }
