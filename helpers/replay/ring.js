@@ -1,7 +1,7 @@
 // The boxes and arrows of circle.js, on a ring.
 
 import { placed, sameArrow } from './circle.js';
-import { element, seen, shape } from './element.js';
+import { change, element, seen, shape } from './element.js';
 import { keep } from './keep.js';
 import { model } from './model.js';
 
@@ -40,48 +40,55 @@ function edge({ x, y, w, h }, to, gap) {
   return [x + part * dx, y + part * dy];
 }
 
-function drawArrow({ label, hot }, from, to, isNew) {
+// An arrow without a place yet, and a box. To lay out letters takes time, so each is made once.
+const arrowOf = label => shape('g', {},
+  shape('path', { class: 'ring-line', pathLength: 1 }), shape('path', { class: 'ring-head' }), text(label, 0, 0, 'ring-label'));
+
+const boxOf = (id, { x, y, w, h, words }) => shape('g', {},
+  shape('rect', { x: x - w / 2, y: y - h / 2, width: w, height: h, rx: id.startsWith('run') ? 4 : h / 2 }),
+  ...words.map((line, i) => text(line, x, y + 4 + 16 * (i - (words.length - 1) / 2))));
+
+function putArrow(node, from, to, hot, isNew) {
   const [[x1, y1], [x2, y2]] = [edge(from, to, 2), edge(to, from, 4)];
   const angle = Math.atan2(y2 - y1, x2 - x1);
   const at = (along, aside) => `${(x2 - along * Math.cos(angle) - aside * Math.sin(angle)).toFixed(1)} ${(y2 - along * Math.sin(angle) + aside * Math.cos(angle)).toFixed(1)}`;
   const head = hot ? 13 : 10;
-  return shape('g', { class: `${hot ? 'ring-hot' : 'ring-arrow'}${isNew ? ' ring-new' : ''}` },
-    shape('path', { class: 'ring-line', pathLength: 1, d: `M${x1.toFixed(1)} ${y1.toFixed(1)}L${at(head - 2, 0)}` }),
-    shape('path', { class: 'ring-head', d: `M${at(0, 0)}L${at(head, head / 2)}L${at(head, -head / 2)}z` }),
-    text(label, ((x1 + x2) / 2).toFixed(1), ((y1 + y2) / 2 + 4).toFixed(1), 'ring-label'));
-}
-
-function drawBox(id, { x, y, w, h, words }, hot) {
-  return shape('g', { class: `ring-box ring-${id.split(' ')[0]}${hot ? ' ring-on' : ''}` },
-    shape('rect', { x: x - w / 2, y: y - h / 2, width: w, height: h, rx: id.startsWith('run') ? 4 : h / 2 }),
-    ...words.map((line, i) => text(line, x, y + 4 + 16 * (i - (words.length - 1) / 2))));
+  const [line, point, words] = node.children;
+  change(node, { class: `${hot ? 'ring-hot' : 'ring-arrow'}${isNew ? ' ring-new' : ''}` });
+  change(line, { d: `M${x1.toFixed(1)} ${y1.toFixed(1)}L${at(head - 2, 0)}` });
+  change(point, { d: `M${at(0, 0)}L${at(head, head / 2)}L${at(head, -head / 2)}z` });
+  change(words, { x: ((x1 + x2) / 2).toFixed(1), y: ((y1 + y2) / 2 + 4).toFixed(1) });
 }
 
 // Return the node of the picture, and `draw(now, last)`: what circle.js returns of this state, and of
 // the end. Only the boxes of the circle have a place, or those of a chain that is open.
 export function ring() {
-  const node = element('div', { class: 'ring' });
   const svg = shape('svg', { viewBox: `0 0 ${RING_WIDE} ${RING_HIGH}` });
+  const node = element('div', { class: 'ring', hidden: '' }, svg);
   let known; // the arrows that are drawn already
 
   function draw(now, last = now) {
     const all = placed(last);
-    node.replaceChildren(...(all.length ? [svg] : []));
+    node.hidden = !all.length;
+    if (node.hidden) return;
     const places = placesOf(all);
-    const here = now.boxes.filter(({ id }) => places.has(id));
     const arrows = now.arrows.filter(({ from, to }) => places.has(from) && places.has(to));
-    const isOn = id => arrows.some(one => one.hot && (one.from === id || one.to === id));
     const result = now.stuck.length ? ['Nobody', 'can go on'] : now.isOpen ? ['The circle', 'is open'] : [];
     const middle = all.length === 3 ? 162 : RING_WIDE / 2;
     keep(svg, [
-      ...arrows.map(one => ['arrow', one]),
-      ...here.map(({ id }) => ['box', id, places.get(id), isOn(id)]),
+      ...arrows.map(({ label, from, to }) => ['arrow', label, from, to]),
+      ...all.map(({ id }) => ['box', id, places.get(id)]),
       ...result.map((line, i) => ['result', line, RING_HIGH / 2 + 18 * i - 2]),
-    ], ([kind, ...it]) => {
-      if (kind === 'box') return drawBox(...it);
-      if (kind === 'result') return text(it[0], middle, it[1], 'ring-closed');
-      const [one] = it;
-      return drawArrow(one, places.get(one.from), places.get(one.to), known && !known.has(sameArrow(one)));
+    ], ([kind, what, where]) => {
+      if (kind === 'arrow') return arrowOf(what);
+      return kind === 'box' ? boxOf(what, where) : text(what, middle, where, 'ring-closed');
+    });
+
+    arrows.forEach((one, i) => putArrow(svg.children[i], places.get(one.from), places.get(one.to), one.hot, known && !known.has(sameArrow(one))));
+    all.forEach(({ id }, i) => {
+      const isOn = arrows.some(one => one.hot && (one.from === id || one.to === id));
+      const isHere = now.boxes.some(box => box.id === id);
+      change(svg.children[arrows.length + i], { class: `ring-box ring-${id.split(' ')[0]}${isOn ? ' ring-on' : ''}`, visibility: isHere ? 'visible' : 'hidden' });
     });
     known = new Set(arrows.map(sameArrow));
     const words = [...arrows.map(({ says }) => model.capital(says)), ...(result.length ? [result.join(' ')] : [])].join('. ');
