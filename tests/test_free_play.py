@@ -20,7 +20,7 @@ numbers = st.tuples(
 
 @pytest.fixture(scope='module')
 def script():
-    return Script('walk.js', 'stories.js', 'free.js', glue=GLUE)
+    return Script('stories.js', 'predicted.js', glue=GLUE)
 
 
 @tries(260)

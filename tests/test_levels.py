@@ -15,7 +15,7 @@ function least(level, chosen) {
   const allowed = state => it.choices(state).map(({ move }) => move)
     .filter(move => !it.refusal(state, move));
   const after = state => (chosen ? allowed(state).map(move => it.choose(state, move))
-    : model.moves(setup, state).map(move => model.apply(setup, state, move)));
+    : rules.moves(setup, state).map(move => rules.apply(setup, state, move)));
   function visit(state) {
     const key = JSON.stringify(state);
     if (seen.has(key)) return;
@@ -32,8 +32,8 @@ function least(level, chosen) {
 function eager(level) {
   const { start, score } = game(level);
   let state = start();
-  for (let move; (move = model.eager(level.setup, state)); )
-    state = model.apply(level.setup, state, move).state;
+  for (let move; (move = rules.eager(level.setup, state)); )
+    state = rules.apply(level.setup, state, move).state;
   return score(state);
 }
 """

@@ -18,6 +18,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu, LaserScan
 
 from helpers import robot_view
+from helpers.replay import source
 from helpers.robot import CORRIDOR, EMPTY, ROOMS, DriveRecord, Pose, Robot
 from helpers.robot.body import Body
 from helpers.robot.record import Command, Event, Scan, Step
@@ -45,7 +46,7 @@ def record_of(shown, index=0):
 def script():
     """Return a function that looks at a drive as the page does, at these milliseconds."""
     context = quickjs.Context()
-    context.eval(Path(robot_view.__file__).with_name('drive.js').read_text())
+    context.eval(source(Path(robot_view.__file__).with_name('drive.js')))
     context.eval("""function looked(record, times) {
         const run = drive(record);
         return { seen: times.map(run.look), told: run.told, times: run.times,

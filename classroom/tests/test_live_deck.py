@@ -47,6 +47,15 @@ PRINTS = """import time
 for number in range(60):
     print(number)
     time.sleep(0.05)"""
+# Which cell of a task is on the stage, whether its output is seen, and how much of the slide is
+# not.
+STAGE = f"""() => {{
+    const {{ widgets, outerNode }} = {PANEL}.content;
+    const stage = widgets.findIndex(cell => cell.node.matches('.deck-on.deck-stage'));
+    const output = widgets[stage]?.node.querySelector('.jp-OutputArea-output');
+    const below = outerNode.scrollHeight - outerNode.clientHeight;
+    return [stage, !output || output.checkVisibility(), below];
+}}"""
 CODE_OF_SLIDE = f"""() => {PANEL}.content.widgets.flatMap((cell, index) =>
     (cell.node.classList.contains('deck-on') && cell.model.type === 'code' ? [index] : []))"""
 BLACK = 'body.deck-black'
@@ -435,6 +444,51 @@ def test_the_end_of_an_output_is_seen(deck):
     deck.run_here()
     assert deck.active() == code
     assert deck.page.evaluate(END_IN_SIGHT)
+
+
+def test_a_task_is_one_thing_at_a_time(deck):
+    """Starter, check and solution run one after the other, and nothing scrolls away."""
+    deck.present(LESSON)
+    deck.command('notebook:clear-all-cell-outputs')
+    starter, check, solution = (deck.find(tag=tag) for tag in ('exercise', 'check', 'solution'))
+    while deck.active() != starter:
+        deck.page.keyboard.press('Space')
+    for key in 'aa':
+        deck.page.keyboard.press(key)
+    deck.page.locator('#deck-says', has_text='have run').wait_for()
+    seen = []
+    for cell in (starter, check, solution):
+        deck.page.keyboard.press('Shift+Enter')
+        deck.wait_until_ran(cell)
+        seen += [(cell, size, deck.page.evaluate(STAGE)) for size in sizes(deck)]
+    for cell in (check, starter):
+        deck.page.keyboard.press('ArrowUp')
+        seen += [(cell, size, deck.page.evaluate(STAGE)) for size in sizes(deck)]
+    deck.screenshot('task')
+    # Each is on the stage with its output, and all of the slide is seen.
+    assert [stage for *_, stage in seen] == [[cell, True, 0] for cell, *_ in seen]
+
+
+def sizes(deck):
+    """Yield the sizes of a projector and of an old one, each while the deck has it."""
+    for width, height in ((1920, 1080), (1024, 768)):
+        deck.page.set_viewport_size({'width': width, 'height': height})
+        deck.page.wait_for_timeout(300)  # the letters follow the size
+        yield width, height
+
+
+def test_no_key_stops_at_notes_that_nobody_sees(deck):
+    deck.present(LESSON)
+    deck.page.keyboard.press('ArrowRight')
+    code = deck.active()
+    assert deck.cells()[code - 1]['cell_type'] == 'raw'
+    deck.page.keyboard.press('Enter')
+    deck.page.keyboard.press('Control+Home')
+    deck.page.keyboard.press('ArrowUp')
+    assert deck.page.evaluate(f"() => {PANEL}.content.activeCell.node.matches('.deck-on')")
+    deck.page.keyboard.press('Escape')
+    deck.page.keyboard.press('ArrowDown')
+    assert deck.active() == code
 
 
 def test_a_dialog_becomes_a_line(deck):

@@ -40,7 +40,7 @@ def replay_calls(recording: CallbackRecording, threads: int = 1) -> Replay:
         for name, thing in recording.watched.items()
     ]
     run = run_of(recording, threads, callbacks, _moves(recording), TIME_LABEL)
-    stuck = javascript('stuck', run.record())
+    stuck = javascript('circleAtEnd', run.record())
     summary = f'{count_of(threads)} {stuck or "Nobody waits for ever."}'
     return Replay((replace(run, summary=summary, after_s=HANGS_S if stuck else 0.0),))
 

@@ -1,10 +1,13 @@
 // Who holds what, and who waits for what, as boxes and arrows. If they close to a circle, and nobody
 // can open it, the runs on it can never go on. ring.js draws it.
 
+import { model } from './model.js';
+import { walk } from './walk.js';
+
 // Return {stuck, boxes, arrows, says}: the ids of the runs that can never go on; {id, name}; {from,
 // to, label, says, hot}, where `hot` is on the circle; and the circle as one sentence, '' if there is
 // none. An arrow goes from who waits, and from what is held to who holds it: so a circle turns.
-function circleOf(setup, state) {
+export function circleOf(setup, state) {
   const runs = model.going(state);
   const free = new Set();
   const can = run => !run || free.has(run.id);
@@ -99,11 +102,17 @@ function circleOf(setup, state) {
   };
 }
 
+// Return the sentence of the circle in which a run ends, '' if there is none.
+export function circleAtEnd(record) {
+  const { state } = walk(record).seek(record.moves.length);
+  return circleOf(record.setup, state).says;
+}
+
 // An arrow is the same in two states if it leads from and to the same.
-const sameArrow = ({ from, to }) => `${from} > ${to}`;
+export const sameArrow = ({ from, to }) => `${from} > ${to}`;
 
 // The boxes of a circle, in the order in which its arrows turn; of a chain that is open, all of them.
-function placed({ stuck, boxes, arrows, isOpen }) {
+export function placed({ stuck, boxes, arrows, isOpen }) {
   if (isOpen) return boxes;
   const found = new Set();
   const follow = id => {
@@ -117,7 +126,7 @@ function placed({ stuck, boxes, arrows, isOpen }) {
 
 // Return a circle that did not close: of a run that waits and will go on, what it holds, its answer,
 // and what the answer needs, which is free. undefined if nobody waits.
-function openOf(setup, state) {
+export function openOf(setup, state) {
   const run = model.going(state).find(({ waits }) => waits);
   if (!run) return undefined;
   const { client, call: service } = model.step(setup, run);
@@ -142,11 +151,10 @@ function openOf(setup, state) {
   };
 }
 
-// Give a run that can never go on its circle. Its arrows come one at a time, each with a step of its
+// Give a run that asks, and can never go on, its circle. Its arrows come one at a time, each with a step of its
 // own. `circle(step)` is what circleOf returns then, and `end` that of the last step. `says` has the
 // sentences that are not those of the run, `almost` is the step before the circle closes.
-function close(run, { setup }) {
-  if (!setup?.callbacks.some(({ does = [] }) => does.some(step => 'client' in step))) return run;
+export function close(run, { setup }) {
   const at = move => circleOf(setup, run.seek(move).state);
   const end = at(run.times.length);
   if (!end.stuck.length) return run;

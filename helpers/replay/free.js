@@ -1,32 +1,51 @@
-// Free play: numbers of a run on sliders, and its prediction, drawn again at each change. The rules
-// are those of model.js, played by an executor that never rests.
+// Free play as a page shows it: a slider for each number, and the picture of what is predicted.
 
-const MESSAGES = 41;
+import { element, seen, wake } from './element.js';
+import { pictures } from './picture.js';
+import { MESSAGES, predicted, told } from './predicted.js';
+import { stories } from './stories.js';
 
-// Return a record of what becomes of each message. Times are whole hundredths of a second here:
-// sums of 0.05 and of 0.2 would not meet.
-function predicted({ period, callback, depth, threads, exclusive }) {
-  const hundredths = seconds => Math.round(100 * seconds);
-  const setup = {
-    threads: Array.from({ length: threads }, (_, i) => `thread ${i + 1}`),
-    groups: [{ name: 'group', exclusive }],
-    callbacks: [{ name: 'topic', group: 0, depth, does: [{ work: hundredths(callback) }] }],
-    arrivals: Array.from({ length: MESSAGES }, (_, seq) => ({
-      at: seq * hundredths(period), callback: 0, seq,
-    })),
-  };
-  const moves = [];
-  const state = model.start(setup);
-  for (let move = model.eager(setup, state); move; move = model.eager(setup, state)) {
-    model.advance(setup, state, move);
-    moves.push([1e4 * state.now, DOES.indexOf(move.do), 0, move.do === 'arrive' ? move.seq : move.thread]);
+const NAMES = {
+  period: ['period (s)', 0.01, 0.5, 0.01],
+  callback: ['callback (s)', 0.01, 1, 0.01],
+  depth: ['depth', 1, 41, 1],
+  threads: ['threads', 1, 10, 1],
+};
+
+const WORDS = 'A row for each message: a thin line while it waits, a bar while its callback runs, a cross '
+  + 'where it is pushed out.';
+
+function show(root, values) {
+  const says = element('p', { 'aria-live': 'polite', class: 'replay-says' });
+  const drawn = element('div', { class: 'replay-picture' });
+  const group = element('select', { onchange: draw },
+    ...['mutually exclusive', 'reentrant'].map(name => element('option', {}, name)));
+  const sliders = Object.entries(NAMES).map(([name, [label, min, max, step]]) => {
+    const number = element('output');
+    const input = element('input', { type: 'range', min, max, step, value: values[name], oninput: draw });
+    return { name, input, number, node: element('label', {}, `${label} `, input, number) };
+  });
+
+  function draw() {
+    const now = { exclusive: group.selectedIndex === 0 };
+    for (const { name, input, number } of sliders) {
+      now[name] = +input.value;
+      number.textContent = input.value;
+    }
+    const run = { ...predicted(now), time: 'time (s)' };
+    says.textContent = told(stories(run, MESSAGES));
+    [drawn.innerHTML] = pictures([run], [0, run.moves.at(-1)[0] / 1e6], 0);
+    seen(drawn.firstChild, WORDS);
   }
-  const { threads: names, groups, callbacks: [{ name, group }] } = setup;
-  return { setup: { threads: names, groups, callbacks: [{ name, group, depth }] }, moves };
+
+  wake(root, 'free play');
+  root.removeAttribute('tabindex');
+  root.querySelector('.replay-static').replaceWith(
+    element('div', { class: 'replay-controls' }, ...sliders.map(({ node }) => node),
+      element('label', {}, 'group ', group)),
+    says, drawn);
+  draw();
 }
 
-function told(messages) {
-  const heard = messages.filter(({ by }) => by === undefined);
-  const oldest = Math.max(...heard.map(({ arrived, left }) => left - arrived));
-  return `${heard.length} of ${MESSAGES} messages are received. The oldest waits ${oldest.toFixed(2)} s.`;
-}
+const root = document.currentScript.closest('.replay');
+show(root, JSON.parse(root.dataset.free));

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from helpers.replay.script import DRAWN, played
+from helpers.replay.script import played
 
-SCRIPT = *DRAWN, 'free.js', 'element.js', 'sliders.js'
 SAYS = (
     'Free play: the period, the callback, the depth, the threads and the group on sliders. The '
     'prediction for 41 messages is drawn again at each change.'
@@ -26,5 +25,5 @@ class FreePlay:
         return SAYS
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
-        html = played('free', vars(self), SAYS, *SCRIPT)
+        html = played('free', vars(self), SAYS)
         return {'text/plain': SAYS, 'text/html': html}

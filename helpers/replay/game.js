@@ -1,12 +1,13 @@
 // The learner is the executor. What is allowed is decided in model.js; here is what may be tried,
 // when a game is over, and how well it went. No page here.
 
-const model = refereed(queueModel());
+import { model } from './model.js';
+import { rules } from './rules.js';
 
 // A game of one setup. `goal` is 'keep' (lose no message), 'lose' (let the number count be too
 // small), 'answer' (let all callbacks end) or 'stop' (keep the number places small). A state is one
 // of model.js. `begun`, moves, are done before the learner's first.
-function game({ setup, goal, begun = [] }) {
+export function game({ setup, goal, begun = [] }) {
   const { callbacks, arrivals = [] } = setup;
   const stepOf = run => (callbacks[run.callback].does ?? [{ work: undefined }])[run.step];
   const canStep = run => run && !run.waits && run.until === undefined;
@@ -30,7 +31,7 @@ function game({ setup, goal, begun = [] }) {
 
   // What may be tried now, [{move, text}]. What the rules forbid is among it, to be refused.
   function choices(state) {
-    const [first] = model.due(setup, state);
+    const [first] = rules.due(setup, state);
     const found = first ? [{ move: first, text: 'Wait' }] : [];
     state.runs.forEach((run, thread) => {
       if (!canStep(run)) return;
@@ -45,11 +46,11 @@ function game({ setup, goal, begun = [] }) {
     return found;
   }
 
-  const refusal = (state, move) => model.refusal(setup, state, move);
+  const refusal = (state, move) => rules.refusal(setup, state, move);
 
   // What happens without a choice: what is due now, and the end of what has no more to do.
   function automatic(state) {
-    const [first] = model.due(setup, state);
+    const [first] = rules.due(setup, state);
     if (first && first.at <= state.now) return first;
     const thread = state.runs.findIndex(run => canStep(run) && !stepOf(run));
     return thread < 0 ? undefined : { do: 'end', thread };
@@ -60,24 +61,24 @@ function game({ setup, goal, begun = [] }) {
   function settle(state) {
     const said = [];
     let next = automatic(state);
-    for (; next; next = automatic(state)) said.push(model.advance(setup, state, next));
+    for (; next; next = automatic(state)) said.push(rules.advance(setup, state, next));
     if (goal !== 'keep' || state.arrived < arrivals.length) return said;
-    next = model.eager(setup, state);
+    next = rules.eager(setup, state);
     if (next) said.push('No more come. What still waits is done, one after the other.');
-    for (; next; next = model.eager(setup, state)) model.advance(setup, state, next);
+    for (; next; next = rules.eager(setup, state)) rules.advance(setup, state, next);
     return said;
   }
 
   function start() {
     const state = model.start(setup);
     settle(state);
-    begun.forEach(move => model.advance(setup, state, move));
+    begun.forEach(move => rules.advance(setup, state, move));
     return state;
   }
 
   // Do what was chosen: a new state, and what happened. The state that came in stays as it was.
   function choose(state, move) {
-    const { state: after, says } = model.apply(setup, state, move);
+    const { state: after, says } = rules.apply(setup, state, move);
     return { state: after, says: [says, ...settle(after)].join(' ') };
   }
 

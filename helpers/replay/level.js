@@ -1,6 +1,12 @@
 // A level as a page shows it: lists that can be read, buttons, keys. What may be tried is decided in
 // game.js, and a state is drawn by board.js. Nothing is global: a page may have many levels.
 
+import { board } from './board.js';
+import { circleOf, openOf } from './circle.js';
+import { element, row, wake } from './element.js';
+import { game } from './game.js';
+import { ring } from './ring.js';
+
 // A level is {goal, options: [{name, values}], variants: [{setup, begun, code, lesson, best,
 // rclpy}]}: one variant for each combination of the options, the last option changing first.
 function show(root, level) {
@@ -46,6 +52,7 @@ function show(root, level) {
         element('span', { 'aria-hidden': 'true', class: 'level-key' }, `${place + 1}`), text))));
     ready.classList.toggle('level-over', over);
     if (over) tell(result());
+    lists.look()();
     if (index >= 0) (buttons()[index] ?? buttons()[0] ?? again).focus();
   }
 
@@ -107,22 +114,15 @@ function show(root, level) {
     root.parentElement.closest('[tabindex]')?.focus();
   }
 
-  function onKey(event) {
-    const { key, target } = event;
-    if (event.ctrlKey || event.metaKey || event.altKey || key === 'Tab') return;
-    // A clicker walks on; what else is typed here is no command of JupyterLab.
-    if (key.startsWith('Page')) return;
-    event.stopPropagation();
-    if (target.tagName === 'SELECT' && key !== 'Escape') return;
-    const chosen = buttons()[+key - 1];
-    if (!chosen && key !== 'Escape') return;
-    event.preventDefault();
+  function onKey(key, target) {
+    const chosen = target.tagName !== 'SELECT' && buttons()[+key - 1];
     if (chosen) chosen.click();
-    else leave();
+    else if (key === 'Escape') leave();
+    else return false;
+    return true;
   }
 
-  wake(root, 'level');
-  root.addEventListener('keydown', onKey);
+  wake(root, 'level', onKey);
   root.querySelector('.replay-static').replaceWith(
     element('div', { class: 'replay-controls' }, ...level.options.map(
       ({ name }, i) => element('label', {}, `${name} `, selects[i]))),

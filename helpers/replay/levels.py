@@ -18,8 +18,6 @@ from itertools import product
 from helpers.notebook import shown
 from helpers.replay.script import played
 
-SCRIPT = 'model.js', 'rules.js', 'game.js', 'circle.js', 'ring.js', 'element.js', 'board.js'
-SCRIPT += ('level.js',)
 ONE = 'SingleThreadedExecutor()'
 
 
@@ -65,7 +63,7 @@ class Level:
             'options': [{'name': name, 'values': of} for name, of in self.options.items()],
             'variants': [vars(variant) for variant in self.variants().values()],
         }
-        return played('level', record, self.task, *SCRIPT)
+        return played('level', record, self.task, 'ring.css')
 
     def _repr_mimebundle_(self, include=None, exclude=None) -> dict[str, str]:
         return {'text/plain': str(self), 'text/html': self.html()}

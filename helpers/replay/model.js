@@ -25,6 +25,8 @@
 //   {do: 'go', thread}              the callback on the thread does its next step
 //   {do: 'end', thread}             the callback ends, and an answer goes to the client
 
+export const model = queueModel();
+
 function queueModel() {
   const WORDS = ['No', 'One', 'Two', 'Three', 'Four', 'Five', 'Six', 'Seven', 'Eight', 'Nine', 'Ten'];
   const count = n => WORDS[n] ?? `${n}`;

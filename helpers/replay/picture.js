@@ -1,6 +1,9 @@
 // A run as one picture: a row for each message, and why it waited. It is SVG as text: Python draws it
 // for pages without scripts, free play in the page. Its ink is currentColor.
 
+import { stories } from './stories.js';
+import { walk } from './walk.js';
+
 const ROWS = 120; // at most
 const [RIGHT, LINE, LETTER] = [14, 20, 7.6]; // pixels; letters are about so wide
 const WIDTH = 370; // so letters have 12 pixels on a phone, too
@@ -26,7 +29,7 @@ function lastLoss(run) {
 
 // Return the picture of each run, of the same span of seconds, all on one scale. The cursor stands at
 // a time, else at the last loss, else at the end.
-function pictures(runs, span, at) {
+export function pictures(runs, span, at) {
   const losses = runs.map(lastLoss).filter(loss => loss !== undefined);
   const cursor = at ?? (losses.length ? Math.max(...losses) : span[1]);
   const seen = runs.map(run => {
@@ -51,10 +54,12 @@ function picture({ messages, names, time }, [from, until], rows, left, cursor, l
   const wide = WIDTH - left - RIGHT;
   const x = at => +(left + wide * (Math.max(at, from) - from) / (until - from)).toFixed(1);
   const y = row => +(step * (row + 0.5)).toFixed(1);
-  const path = (d, colour, width, dashes = '') =>
-    `<path d="${d}" stroke="${colour}" stroke-width="${width}" stroke-dasharray="${dashes}"/>`;
-  const text = (words, at, down, anchor = 'start') =>
-    `<text x="${at}" y="${down}" text-anchor="${anchor}">${words}</text>`;
+  const path = (d, colour, width, dashes) => {
+    const dashed = dashes ? ` stroke-dasharray="${dashes}"` : '';
+    return `<path d="${d}" stroke="${colour}" stroke-width="${width}"${dashed}/>`;
+  };
+  const text = (words, at, down) => `<text x="${at}" y="${down}">${words}</text>`;
+  const anchored = (anchor, texts) => `<g text-anchor="${anchor}">${texts}</g>`;
 
   const found = { waits: {}, runs: {} };
   const row = new Map(messages.map(({ callback, seq }, index) => [`${callback} ${seq}`, index]));
@@ -100,14 +105,16 @@ function picture({ messages, names, time }, [from, until], rows, left, cursor, l
   const rough = (until - from) / 5;
   const power = 10 ** Math.floor(Math.log10(rough));
   const tick = power * [1, 2, 5, 10].find(n => n * power >= rough);
-  let axes = path(`M${left} ${bottom}h${wide}`, 'currentColor', 1);
+  let line = `M${left} ${bottom}h${wide}`;
+  let below = text(isShort ? time.replace('(s)', '(ms)') : time, left + wide / 2, bottom + 40);
   for (let n = Math.ceil(from / tick); n * tick <= until; n += 1) {
-    axes += path(`M${x(n * tick)} ${bottom}v5`, 'currentColor', 1)
-      + text(+((isShort ? 1000 : 1) * n * tick).toPrecision(6), x(n * tick), bottom + 20, 'middle');
+    line += `M${x(n * tick)} ${bottom}v5`;
+    below += text(+((isShort ? 1000 : 1) * n * tick).toPrecision(6), x(n * tick), bottom + 20);
   }
   const every = [1, 2, 5, 10].find(n => n * step >= 14);
-  for (let i = 0; i < names.length; i += every) axes += text(names[i], left - 6, y(i) + 5, 'end');
-  axes += text(isShort ? time.replace('(s)', '(ms)') : time, left + wide / 2, bottom + 40, 'middle');
+  let beside = '';
+  for (let i = 0; i < names.length; i += every) beside += text(names[i], left - 6, y(i) + 5);
+  let axes = path(line, 'currentColor', 1) + anchored('middle', below) + anchored('end', beside);
   axes += `<path class="cursor" d="M${left} 0V${bottom}" transform="translate(${+(x(Math.min(cursor, until)) - left).toFixed(1)})" stroke="currentColor" stroke-width="1.5"/>`;
   const places = messages.map(({ callback, seq }) => [callback, seq].join(' '));
   const [top, height] = [down + 12, down + bottom + 60];

@@ -48,9 +48,8 @@ class Run:
 
     @property
     def scripts(self) -> tuple[str, ...]:
-        """The files that step through it."""
-        circle = ('circle.js', 'ring.js') if self.asks else ()
-        return ('model.js', 'walk.js', 'board.js', *circle)
+        """The files that view.js needs for it."""
+        return ('walk.js', 'board.js', *(['ring.js'] if self.asks else []))
 
     @property
     def styles(self) -> tuple[str, ...]:
@@ -106,14 +105,14 @@ class Replay:
         )
         # Each file once, those of the queues first.
         ordered = sorted(self.runs, key=lambda run: not run.setup)
-        scripts = dict.fromkeys(file for run in ordered for file in run.scripts)
+        scripts = [file for run in ordered for file in run.scripts]
         styles = dict.fromkeys(file for run in ordered for file in run.styles)
         opens = {'opens': 'end'} if any(run.opens == 'end' for run in self.runs) else {}
         record = {'span': span_s, **opens, 'runs': [run.record() for run in self.runs]}
         html = (
             f'<div class="replay" data-record={attribute(record)}>'
             f'{style(*styles)}<p>{escape(str(self))}</p>{figures}'
-            f'<script>{script(*scripts, "element.js", "view.js")}</script></div>'
+            f'<script>{script(*scripts, "view.js")}</script></div>'
         )
         return {'text/plain': str(self), 'text/html': html}
 

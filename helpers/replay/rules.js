@@ -1,9 +1,9 @@
 // What may happen next, in a state of model.js. The page of a replay goes without: what happened is
 // known, and Python has tried each move of it.
 
-// Return the model with a referee: `due`, `refusal`, `moves`, `eager` and `apply` are new, and `advance`
-// refuses what the rules forbid.
-function refereed(model) {
+import { model } from './model.js';
+
+export const rules = (() => {
   const { named, capital, step, stepsOf, holder, groupOf, runOf } = model;
 
   // What the clock brings next, if a schedule or a work with a number says so.
@@ -79,6 +79,7 @@ function refereed(model) {
     return `the end of ${named(setup, state.runs[move.thread])}`;
   }
 
+  // As that of the model, but what the rules forbid is an error.
   function advance(setup, state, move) {
     const refused = refusal(setup, state, move);
     if (refused) throw new Error(refused);
@@ -102,5 +103,5 @@ function refereed(model) {
   const isSame = (one, other) =>
     other && one.do === other.do && one.thread === other.thread && one.seq === other.seq;
 
-  return { ...model, due, refusal, moves, advance, apply, eager };
-}
+  return { due, refusal, moves, advance, apply, eager };
+})();

@@ -1,11 +1,15 @@
 // What became of each message of a run, for its picture.
 
+import { model } from './model.js';
+import { rules } from './rules.js';
+import { walk } from './walk.js';
+
 // Return of the first `most` messages, in the order of their arrival: {callback, seq, arrived, waits,
 // left, by, runs, ended}. `waits` and `runs` are pairs of a time and the cause that holds from then
 // on; `by` is the message that pushed it out.
-function stories(record, most) {
+export function stories(record, most) {
   const { setup, moves } = record;
-  const { seek } = walk(record);
+  const { seek } = walk(record, rules.advance);
   const found = new Map();
   const of = ({ callback, seq }) => found.get(`${callback} ${seq}`);
   const because = (phases, at, cause) => {
@@ -48,10 +52,4 @@ function stories(record, most) {
     run(state);
   }
   return [...found.values()];
-}
-
-// Return the sentence of the circle in which the run ends, '' if there is none.
-function stuck(record) {
-  const { state } = walk(record).seek(record.moves.length);
-  return circleOf(record.setup, state).says;
 }

@@ -1,18 +1,20 @@
 // A run that was recorded or predicted, put to any of its steps. No page here.
 
-const DOES = ['arrive', 'take', 'end', 'go'];
-const model = typeof refereed === 'undefined' ? queueModel() : refereed(queueModel());
+import { model } from './model.js';
+
+export const DOES = ['arrive', 'take', 'end', 'go'];
 
 // A record is {setup, moves}: the setup of model.js, and moves in short, [microseconds, which of
-// DOES, callback, and the number of what arrives, else of the thread].
-function walk({ setup, moves }) {
+// DOES, callback, and the number of what arrives, else of the thread]. `does` does a move: that of
+// rules.js refuses what cannot have happened.
+export function walk({ setup, moves }, does = model.advance) {
   let state = model.start(setup);
   let at = 0; // moves that are done
   let says = '';
 
   function advance(state, [us, kind, callback, number]) {
     const [made, which] = [DOES[kind], kind ? 'thread' : 'seq'];
-    return model.advance(setup, state, { do: made, at: us / 1e6, callback, [which]: number });
+    return does(setup, state, { do: made, at: us / 1e6, callback, [which]: number });
   }
 
   // Return the state after `to` moves, and the sentence of the last one. The next call changes the

@@ -1,18 +1,25 @@
-// A drive while it happens: the floor of drive.js and the queue of board.js, as live.py tells of them
+// A drive while it happens: the floor of floor.js and the queue of board.js, as live.py tells of them
 // by the event 'drive'. Between two tellings the robot goes on, a little later than it does.
+
+import { board } from '../replay/board.js';
+import { clock } from '../replay/clock.js';
+import { controls } from '../replay/controls.js';
+import { drawing, element, row } from '../replay/element.js';
+import { drive } from './drive.js';
+import { drivePanel } from './floor.js';
+
 const LATE_MS = [150, 300]; // later than this it hurries, and more it never is
 
 function live(root, record) {
-  const { poses, depth } = record;
+  const { depth } = record;
   const run = drive(record, root);
-  const shown = floor(run, record, drawing(root.querySelector('img')));
+  const shown = drivePanel(run, record, drawing(root.querySelector('img')));
   const says = element('p', { class: 'replay-says' });
   const time = element('span', { class: 'replay-time' });
   const lost = element('span', { class: 'replay-count' });
   const setup = { callbacks: [{ name: 'callback', depth }], threads: ['thread 1'], groups: [] };
   const queue = depth && board(setup, ['threads', 'queue']);
-  const off = (name, kind) => element('button', { type: 'button', disabled: '', class: kind }, name);
-  let [ms, heard, before] = [0, 0, undefined];
+  let [ms, heard] = [0, 0];
 
   // Rows come again and again: a telling may be lost.
   function put(rows) {
@@ -20,7 +27,7 @@ function live(root, record) {
       while (record[name].length < from) record[name].push(record[name].at(-1) ?? added[0]);
       record[name].splice(from, record[name].length, ...added);
     }
-    run.points.push(...poses.slice(run.points.length).map(run.point));
+    run.grow();
   }
 
   function hear({ detail }) {
@@ -34,29 +41,29 @@ function live(root, record) {
     setup.threads = detail.busy.map((_, i) => `thread ${i + 1}`);
     const item = seq => ({ callback: 0, seq });
     queue.draw({ runs: detail.busy.map(seq => (seq === null ? undefined : item(seq))), queues: [detail.waits.map(item)], lost: [], values: {} });
+    queue.look()();
     lost.textContent = `${detail.lost} lost`;
   }
 
-  function frame(now) {
-    if (!root.isConnected) return;
-    const hurry = heard - ms > LATE_MS[0] ? 1.25 : 1;
-    ms = Math.min(Math.max(ms + hurry * (now - (before ?? now)), heard - LATE_MS[1]), heard);
-    before = now;
-    shown.draw(0, 1000 * ms, true);
-    time.textContent = `${(ms / 1000).toFixed(3)} s`;
-    requestAnimationFrame(frame);
-  }
+  // The row of a replay, of which nothing can be used yet.
+  const { node: above, put: slide, name } = controls(0, 1, {});
+  above.ariaHidden = 'true';
+  slide(1);
+  name('● Live');
+  for (const one of above.children) one.disabled = true;
 
   const beside = queue && element('div', { class: 'replay-run' }, row('time', time), queue.rows[0], row('', lost), queue.rows[1]);
   root.querySelectorAll('figure').forEach(figure => figure.remove());
-  root.querySelector('p').before(
-    element('div', { class: 'replay-controls', 'aria-hidden': 'true' }, off('‹'), off('›'), off('● Live', 'replay-play'), off('1×', 'replay-rate'),
-      element('input', { type: 'range', disabled: '', min: 0, max: 1, value: 1 })),
-    says, element('div', { class: 'replay-runs' }, shown.node, ...(queue ? [beside] : [])));
+  root.querySelector('p').before(above, says, element('div', { class: 'replay-runs' }, shown.node, ...(queue ? [beside] : [])));
   root.classList.add('replay-on');
   document.addEventListener('drive', hear);
   put({});
-  requestAnimationFrame(frame);
+  clock(root, passed => {
+    const hurry = heard - ms > LATE_MS[0] ? 1.25 : 1;
+    ms = Math.min(Math.max(ms + hurry * passed, heard - LATE_MS[1]), heard);
+    shown.pass(1000 * ms);
+    time.textContent = `${(ms / 1000).toFixed(3)} s`;
+  }).start();
 }
 
 const root = document.currentScript.closest('.replay');

@@ -136,12 +136,11 @@ class LiveView:
             **({'guess': self._guess.record()} if self._guess else {}),
         }
         guessed = (*self._guess.kind.scripts, MEMORY) if self._guess else ()
-        files = (*guessed, 'element.js', 'board.js', HERE / 'drive.js', HERE / 'live.js')
         return (
             f'<div class="replay robot-live" data-live={attribute(record)}>'
             f'{style(DRIVE_CSS, CSS)}{picture_of(svg, floor_in_words(floor))}'
             f'<p>A drive on the floor {escape(floor.name)}.</p>'
-            f'<script>{script(*files)}</script></div>'
+            f'<script>{script(*guessed, HERE / "live.js")}</script></div>'
         )
 
     def telling(self) -> str:

@@ -53,10 +53,10 @@ class Drive:
 
     @property
     def scripts(self) -> tuple[Path, ...]:
-        """The files that step through it."""
+        """The files that view.js needs for it."""
         guessed = (*self.guess.kind.scripts, MEMORY) if self.guess else ()
         beside = (HERE / 'timeline.js',) if self.recording and self.as_lane else ()
-        return (*guessed, HERE / 'drive.js', *beside)
+        return (*guessed, HERE / 'drive.js', HERE / 'floor.js', *beside)
 
     @property
     def styles(self) -> tuple[Path, ...]:

@@ -1,18 +1,22 @@
 // The time axis below a lane: when each message was published, which one had a callback, and when one
 // was pushed out. A line leads from the callback of now to the moment at which its message was made.
-// What it has in its dataset is what view.js wants of a picture of a run.
-function timeline({ setup: { callbacks: [{ depth }] }, moves }, [from, until]) {
+// Its dataset is what axis.js wants of a picture of a run.
+
+import { seen, shape } from '../replay/element.js';
+import { DOES } from '../replay/walk.js';
+
+// Return its `svg`, and `now(us)`, which leads the line.
+export function timeline({ setup: { callbacks: [{ depth }] }, moves }, [from, until]) {
   const [LEFT, RIGHT, ROW] = [92, 20, 28];
   const WIDTH = matchMedia('(max-width: 600px)').matches ? 420 : 720; // narrower there, not smaller
   const wide = WIDTH - LEFT - RIGHT;
   const x = us => +(LEFT + wide * (us / 1e6 - from) / (until - from)).toFixed(1);
   const y = row => 6 + ROW * (row + 0.5);
   const bottom = 12 + 3 * ROW;
-  const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
+  const looks = { class: 'timeline', viewBox: `0 0 ${WIDTH} ${bottom + 32}`, 'font-size': 16, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' };
+  const svg = seen(shape('svg', looks), 'A time axis: when each message was published, which one had a callback, and when one was lost.');
   const add = (name, attributes, text = '') => {
-    const made = document.createElementNS(svg.namespaceURI, name);
-    Object.entries(attributes).forEach(([key, one]) => made.setAttribute(key, one));
-    made.textContent = text;
+    const made = shape(name, attributes, text);
     svg.append(made);
     return made;
   };
@@ -44,12 +48,9 @@ function timeline({ setup: { callbacks: [{ depth }] }, moves }, [from, until]) {
   const link = add('path', { class: 'link', d: '', stroke: 'currentColor', 'stroke-width': 3, fill: 'none' });
   add('path', { class: 'cursor', d: `M${LEFT} 0V${bottom}`, stroke: 'currentColor', 'stroke-width': 1.5 });
 
-  svg.now = us => {
+  Object.assign(svg.dataset, { wide, left: LEFT, row: ROW, top: 6, rows: ',,' });
+  return { svg, now(us) {
     const run = begun.findLast(([, begin]) => begin <= us);
     link.setAttribute('d', run ? `M${x(run[0])} ${y(0) + 7}V${y(0.5)}H${x(Math.min(us, run[2]))}V${y(1) - 8}` : '');
-  };
-  const looks = { class: 'timeline', viewBox: `0 0 ${WIDTH} ${bottom + 32}`, 'font-size': 16, 'font-family': 'system-ui, sans-serif', fill: 'currentColor' };
-  Object.entries(looks).forEach(([key, one]) => svg.setAttribute(key, one));
-  Object.assign(svg.dataset, { wide, left: LEFT, row: ROW, top: 6, rows: ',,' });
-  return seen(svg, 'A time axis: when each message was published, which one had a callback, and when one was lost.');
+  } };
 }

@@ -189,7 +189,7 @@ def test_in_jupyterlab(lab, axe, prediction):
     assert says.inner_text() == PUSHED_OUT
     # No key reaches the commands of the notebook.
     before = [(c['cell_type'], c['source']) for c in lab.cells()]
-    for key in ['d', 'd', 'b', 'a', 'x', 'm', 'Enter', 'ArrowDown']:
+    for key in ['d', 'd', 'b', 'a', 'x', 'm', 'Shift+M', 'Enter', 'ArrowDown']:
         lab.page.keyboard.press(key)
     assert [(c['cell_type'], c['source']) for c in lab.cells()] == before
     assert says.inner_text() == PUSHED_OUT

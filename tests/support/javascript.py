@@ -1,17 +1,15 @@
 """The script of the replays, without its page, in a JavaScript engine."""
 
 import json
-from pathlib import Path
 
 import quickjs
 
-import helpers.replay
+from helpers.replay.script import source, with_imports
 
-FOLDER = Path(helpers.replay.__file__).parent
 GLUE = """
 // All states of a run, one a step from before the first, as a page could read them.
 function states(record) {
-  const run = walk(record);
+  const run = walk(record, rules.advance);
   return Array.from({ length: run.times.length + 1 }, (_, step) => {
     const { state, says } = run.seek(step);
     return {
@@ -29,7 +27,7 @@ function states(record) {
 // and by whom, and the circle that can never go on: its sentence, and who waits for or holds what.
 function steps(record) {
   const { setup } = record;
-  const run = walk(record);
+  const run = walk(record, rules.advance);
   const named = item => (item ? setup.callbacks[item.callback].name : null);
   return run.times.map((_, step) => {
     const { state, says } = run.seek(step + 1);
@@ -73,13 +71,13 @@ function play(setup, prefer = []) {
   let state = model.start(setup);
   const done = [];
   for (;;) {
-    const allowed = model.moves(setup, state);
+    const allowed = rules.moves(setup, state);
     const rank = move => (prefer.includes(move.do) ? prefer.indexOf(move.do) : prefer.length);
     const move = prefer.length
-      ? allowed.sort((one, other) => rank(one) - rank(other))[0] : model.eager(setup, state);
+      ? allowed.sort((one, other) => rank(one) - rank(other))[0] : rules.eager(setup, state);
     if (!move) return { state, done, circle: circleOf(setup, state) };
     const before = JSON.stringify(state);
-    const { state: after, says } = model.apply(setup, state, move);
+    const { state: after, says } = rules.apply(setup, state, move);
     if (JSON.stringify(state) !== before) throw new Error('apply changed the state it got');
     done.push({ ...move, at: after.now, says });
     state = after;
@@ -87,19 +85,19 @@ function play(setup, prefer = []) {
 }
 
 const after = (setup, moves) =>
-  moves.reduce((was, move) => model.apply(setup, was.state, move), { state: model.start(setup) });
-const refusal = (setup, moves, move) => model.refusal(setup, after(setup, moves).state, move);
+  moves.reduce((was, move) => rules.apply(setup, was.state, move), { state: model.start(setup) });
+const refusal = (setup, moves, move) => rules.refusal(setup, after(setup, moves).state, move);
 const last = (setup, moves) => after(setup, moves).says;
 """
 
 
 class Script:
-    """model.js, rules.js, files that use them, circle.js, glue. `call` exchanges JSON."""
+    """Files `.js` with what they import, and glue. `call` exchanges JSON."""
 
     def __init__(self, *names: str, glue: str = GLUE) -> None:
         self._context = quickjs.Context()
-        for name in ('model.js', 'rules.js', *(names or ('walk.js',)), 'circle.js'):
-            self._context.eval((FOLDER / name).read_text())
+        for path in with_imports(names or ('rules.js', 'circle.js')):
+            self._context.eval(source(path))
         self._context.eval(glue)
 
     def call(self, function: str, *arguments):

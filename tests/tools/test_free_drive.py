@@ -6,6 +6,7 @@ import random
 import pytest
 import quickjs
 
+from helpers.replay import source
 from helpers.robot.body import Body
 from helpers.robot.floor import ROOMS
 from helpers.robot.record import Command
@@ -25,7 +26,7 @@ def test_it_moves_as_the_body_of_the_lessons():
     for _ in range(40):
         speeds += 50 * [rng.choice([(1, 0), (-0.5, 0), (0, 1.2), (0, -1.2), (1, 0)])]
     context = quickjs.Context()
-    context.eval(SCRIPT.read_text() + GLUE)
+    context.eval(source(SCRIPT.with_name('body.js')) + GLUE)
     given = f'{json.dumps(record())}, {json.dumps(speeds)}'
     seen = json.loads(context.eval(f'JSON.stringify(driven({given}))'))
     one = Body(ROOMS)

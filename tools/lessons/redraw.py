@@ -24,7 +24,7 @@ SCRIPT = re.compile(r'(?<=<script>)\(\(\) => \{\n.*?\}\)\(\);(?=</script>)', re.
 STYLE = re.compile(r'<style>.*?</style>', re.DOTALL)
 OURS = '<div class="replay'
 GUESS = f'{OURS} guess"'
-FIRST = re.compile(r'^(?:function|const|let) (\w+)', re.MULTILINE)
+FIRST = re.compile(r'^(?:export )?(?:function|const|let) (\w+)', re.MULTILINE)
 LAST = re.compile(r'JSON\.parse\((root\.dataset\.\w+)\)')  # of a file that ends a script
 RULE = re.compile(r'^([^/\s@][^{]*?)\s*\{', re.MULTILINE)
 SHARED = {'frame.css', 'style.css', 'look.css'}  # no maker of a style names them

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from helpers import robot
-from helpers.replay import attribute, source, style
+from helpers.replay import attribute, script, style
 from helpers.robot import ROOMS
 from helpers.robot_view import DRIVE_CSS, floor_in_words, floor_picture
 
@@ -30,6 +30,5 @@ def html() -> str:
         f'<div class="replay free-drive" data-drive={attribute(record())}>{style(DRIVE_CSS)}'
         '<p class="drive-hello">Come to A, B and C without a bump.</p>'
         f'<div class="replay-floor" role="img" aria-label="{words}">{svg}</div>'
-        f'<script>(() => {{\n{source("element.js")}{SCRIPT.read_text("utf-8")}'
-        "show(document.currentScript.closest('.replay'));})();</script></div>"
+        f'<script>{script(SCRIPT)}</script></div>'
     )

@@ -221,17 +221,20 @@ const isNew = ({ model }) => model.executionCount === null;
 
 const hasRun = ({ model }) => model.executionCount > 0 || model.executionState === 'running';
 
-const isSolution = ({ model }) => model.getMetadata('tags')?.includes('solution');
+const isTagged = ({ model }, ...tags) => tags.some(tag => model.getMetadata('tags')?.includes(tag));
+
+const isSolution = cell => isTagged(cell, 'solution');
 
 // What a text says beyond what a slide shows of it (../texts.py): for the notes window, or for T.
 const isRest = cell => kindOf(cell) === 'notes';
+const isHidden = cell => kindOf(cell) === 'skip' || (isRest(cell) && !deck.deckWhole);
 
 // Return the slides: the indices of their cells.
 function slides() {
   const found = [];
   deck.content.widgets.forEach((cell, index) => {
     const kind = kindOf(cell);
-    if (kind === 'skip' || (isRest(cell) && !deck.deckWhole)) return;
+    if (isHidden(cell)) return;
     if ((kind && !isRest(cell)) || !found.length) found.push([]);
     found.at(-1).push(index);
   });
@@ -261,6 +264,15 @@ function shownOn(slide) {
   return end < 0 ? slide : slide.slice(0, end);
 }
 
+// A task is one thing at a time: its starter, the check, or the solution. Of those that have run, one is on
+// the stage, the last one up to the active cell, and the others stand aside.
+function stageOf(slide) {
+  const { widgets, activeCellIndex } = deck.content;
+  const ran = slide.filter(index => isTagged(widgets[index], 'exercise', 'check', 'solution') && hasRun(widgets[index]));
+  const stage = ran.findLast(index => index <= activeCellIndex) ?? ran[0];
+  return { stage, aside: ran.filter(index => index !== stage) };
+}
+
 // Show a slide, and choose a cell of it: this one, or the first that runs.
 function goTo(number, cell) {
   const all = slides();
@@ -282,15 +294,28 @@ const focusCell = () => deck.content.activeCell.node.focus({ preventScroll: true
 const scroller = () => deck.content.outerNode;
 
 let shownPlace = '';
+let before = 0; // the cell that was active
+
+// The cursor has left an editor, and come to notes, which no slide shows. It goes on to what is shown.
+function leaveHidden() {
+  const { content } = deck;
+  const way = content.activeCellIndex > before ? 1 : -1;
+  content.activeCellIndex += way;
+}
 
 function update() {
   const { content, context: { path } } = deck;
   const { widgets, activeCellIndex } = content;
+  if (isHidden(widgets[activeCellIndex])) return leaveHidden();
+  before = activeCellIndex;
   const all = slides();
   const number = here();
   const slide = shownOn(all[number]);
+  const { stage, aside } = stageOf(slide);
   widgets.forEach(({ node, model }, index) => {
     node.classList.toggle('deck-on', slide.includes(index));
+    node.classList.toggle('deck-stage', index === stage);
+    node.classList.toggle('deck-aside', aside.includes(index));
     node.classList.toggle('deck-rest', isRest(widgets[index]) && !deck.deckWhole);
     node.classList.toggle('deck-runs', model.executionState === 'running');
     node.classList.toggle('deck-ran', model.type === 'code' && hasRun(widgets[index]));
@@ -321,7 +346,8 @@ function update() {
 const isLong = text => text.split('\n').length > LOG[0] && text.split('\n').every(row => row.length <= LOG[1]);
 
 // The letters are as large as the slide has room for. If there is none even for small ones, code that
-// has run makes room for what came out: see deck-tight in deck.css. What grows below comes into view.
+// has run makes room for what came out, then what stands aside is folded, then pictures are smaller: see
+// deck-tight, deck-folds and deck-tighter in deck.css. What grows below comes into view.
 function fit() {
   const { node, viewportNode, widgets } = deck.content;
   const outer = scroller();
@@ -334,16 +360,27 @@ function fit() {
   }
   let room = 0;
   viewportNode.style.marginTop = 0;
+  node.style.removeProperty('--deck-code');
   const least = SCALES.code.at(-1);
+  const staged = on.find(cell => cell.node.classList.contains('deck-stage'))?.node.querySelector('.jp-InputArea-editor');
   const tries = hasCode
-    ? [...SCALES.code.filter(scale => scale >= 1).map(scale => [scale, 0]), ...SCALES.code.map(scale => [scale, 1]), ...FIGURES.map(tall => [least, 2, tall])]
-    : SCALES.texts.map(scale => [scale, 0]);
-  for (const [scale, tight, tall] of tries) {
+    ? [
+      ...SCALES.code.filter(scale => scale >= 1).map(scale => [scale]),
+      ...SCALES.code.map(scale => [scale, 'deck-tight']),
+      ...(staged ? SCALES.code.map(scale => [scale, 'deck-tight deck-folds']) : []),
+      ...FIGURES.map(tall => [least, 'deck-tight deck-tighter deck-folds', tall]),
+    ]
+    : SCALES.texts.map(scale => [scale]);
+  for (const [scale, makes = '', tall] of tries) {
     node.style.setProperty('--deck-scale', scale);
-    deck.toggleClass('deck-tight', tight > 0);
-    deck.toggleClass('deck-tighter', tight > 1);
+    for (const name of ['deck-tight', 'deck-tighter', 'deck-folds']) deck.toggleClass(name, makes.split(' ').includes(name));
     node.style.setProperty('--deck-tall', tall);
     room = outer.clientHeight - viewportNode.getBoundingClientRect().height;
+    if (room < 0 && scale === least && staged && makes.includes('deck-folds')) {
+      // Of the code on the stage, there is what is left for it.
+      node.style.setProperty('--deck-code', `${staged.offsetHeight + room}px`);
+      room = outer.clientHeight - viewportNode.getBoundingClientRect().height;
+    }
     if (room >= 0) break;
   }
   if (!hasCode) viewportNode.style.marginTop = `${Math.max(room / 2, 0)}px`;
@@ -656,9 +693,9 @@ function toStep(way) {
 function byCell(way) {
   const { content } = deck;
   const runs = shownOn(slides()[here()]).filter(index => content.widgets[index].model.type === 'code');
-  const index = runs[runs.indexOf(content.activeCellIndex) + way];
-  if (index === undefined || content.activeCell.model.type !== 'code')
-    scroller().scrollTop += 0.2 * way * scroller().clientHeight;
+  const at = content.activeCellIndex;
+  const index = way > 0 ? runs.find(one => one > at) : runs.findLast(one => one < at);
+  if (index === undefined) scroller().scrollTop += 0.2 * way * scroller().clientHeight;
   else toCell(index);
 }
 
