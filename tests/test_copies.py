@@ -1,4 +1,4 @@
-"""Runs side by side: each in a copy of the kernel, and what it returns comes back."""
+"""Runs at the same time: each in a copy of the kernel, and what it returns comes back."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ from rclpy.node import Node
 from std_msgs.msg import Int32
 
 from helpers.ros import ros_session
-from helpers.trials import side_by_side
+from helpers.trials import in_copies
 
 
 def hear(number):
@@ -29,7 +29,7 @@ def hear(number):
 
 
 def test_each_run_hears_itself_only_and_the_results_are_in_order():
-    found = side_by_side({number: lambda number=number: hear(number) for number in (3, 1, 2)})
+    found = in_copies({number: lambda number=number: hear(number) for number in (3, 1, 2)})
     assert [*found] == [3, 1, 2]
     assert all(heard == {number} for number, (_, heard) in found.items())
     assert len({domain for domain, _ in found.values()}) == 3
@@ -42,7 +42,7 @@ def test_they_run_at_the_same_time():
 
     ends = {name: os.pipe() for name in 'ab'}
     runs = {'a': lambda: meet('a', 'b'), 'b': lambda: meet('b', 'a')}
-    assert side_by_side(runs) == {'a': b'x', 'b': b'x'}
+    assert in_copies(runs) == {'a': b'x', 'b': b'x'}
 
 
 def test_no_more_than_so_many_run_at_a_time(tmp_path):
@@ -55,7 +55,7 @@ def test_no_more_than_so_many_run_at_a_time(tmp_path):
         return together
 
     runs = {number: lambda number=number: count(number) for number in range(5)}
-    assert max(side_by_side(runs, most=2).values()) <= 2
+    assert max(in_copies(runs, most=2).values()) <= 2
 
 
 def test_what_it_changes_stays_in_the_copy_and_what_it_prints_is_not_shown(capfd):
@@ -66,7 +66,7 @@ def test_what_it_changes_stays_in_the_copy_and_what_it_prints_is_not_shown(capfd
         kept.append(1)
         return len(kept)
 
-    assert side_by_side({'run': run}) == {'run': 1}
+    assert in_copies({'run': run}) == {'run': 1}
     assert kept == []
     assert capfd.readouterr().out == ''
 
@@ -77,7 +77,7 @@ def test_what_a_run_raises_is_raised_and_the_others_end():
 
     begun = time.monotonic()
     with pytest.raises(ValueError, match='no such floor'):
-        side_by_side({'fails': fail, 'waits': lambda: time.sleep(60)})
+        in_copies({'fails': fail, 'waits': lambda: time.sleep(60)})
     assert time.monotonic() - begun < 30
     with pytest.raises(ChildProcessError):
         os.waitpid(-1, os.WNOHANG)
@@ -93,13 +93,13 @@ def test_what_a_run_raises_is_raised_and_the_others_end():
 )
 def test_a_run_without_an_answer_is_an_error(run, says):
     with pytest.raises(RuntimeError, match=says):
-        side_by_side({'dies': run})
+        in_copies({'dies': run})
 
 
 def test_an_interrupt_ends_all_copies():
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        side_by_side({number: lambda: time.sleep(60) for number in range(3)})
+        in_copies({number: lambda: time.sleep(60) for number in range(3)})
     with pytest.raises(ChildProcessError):
         os.waitpid(-1, os.WNOHANG)

@@ -10,11 +10,12 @@ A lesson shows what came out of a trial, and tasks are judged by some of them.
     planted    a learner's tests, with right and with wrong versions of what they test
     busy       a brake on a busy computer, and its flaky test
     lifecycle  a camera whose steps fail
-    side_by_side  runs that are compared, each in a copy of the kernel
+    copies     runs that are compared, each in a copy of the kernel
 """
 
 from helpers.trials.brakes import Camera, scan, show_a_wall, stop_while_looking
 from helpers.trials.busy import BRAKE, BUSY, run_busy
+from helpers.trials.copies import in_copies
 from helpers.trials.executors import callbacks_at_once, cpu_of_spin
 from helpers.trials.lifecycle import Device, state_after
 from helpers.trials.packages import (
@@ -28,7 +29,6 @@ from helpers.trials.packages import (
 from helpers.trials.patrols import note_feedback, record, step_through
 from helpers.trials.planted import planted, run_tests
 from helpers.trials.robots import ways, with_camera
-from helpers.trials.side_by_side import side_by_side
 
 __all__ = [
     'BRAKE',
@@ -40,6 +40,7 @@ __all__ = [
     'callbacks_at_once',
     'cpu_of_spin',
     'imports',
+    'in_copies',
     'make_three_changes',
     'note_feedback',
     'planted',
@@ -49,7 +50,6 @@ __all__ = [
     'run_tests',
     'scan',
     'show_a_wall',
-    'side_by_side',
     'state_after',
     'step_through',
     'stop_while_looking',

@@ -1,4 +1,4 @@
-"""Runs of a lesson side by side: each in a copy of the kernel, in a domain of its own.
+"""Runs of a lesson at the same time: each in a copy of the kernel, in a domain of its own.
 
 A drive, or a queue that fills, mostly waits. So some of them take no longer than the longest one,
 and what they are compared by is the same: no node of one run hears those of another.
@@ -26,8 +26,8 @@ PR_SET_PDEATHSIG = 1  # linux/prctl.h
 POLL_S = 0.2  # after which an Interrupt is noticed
 
 
-def side_by_side(runs: Mapping[Name, Callable[[], Result]], most: int = 6) -> dict[Name, Result]:
-    """Call functions side by side, each in a copy of this kernel, and return what they return.
+def in_copies(runs: Mapping[Name, Callable[[], Result]], most: int = 6) -> dict[Name, Result]:
+    """Call functions at the same time, each in a copy of this kernel, and return what they return.
 
     A copy, made by `fork`, has every object of the notebook. What it prints, shows or changes is
     gone with it. Only what its function returns comes back, so that must be something that pickle
