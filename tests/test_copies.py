@@ -71,6 +71,26 @@ def test_what_it_changes_stays_in_the_copy_and_what_it_prints_is_not_shown(capfd
     assert capfd.readouterr().out == ''
 
 
+def test_what_runs_show_is_shown_in_their_order():
+    from IPython.core.interactiveshell import InteractiveShell
+    from IPython.utils.capture import capture_output
+
+    def show(text):
+        from IPython.display import Markdown, display
+
+        display(Markdown(text))
+        return len(text)
+
+    InteractiveShell.instance()
+    try:
+        with capture_output() as captured:
+            found = in_copies({text: lambda text=text: show(text) for text in ('two', 'three')})
+    finally:
+        InteractiveShell.clear_instance()
+    assert found == {'two': 3, 'three': 5}
+    assert [output.data['text/markdown'] for output in captured.outputs] == ['two', 'three']
+
+
 def test_what_a_run_raises_is_raised_and_the_others_end():
     def fail():
         raise ValueError('no such floor')

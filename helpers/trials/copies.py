@@ -29,10 +29,10 @@ POLL_S = 0.2  # after which an Interrupt is noticed
 def in_copies(runs: Mapping[Name, Callable[[], Result]], most: int = 6) -> dict[Name, Result]:
     """Call functions at the same time, each in a copy of this kernel, and return what they return.
 
-    A copy, made by `fork`, has every object of the notebook. What it prints, shows or changes is
-    gone with it. Only what its function returns comes back, so that must be something that pickle
-    takes: numbers, texts, tables. A session that is open here is closed before. At most `most`
-    copies run at a time.
+    A copy, made by `fork`, has every object of the notebook. What it prints or changes is gone with
+    it. What its function returns comes back, so that must be something that pickle takes: numbers,
+    texts, tables. What it shows, such as the replay of a drive, is shown when all have ended, in
+    their order. A session that is open here is closed before. At most `most` copies run at a time.
 
     Raises what a function raises, and RuntimeError for a copy that ends without an answer.
     """
@@ -47,7 +47,9 @@ def in_copies(runs: Mapping[Name, Callable[[], Result]], most: int = 6) -> dict[
                 results[running[answers]] = _answer_of(answers, running[answers])
                 _reap(answers)
                 del running[answers]
-    return {name: results[name] for name in runs}
+    for name in runs:
+        _show(results[name][1])
+    return {name: results[name][0] for name in runs}
 
 
 class _Answers(Connection):
@@ -87,7 +89,16 @@ def _start(function: Callable[[], object]) -> _Answers:
     return answers
 
 
-def _answer_of(answers: _Answers, name: Hashable) -> object:
+def _show(bundles: list[tuple[dict, dict]]) -> None:
+    if bundles:
+        from IPython.display import display
+
+        for data, metadata in bundles:
+            display(data, metadata=metadata, raw=True)
+
+
+def _answer_of(answers: _Answers, name: Hashable) -> tuple[object, list]:
+    """Return what a copy has returned, and what it has shown."""
     try:
         is_result, answer = answers.recv()
     except EOFError:
@@ -111,10 +122,10 @@ def _be_copy(function: Callable[[], object], sender: Connection, parent: int) ->
         if os.getppid() != parent:
             return
         gc.freeze()  # the objects of the kernel: a collection would only copy their pages
-        _leave_kernel()
+        shown = _leave_kernel()
         change_domain_id()
         try:
-            answer = True, function()
+            answer = True, (function(), shown)
         except BaseException as error:
             answer = False, error
         try:
@@ -127,11 +138,22 @@ def _be_copy(function: Callable[[], object], sender: Connection, parent: int) ->
         os._exit(0)
 
 
-def _leave_kernel() -> None:
-    """Forget that this is a kernel: no display, no sockets of its parent, and nothing printed."""
+def _leave_kernel() -> list[tuple[dict, dict]]:
+    """Forget that this is a kernel: its sockets are its parent's, and nobody sees what is printed.
+
+    Returns a list that gets what is shown from now on: data and metadata, by types of media.
+    """
     nothing = os.open(os.devnull, os.O_RDWR)
     for number in (0, 1, 2):
         os.dup2(nothing, number)
     sys.stdout = sys.stderr = open(1, 'w', closefd=False)  # noqa: SIM115
+    shown: list[tuple[dict, dict]] = []
     if 'IPython' in sys.modules and (shell := sys.modules['IPython'].get_ipython()):
         type(shell).clear_instance()
+        from IPython import display
+
+        def keep(*objects: object, **_: object) -> None:
+            shown.extend(shell.display_formatter.format(each) for each in objects)
+
+        display.display = keep
+    return shown
