@@ -116,10 +116,17 @@ def test_a_run_without_an_answer_is_an_error(run, says):
         in_copies({'dies': run})
 
 
-def test_an_interrupt_ends_all_copies():
+def test_an_interrupt_ends_all_copies_in_order(tmp_path):
+    def wait(number):
+        try:
+            time.sleep(60)
+        finally:
+            (tmp_path / str(number)).touch()
+
     timer = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        in_copies({number: lambda: time.sleep(60) for number in range(3)})
+        in_copies({number: lambda number=number: wait(number) for number in range(3)})
+    assert len([*tmp_path.iterdir()]) == 3
     with pytest.raises(ChildProcessError):
         os.waitpid(-1, os.WNOHANG)

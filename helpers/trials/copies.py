@@ -12,6 +12,7 @@ import os
 import pickle
 import signal
 import sys
+import time
 import warnings
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
@@ -19,11 +20,12 @@ from multiprocessing.connection import Connection, Pipe, wait
 from typing import NoReturn, TypeVar
 
 from helpers.notebook import uninterrupted
-from helpers.ros import change_domain_id, leave_ros
+from helpers.ros import change_domain_id, leave_ros, remove_dead_segments
 
 Name, Result = TypeVar('Name', bound=Hashable), TypeVar('Result')
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 POLL_S = 0.2  # after which an Interrupt is noticed
+END_S = 10.0  # for a copy to end its programs
 
 
 def in_copies(runs: Mapping[Name, Callable[[], Result]], most: int = 6) -> dict[Name, Result]:
@@ -60,15 +62,20 @@ class _Answers(Connection):
 
 @contextmanager
 def _copies() -> Iterator[dict[_Answers, Hashable]]:
-    """Keep the copies that run, and kill those that still do when this ends early."""
+    """Keep the copies that run. Those that still do when this ends early get Ctrl+C, and end."""
     running: dict[_Answers, Hashable] = {}
     try:
         yield running
     finally:
         with uninterrupted():
             for answers in running:
-                os.kill(answers.pid, signal.SIGKILL)
-                _reap(answers)
+                os.kill(answers.pid, signal.SIGINT)
+            end = time.monotonic() + END_S
+            for answers in running:
+                _end(answers.pid, end)
+                answers.close()
+            if running:
+                remove_dead_segments()
 
 
 def _start(function: Callable[[], object]) -> _Answers:
@@ -108,6 +115,13 @@ def _answer_of(answers: _Answers, name: Hashable) -> tuple[object, list]:
     raise answer
 
 
+def _end(pid: int, end: float) -> None:
+    while os.waitpid(pid, os.WNOHANG) == (0, 0):
+        if time.monotonic() > end:
+            os.kill(pid, signal.SIGKILL)
+        time.sleep(0.02)
+
+
 def _reap(answers: _Answers) -> None:
     os.waitpid(answers.pid, 0)
     answers.close()
@@ -116,8 +130,8 @@ def _reap(answers: _Answers) -> None:
 def _be_copy(function: Callable[[], object], sender: Connection, parent: int) -> NoReturn:
     """Run a function as a process without a kernel, send what it returns or raises, and end."""
     try:
-        os.setsid()  # an Interrupt of the kernel's group must not reach it: its owner kills it
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        os.setsid()  # an Interrupt of the kernel's group must not reach it: its owner sends one
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:
             return
