@@ -136,13 +136,18 @@ def test_a_missing_compiler_gets_one_sentence(other, monkeypatch, tmp_path):
         other.build()
 
 
-def test_an_interrupted_build_leaves_no_process(other):
-    other.write('src/slow/package.xml', package_xml('slow', 'cmake'))
-    other.write(
+def slow_package(workspace: Workspace, seconds: int) -> None:
+    workspace.write('src/slow/package.xml', package_xml('slow', 'cmake'))
+    workspace.write(
         'src/slow/CMakeLists.txt',
         'cmake_minimum_required(VERSION 3.8)\nproject(slow LANGUAGES NONE)\n'
-        'add_custom_target(slow ALL COMMAND touch started COMMAND sleep 60)\n',
+        f'add_custom_target(slow ALL COMMAND touch started COMMAND sleep {seconds})\n'
+        'install(FILES package.xml DESTINATION share/slow)\n',
     )
+
+
+def test_an_interrupted_build_leaves_no_process(other):
+    slow_package(other, 60)
 
     def interrupt() -> None:
         wait_for((other.path / 'build/slow/started').exists, timeout_s=60)
@@ -153,6 +158,24 @@ def test_an_interrupted_build_leaves_no_process(other):
     with pytest.raises(KeyboardInterrupt):
         other.build()
     thread.join()
+    wait_for(lambda: processes_of(other.path) == [], timeout_s=2)
+
+
+def test_a_build_that_was_begun_goes_on_beside_the_notebook_and_a_terminal_waits_for_it(other):
+    slow_package(other, 1)
+    begun = other.begin_build('slow')
+    assert not (other.path / 'install/slow/share').exists()
+    assert 'slow' in other.terminal('ls install/slow/share')
+    result = begun.result()
+    assert result.ok, result
+    assert begun.result() is result
+
+
+def test_a_build_that_was_begun_ends_with_its_workspace(other):
+    slow_package(other, 60)
+    other.begin_build('slow')
+    wait_for((other.path / 'build/slow/started').exists, timeout_s=60)
+    other.close()
     wait_for(lambda: processes_of(other.path) == [], timeout_s=2)
 
 

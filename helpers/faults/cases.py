@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -245,26 +245,13 @@ class Case:
             self.workspace.write(f'src/{self.name}/{self.named(path)}', self.named(text))
 
     def reset(self) -> None:
-        """Write its package as it was, and build it."""
+        """Write its package as it was, without a build."""
         for folder in ('src', 'build', 'install', GIVEN):
             shutil.rmtree(self.workspace.file(f'{folder}/{self.name}'), ignore_errors=True)
         self.write(self.fault.files)
         self.workspace.write(f'{GIVEN}/COLCON_IGNORE', '')
         for path, text in self.given.items():
             self.workspace.write(f'{GIVEN}/{self.name}/{path}', text)
-        self.build()
-
-    def build(self) -> None:
-        """Build its package: if an old build is the fault, with other files than those in src."""
-        in_src = self.given | self.files
-        self.write(self.fault.installed)
-        try:
-            result = self.workspace.build(self.name, symlink_install=not self.fault.installed)
-        finally:
-            for path in map(self.named, self.fault.installed):
-                self.workspace.write(f'src/{self.name}/{path}', in_src[path])
-        if not result.ok:
-            raise RuntimeError(str(result))
 
     def mend(self, mend: Mend) -> None:
         """Change it. Raises ValueError if an old text is not there exactly once."""
@@ -285,15 +272,49 @@ def take(workspace: Workspace, fault: Fault, name: str, anew: bool = False) -> C
     build is there, as after `make clean`. `anew` begins again.
     Raises ValueError for a name that no package can have, RuntimeError if it cannot be built.
     """
-    if not re.fullmatch('[a-z][a-z0-9_]*', name):
-        raise ValueError(f'A robot has a name such as ada, not {name!r}.')
-    case = Case(workspace, fault, name)
-    before = _files(workspace.file(f'{GIVEN}/{name}'))
-    if anew or not case.folder.exists() or before != case.given:
-        case.reset()
-    elif not workspace.file(f'install/{name}').exists():
-        case.build()
-    return case
+    return take_all(workspace, {name: fault}, anew)[name]
+
+
+def take_all(
+    workspace: Workspace, faults: Mapping[str, Fault], anew: bool = False
+) -> dict[str, Case]:
+    """Put robots into the workspace as `take` does, {name: fault}, and build them at once."""
+    cases, unbuilt = {}, []
+    for name, fault in faults.items():
+        if not re.fullmatch('[a-z][a-z0-9_]*', name):
+            raise ValueError(f'A robot has a name such as ada, not {name!r}.')
+        case = cases[name] = Case(workspace, fault, name)
+        before = _files(workspace.file(f'{GIVEN}/{name}'))
+        if anew or not case.folder.exists() or before != case.given:
+            case.reset()
+            unbuilt.append(case)
+        elif not workspace.file(f'install/{name}').exists():
+            unbuilt.append(case)
+    build(unbuilt)
+    return cases
+
+
+def build(cases: Sequence[Case]) -> None:
+    """Build the packages of robots: where an old build is the fault, other files than in src.
+
+    Raises RuntimeError if one of them cannot be built.
+    """
+    linked = [case for case in cases if not case.fault.installed]
+    copied = [case for case in cases if case.fault.installed]
+    in_src = {case: case.given | case.files for case in copied}
+    for case in copied:
+        case.write(case.fault.installed)
+    try:
+        for some, symlink_install in ((linked, True), (copied, False)):
+            if some:
+                names = [case.name for case in some]
+                result = some[0].workspace.build(*names, symlink_install=symlink_install)
+                if not result.ok:
+                    raise RuntimeError(str(result))
+    finally:
+        for case in copied:
+            for path in map(case.named, case.fault.installed):
+                case.workspace.write(f'src/{case.name}/{path}', in_src[case][path])
 
 
 def forget(workspace: Workspace, names: Iterable[str]) -> None:

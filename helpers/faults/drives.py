@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from rclpy.task import Future
 from std_msgs.msg import Float64
 
 from helpers.faults.cases import Case
+from helpers.notebook import ProgressBar
 from helpers.robot import CORRIDOR, TURTLEBOT3, DriveRecord, Floor, Pose, Robot
 from helpers.robot_view import watch
 from helpers.ros import Session, ros_session
@@ -110,7 +111,10 @@ def drive(
             watch(robot, name=name)
         with workspace.start(words, f'the launch of {case.name}') as program:
             watcher = Watcher(session, robot, program, trouble, wanted_mps)
-            robot.run(LIMIT_S, until=watcher.is_over)
+            with ProgressBar(None) as bar:
+                if name:  # while it stands, nothing else moves
+                    watcher.tell = bar.say
+                robot.run(LIMIT_S, until=watcher.is_over)
             if watcher.how == 'stops' and trouble:
                 freshest_s = watcher.wait_for_a_fresh_scan()
             program.interrupt()
@@ -160,6 +164,8 @@ class Watcher:
         self._begun_s, self._ready_s = time.monotonic(), None
         self._moved_at_s = self._still_at_s = self._trouble_at_s = None
         self._trouble_at_m = 0.0
+        self.tell: Callable[[str], object] = lambda text: None
+        self._told = ''
         self.start = robot.pose
 
     @property
@@ -196,6 +202,7 @@ class Watcher:
         step = robot.record.poses[-1]
         is_still = step.v == 0 == step.w
         if self._moved_at_s is None:
+            self._tell_how_long(is_still)
             if is_still:
                 return 'stands' if self._waited_enough() else ''
             self._moved_at_s = now_s
@@ -257,6 +264,15 @@ class Watcher:
             self.robot.clock_ahead_s = 5.0 if is_there else 0.0
         else:
             self.robot.blind = is_there
+
+    def _tell_how_long(self, is_still: bool) -> None:
+        """Say once a second how long its programs have been starting, or how long it stands."""
+        since_s = time.monotonic() - (self._ready_s or self._begun_s)
+        text = 'Its nodes are there. It stands' if self._ready_s else 'Its programs start'
+        text = f'{text}: {since_s:.0f} s' if is_still else ''
+        if text != self._told:
+            self._told = text
+            self.tell(text)
 
     def _waited_enough(self) -> bool:
         """Return whether a robot that stands will not move any more: a slow machine has longer."""

@@ -18,13 +18,14 @@ from helpers.guesses import Guess
 from helpers.notebook import ProgressBar
 from helpers.patrol.floors import CLOSE
 from helpers.patrol.program import PACKAGE, action, route_of
-from helpers.robot import CORRIDOR, KIND, RATE_HZ, TURTLEBOT3, Driver, Floor, Robot
+from helpers.robot import CORRIDOR, KIND, RATE_HZ, TURTLEBOT3, Driver, DriveRecord, Floor, Robot
 from helpers.robot_view import watch
 from helpers.ros import STATUS, Session, ros_session, spun
 from helpers.workspace import (
     DIED,
     Process,
     Workspace,
+    end_together,
     error_of_launch,
     why_it_failed,
     without_folders,
@@ -166,7 +167,7 @@ def printed(workspace: Workspace, lines: Sequence[str]) -> str:
 class Ended(NamedTuple):
     """What a robot did after an end: whether it stands, and how far (m) and long (s) it went on."""
 
-    robot: Robot
+    record: DriveRecord
     stands: bool
     metres: float
     seconds: float
@@ -210,7 +211,9 @@ def ended_by(workspace: Workspace, end: str, halt: bool = False) -> Ended:
         moves = [step for step in robot.record.poses if step.t_s > since_s and (step.v or step.w)]
         if end == 'patrol freezes':
             os.kill(programs['patrol'].pid, signal.SIGCONT)  # or it could not end
-    return Ended(robot, stands, sum(step.v for step in moves) / RATE_HZ, len(moves) / RATE_HZ)
+        end_together(programs.values())
+    metres, seconds = sum(step.v for step in moves) / RATE_HZ, len(moves) / RATE_HZ
+    return Ended(robot.record, stands, metres, seconds)
 
 
 def _wait_until_it_misses(session: Session, client: Node, guard: Process) -> None:

@@ -58,6 +58,8 @@ class Driver:
     # `percentage` goes from 0 to 100, though BatteryState.msg says 0 to 1 (FIRMWARE:
     # bat_percent * 100; NODE, battery_state.cpp: times 0.01). Charge and current stay 0.
     battery_percent: bool = False
+    # So often (Hz) the battery speaks (NODE: in the same timer of 50 ms).
+    battery_hz: int = 1
     # So often (Hz) wheels, IMU and /tf speak (NODE: a timer of 50 ms).
     rate_hz: int = 50
     # It says on /tf itself where the robot is in `odom` (BRINGUP: odometry.publish_tf). A filter
@@ -114,6 +116,7 @@ TURTLEBOT3 = Driver(
     zero_covariance=True,
     odometry_by_imu=True,
     battery_percent=True,
+    battery_hz=20,
     rate_hz=20,
     gps=False,
     bumper=False,

@@ -295,7 +295,7 @@ class Robot(Node):
         if self.sim_time:
             self._clock_topic.publish(ClockMessage(clock=now))
         driver = self.driver
-        if number * driver.rate_hz // RATE_HZ != (number - 1) * driver.rate_hz // RATE_HZ:
+        if is_due(driver.rate_hz, number):
             self._say(
                 'odom',
                 lambda: messages.odometry(
@@ -311,6 +311,8 @@ class Robot(Node):
             )
             self._say('/tf', self._moving_frame)
             self._say(TRUTH, self._truth)
+        if is_due(driver.battery_hz, number):
+            self._say('battery_state', lambda: messages.battery(self._header(''), body.t_s, driver))
         if number % SCAN_EVERY == 0 and not self.silent:
             ranges, first, step = self._sensors.scan(body)
             if self.blind:
@@ -324,7 +326,6 @@ class Robot(Node):
             self._say(CAMERA, self._picture)
         if number % RATE_HZ == 0:
             self._say(GPS, lambda: messages.fix(self._header('gps_link'), readings))
-            self._say('battery_state', lambda: messages.battery(self._header(''), body.t_s, driver))
             for topic, sentence in other_types(self, self.get_namespace().strip('/'), driver):
                 self._warn(topic, sentence)
 
@@ -366,6 +367,11 @@ class Robot(Node):
         if topic not in self._warned:
             self._warned.add(topic)
             self.get_logger().warning(text)
+
+
+def is_due(rate_hz: int, step_number: int) -> bool:
+    """Return whether what is said so often is said after this step."""
+    return step_number * rate_hz // RATE_HZ != (step_number - 1) * rate_hz // RATE_HZ
 
 
 def topics_of(driver: Driver) -> dict[str, type]:

@@ -10,10 +10,12 @@ A lesson shows what came out of a trial, and tasks are judged by some of them.
     planted    a learner's tests, with right and with wrong versions of what they test
     busy       a brake on a busy computer, and its flaky test
     lifecycle  a camera whose steps fail
+    copies     runs that are compared, each in a copy of the kernel
 """
 
 from helpers.trials.brakes import Camera, scan, show_a_wall, stop_while_looking
 from helpers.trials.busy import BRAKE, BUSY, run_busy
+from helpers.trials.copies import in_copies
 from helpers.trials.executors import callbacks_at_once, cpu_of_spin
 from helpers.trials.lifecycle import Device, state_after
 from helpers.trials.packages import (
@@ -38,6 +40,7 @@ __all__ = [
     'callbacks_at_once',
     'cpu_of_spin',
     'imports',
+    'in_copies',
     'make_three_changes',
     'note_feedback',
     'planted',

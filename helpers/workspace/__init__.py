@@ -29,9 +29,9 @@ from helpers.workspace.first_error import (
     why_it_failed,
 )
 from helpers.workspace.given import play_colleague, write_fleet, write_try_nearest
-from helpers.workspace.processes import DIED, Process, show_launch, wait_until
+from helpers.workspace.processes import DIED, Process, end_together, show_launch, wait_until
 from helpers.workspace.rosdep import rosdep, run_rosdep
-from helpers.workspace.tf2_msgs import provide_tf2_msgs
+from helpers.workspace.tf2_msgs import begin_tf2_msgs, provide_tf2_msgs
 from helpers.workspace.wheels import fix_wheels
 from helpers.workspace.workspace import SMALL_RCLCPP, Workspace, path_and_part
 
@@ -51,6 +51,7 @@ __all__ = [
     'first_error',
     'error_in',
     'compile_error',
+    'end_together',
     'DIED',
     'SMALL_RCLCPP',
     'TRACEBACK',
@@ -60,6 +61,7 @@ __all__ = [
     'fix_wheels',
     'lines_that_matter',
     'path_and_part',
+    'begin_tf2_msgs',
     'provide_tf2_msgs',
     'without_folders',
 ]

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import psutil
@@ -243,6 +243,14 @@ def _after_cell(result) -> None:
     if result is None or isinstance(result.error_in_exec, KeyboardInterrupt):
         _stop_each(_of_this_cell)
     _of_this_cell.clear()
+
+
+def end_together(processes: Iterable[Process], limit_s: float = STOP_TIMEOUT_S) -> None:
+    """Press Ctrl+C in all of them, and wait until they have ended, at most `limit_s` seconds."""
+    processes = [*processes]
+    for process in processes:
+        process.interrupt(limit_s=0)
+    wait_until(lambda: not any(process.running for process in processes), limit_s)
 
 
 def wait_until(condition: Callable[[], object], limit_s: float) -> bool:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
+from pathlib import Path
 
-from helpers.workspace.workspace import Workspace
+from helpers.workspace.workspace import Build, Workspace
 
 MESSAGE = 'geometry_msgs/TransformStamped[] transforms\n'
 CMAKE_LISTS = """\
@@ -34,6 +35,19 @@ PACKAGE_XML = """\
 """
 
 
+_begun: dict[Path, Build] = {}  # by the path of a workspace
+
+
+def begin_tf2_msgs(workspace: Workspace) -> None:
+    """Begin to build the package, which takes some seconds. If ROS has it, nothing is built."""
+    if find_spec('tf2_msgs'):
+        return
+    workspace.write('src/tf2_msgs/msg/TFMessage.msg', MESSAGE)
+    workspace.write('src/tf2_msgs/CMakeLists.txt', CMAKE_LISTS)
+    workspace.write('src/tf2_msgs/package.xml', PACKAGE_XML)
+    _begun[workspace.path] = workspace.begin_build('tf2_msgs')
+
+
 def provide_tf2_msgs(workspace: Workspace) -> None:
     """Make `from tf2_msgs.msg import TFMessage` possible. If ROS has it, nothing is built.
 
@@ -41,10 +55,9 @@ def provide_tf2_msgs(workspace: Workspace) -> None:
     """
     if find_spec('tf2_msgs'):
         return
-    workspace.write('src/tf2_msgs/msg/TFMessage.msg', MESSAGE)
-    workspace.write('src/tf2_msgs/CMakeLists.txt', CMAKE_LISTS)
-    workspace.write('src/tf2_msgs/package.xml', PACKAGE_XML)
-    result = workspace.build('tf2_msgs')
+    if workspace.path not in _begun:
+        begin_tf2_msgs(workspace)
+    result = _begun.pop(workspace.path).result()
     if not result.ok:
         raise RuntimeError(str(result))
     workspace.use()

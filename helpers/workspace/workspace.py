@@ -91,6 +91,7 @@ class Workspace:
         self._ran: list[tuple[str, str | Process]] = []  # in terminals
         # What the last sourcing gave, and the state of the folder `install` then.
         self._sourced: tuple[object, dict[str, str]] | None = None
+        self._building: Build | None = None  # the last one
         self._parts: dict[str, list[str]] = {}  # of the files that several cells write
         if underlay is not None:
             self._empty()
@@ -195,6 +196,15 @@ class Workspace:
         A build that fails is a result, not an exception: print it. Raises RuntimeError if this
         machine lacks a tool, with the command that installs it.
         """
+        return self.begin_build(*packages, symlink_install=symlink_install).result()
+
+    def begin_build(self, *packages: str, symlink_install: bool = False) -> Build:
+        """Begin a build as `build` does, and let the notebook go on meanwhile.
+
+        Its `result()` waits for it, and so does whatever else needs the workspace: the next build,
+        a terminal, a program. Raises RuntimeError as `build` does.
+        """
+        self._wait_for_build()
         with_cmake = any(self.path.glob('src/**/CMakeLists.txt'))
         for tool in tools_of_a_build(with_cmake):
             if not tool.found:
@@ -215,44 +225,23 @@ class Workspace:
         python = [f'-DPython3_EXECUTABLE={sys.executable}', f'-DCMAKE_MODULE_PATH={CMAKE_MODULES}']
         settings += ['--cmake-args', *python]
         total = len(packages) or len(list(self.path.glob('src/**/package.xml'))) or 1
-        output = self._colcon([*command[1:], *settings], total)
-        return read_result(self.path, ' '.join(command), packages, output)
+        colcon = self._colcon([*command[1:], *settings])
+        self._building = Build(self.path, ' '.join(command), packages, total, colcon)
+        return self._building
 
-    def _colcon(self, arguments: list[str], total: int) -> list[str]:
-        """Run colcon in the workspace with a progress bar, and return the lines it printed."""
+    def _wait_for_build(self) -> None:
+        if self._building is not None:
+            self._building.result()
+
+    def _colcon(self, arguments: list[str]) -> Process:
+        """Start colcon in the workspace."""
         # The entry point: the script `colcon` may be of another environment. As with the script,
         # no file of the workspace hides a module of Python (-P).
         main = 'import sys; from colcon_core.command import main; sys.exit(main())'
         command = [sys.executable, '-P', '-c', main, '--log-base', 'log', *arguments]
         environment = self._underlay.environment() if self._underlay else build_environment()
         # If it were killed, its compilers would go on without an owner: it builds to its end.
-        with Process('colcon', command, environment, self.path, ends_with_kernel=False) as colcon:
-            try:
-                started = time.monotonic()
-                with ProgressBar(lambda: _packages_done(colcon.lines) / total) as bar:
-                    while colcon.running:
-                        time.sleep(POLL_S)
-                        bar.update(time.monotonic() - started)
-            except KeyboardInterrupt:
-                with uninterrupted():
-                    colcon.stop()
-                    self._note_half_built(colcon.lines)
-                raise
-        return colcon.lines
-
-    def _note_half_built(self, lines: Sequence[str]) -> None:
-        """Let colcon replace the copies of packages that it began and did not finish.
-
-        If the change of a Python package from copies to links is interrupted, colcon 0.21.3 has
-        removed its list of copies. Without this file it refuses to replace them by links.
-        """
-        begun, finished = (
-            {line.split()[2] for line in lines if line.startswith(word)}
-            for word in ('Starting >>>', 'Finished <<<')
-        )
-        for package in begun - finished:
-            with contextlib.suppress(FileNotFoundError):  # it had no folder yet
-                (self.path / 'build' / package / 'install.log').touch()
+        return Process('colcon', command, environment, self.path, ends_with_kernel=False)
 
     # --- Use ---
 
@@ -261,6 +250,7 @@ class Workspace:
 
         Raises RuntimeError if nothing has been built.
         """
+        self._wait_for_build()
         state = _state(self.path / 'install')  # a check, a process apart, may have built, too
         if self._sourced is None or self._sourced[0] != state:
             self._sourced = state, source(self.path)
@@ -366,6 +356,7 @@ class Workspace:
         ]
 
     def _bash(self, name: str, commands: str) -> Process:
+        self._wait_for_build()
         environment = build_environment() | self._environment_of_nodes()
         environment |= {
             'GIT_CONFIG_GLOBAL': os.devnull,
@@ -391,8 +382,59 @@ class Workspace:
             overlay.close()
         for process in [*self._processes.values(), *self.terminals.values()]:
             process.stop()
+        if self._building is not None:
+            self._building.stop()
         self._processes.clear()
         self.terminals.clear()
+
+
+class Build:
+    """A build that was begun. `result()` waits until it has ended, with a progress bar."""
+
+    def __init__(
+        self, path: Path, command: str, packages: Sequence[str], total: int, colcon: Process
+    ) -> None:
+        self._path, self._command, self._packages, self._total = path, command, packages, total
+        self._colcon = colcon
+        self._result: BuildResult | None = None
+
+    def result(self) -> BuildResult:
+        """Return what was built. An Interrupt ends the build."""
+        if self._result is not None:
+            return self._result
+        colcon, started = self._colcon, time.monotonic()
+        try:
+            with ProgressBar(lambda: _packages_done(colcon.lines) / self._total) as bar:
+                while colcon.running:
+                    time.sleep(POLL_S)
+                    bar.update(time.monotonic() - started)
+        except KeyboardInterrupt:
+            self.stop()
+            raise
+        colcon.stop()
+        self._result = read_result(self._path, self._command, self._packages, colcon.lines)
+        return self._result
+
+    def stop(self) -> None:
+        """End it, as an Interrupt does."""
+        with uninterrupted():
+            if self._colcon.running:
+                self._colcon.stop()
+                self._note_half_built()
+
+    def _note_half_built(self) -> None:
+        """Let colcon replace the copies of packages that it began and did not finish.
+
+        If the change of a Python package from copies to links is interrupted, colcon 0.21.3 has
+        removed its list of copies. Without this file it refuses to replace them by links.
+        """
+        begun, finished = (
+            {line.split()[2] for line in self._colcon.lines if line.startswith(word)}
+            for word in ('Starting >>>', 'Finished <<<')
+        )
+        for package in begun - finished:
+            with contextlib.suppress(FileNotFoundError):  # it had no folder yet
+                (self._path / 'build' / package / 'install.log').touch()
 
 
 def _count(files: Sequence[Path]) -> str:
