@@ -32,7 +32,6 @@ import sys
 import tempfile
 import time
 import traceback
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, Pipe, wait
@@ -41,7 +40,7 @@ from typing import NoReturn
 import psutil
 
 from helpers.notebook import uninterrupted
-from helpers.ros import leave_ros, remove_dead_segments
+from helpers.ros import fork, leave_ros, remove_dead_segments
 
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 POLL_S = 0.05
@@ -93,7 +92,7 @@ class Sandbox:
         guard = 0
         try:
             with uninterrupted():  # a guard needs somebody who ends it
-                guard = _fork()
+                guard = fork()
                 if guard == 0:
                     messages.close()
                     os.close(hold)
@@ -127,16 +126,6 @@ def _comes(messages: Connection, deadline: float) -> bool:
     return messages.poll(max(0.0, deadline - time.monotonic()))
 
 
-def _fork() -> int:
-    sys.stdout.flush()
-    sys.stderr.flush()
-    with warnings.catch_warnings():
-        # Python warns of locks that another thread may hold. The worker uses none of those of
-        # ipykernel's threads; rclpy has no threads while no session is open.
-        warnings.simplefilter('ignore', DeprecationWarning)
-        return os.fork()
-
-
 # --- The guard ------------------------------------------------------------------------------------
 
 
@@ -151,7 +140,7 @@ def _be_guard(
         with tempfile.TemporaryFile(buffering=0) as dump:
             from_worker, workers_end = Pipe(duplex=False)
             printed, printer = os.pipe()
-            worker = _fork()
+            worker = fork()
             if worker == 0:
                 messages.close()
                 for unused in (from_worker.fileno(), printed, alive):

@@ -4,6 +4,7 @@ from helpers.ros.connections import NOT_OF_A_LESSON, nearly
 from helpers.ros.conversions import START_NS, STATUS, quaternion, seconds_of, stamp_of, yaw_of
 from helpers.ros.domain import change_domain_id, remove_dead_segments
 from helpers.ros.executors import spin_each, spun
+from helpers.ros.fork import fork
 from helpers.ros.program import run_program
 from helpers.ros.session import (
     Session,
@@ -23,6 +24,7 @@ __all__ = [
     'change_domain_id',
     'current_session',
     'find',
+    'fork',
     'frames',
     'graph_environment',
     'leave_ros',

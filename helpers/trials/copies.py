@@ -13,14 +13,13 @@ import pickle
 import signal
 import sys
 import time
-import warnings
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from contextlib import contextmanager
 from multiprocessing.connection import Connection, Pipe, wait
 from typing import NoReturn, TypeVar
 
 from helpers.notebook import uninterrupted
-from helpers.ros import change_domain_id, leave_ros, remove_dead_segments
+from helpers.ros import change_domain_id, fork, leave_ros, remove_dead_segments
 
 Name, Result = TypeVar('Name', bound=Hashable), TypeVar('Result')
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
@@ -82,14 +81,9 @@ def _start(function: Callable[[], object]) -> _Answers:
     receiver, sender = Pipe(duplex=False)
     answers = _Answers(os.dup(receiver.fileno()), writable=False)
     receiver.close()
-    sys.stdout.flush()
-    sys.stderr.flush()
     parent = os.getpid()
-    with uninterrupted(), warnings.catch_warnings():
-        # Python warns of locks that another thread may hold. A copy uses none of those of
-        # ipykernel's threads; rclpy has no threads while no session is open.
-        warnings.simplefilter('ignore', DeprecationWarning)
-        answers.pid = os.fork()
+    with uninterrupted():
+        answers.pid = fork()
         if answers.pid == 0:
             _be_copy(function, sender, parent)
     sender.close()
