@@ -172,14 +172,14 @@ def test_an_interrupt_ends_the_check_and_all_it_started(capsys):
 
 
 def test_an_interrupt_while_the_guard_begins(capsys, monkeypatch):
-    fork = sandbox._fork
+    fork = sandbox.fork
 
     def interrupted():
         process = fork()
         signal.raise_signal(signal.SIGINT)  # in this process, and in the guard
         return process
 
-    monkeypatch.setattr(sandbox, '_fork', interrupted)
+    monkeypatch.setattr(sandbox, 'fork', interrupted)
     with pytest.raises(KeyboardInterrupt):
         points_of(sleeps_for_ever, capsys)
     assert psutil.Process().children(recursive=True) == []
