@@ -1,7 +1,7 @@
 // The boxes and arrows of circle.js, on a ring.
 
-const [RING_WIDE, RING_HIGH] = [340, 260]; // pixels: letters keep their size on a phone
-const LETTERS = 17; // of a line in a box
+const [RING_WIDE, RING_HIGH] = [340, 260]; // pixels, of up to five boxes: letters keep their size on a phone
+const [LETTERS, NEAR] = [17, 14]; // of a line in a box, and in one beside the middle
 
 // Return the node of the picture, and `draw(now, last)`: what circle.js returns of this state, and of
 // the end. Only the boxes of the circle have a place, or those of a chain that is open.
@@ -16,14 +16,20 @@ function ring() {
   const node = element('div', { class: 'ring' });
   let known; // the arrows that are drawn already
 
-  function lines(name) {
+  // It begins with a capital letter, but a name of code keeps its letters.
+  const sentence = says => (/^\w+\(\)/.test(says) ? says : says[0].toUpperCase() + says.slice(1));
+
+  // A word with a space behind it. One that is too long for a line is cut behind a dot, a _ or a /.
+  const cut = word => (word.length > LETTERS ? `${word} `.match(/[^._/]*[._/]|.+$/g) : [`${word} `]);
+
+  function lines(name, most) {
     const found = [''];
-    name.split(' ').forEach(word => {
-      const longer = `${found.at(-1)} ${word}`.trim();
-      if (longer.length <= LETTERS || !found.at(-1)) found[found.length - 1] = longer;
-      else found.push(word);
+    name.split(' ').flatMap(cut).forEach(part => {
+      const longer = found.at(-1) + part;
+      if (longer.trim().length <= most || !found.at(-1)) found[found.length - 1] = longer;
+      else found.push(part);
     });
-    return found;
+    return found.map(line => line.trim());
   }
 
   // Where a line from the middle of a box to a point leaves the box, and a little more.
@@ -48,13 +54,15 @@ function ring() {
     node.replaceChildren();
     const all = placed(last);
     if (!all.length) return;
+    const tall = RING_HIGH + 50 * Math.max(0, all.length - 5);
     const places = new Map(all.map((box, i) => {
-      const words = lines(box.name);
-      const [w, h] = [Math.max(...words.map(line => line.length)) * 7.3 + 16, 16 * words.length + 10];
       // Of three, two are above each other: there is room for the words of the arrows.
       const turn = 2 * Math.PI * (i / all.length - (all.length === 3 ? 1 / 3 : 1 / 4));
+      const words = lines(box.name, Math.abs(Math.sin(turn)) < 0.5 ? NEAR : LETTERS);
+      const [w, h] = [Math.max(...words.map(line => line.length)) * 7.3 + 16, 16 * words.length + 10];
       const x = all.length === 3 ? [85, 278, 85][i] : RING_WIDE / 2 + 105 * Math.cos(turn);
-      return [box.id, { x, y: RING_HIGH / 2 + (RING_HIGH - 62) / 2 * Math.sin(turn) * (all.length === 3 ? 1.15 : 1), w, h, words }];
+      const inside = Math.max(w / 2 + 2, Math.min(x, RING_WIDE - w / 2 - 2));
+      return [box.id, { x: inside, y: tall / 2 + (tall - 62) / 2 * Math.sin(turn) * (all.length === 3 ? 1.15 : 1), w, h, words }];
     }));
     const here = now.boxes.filter(({ id }) => places.has(id));
     const arrows = now.arrows.filter(({ from, to }) => places.has(from) && places.has(to));
@@ -71,9 +79,9 @@ function ring() {
     });
     const result = closed ? ['Nobody', 'can go on'] : now.isOpen ? ['The circle', 'is open'] : [];
     const middle = result.map((line, i) =>
-      text(line, all.length === 3 ? 162 : RING_WIDE / 2, RING_HIGH / 2 + 18 * i - 2, 'ring-closed'));
-    const words = [...arrows.map(({ says }) => model.capital(says)), ...(result.length ? [result.join(' ')] : [])].join('. ');
-    node.replaceChildren(seen(draws('svg', { viewBox: `0 0 ${RING_WIDE} ${RING_HIGH}` }, ...drawn, ...boxes, ...middle),
+      text(line, all.length === 3 ? 162 : RING_WIDE / 2, tall / 2 + 18 * i - 2, 'ring-closed'));
+    const words = [...arrows.map(({ says }) => sentence(says)), ...(result.length ? [result.join(' ')] : [])].join('. ');
+    node.replaceChildren(seen(draws('svg', { viewBox: `0 0 ${RING_WIDE} ${tall}` }, ...drawn, ...boxes, ...middle),
       words ? `${words}.` : 'Nobody holds or waits for anything.'));
   }
 
