@@ -54,7 +54,7 @@ function ring() {
     node.replaceChildren();
     const all = placed(last);
     if (!all.length) return;
-    const tall = RING_HIGH + 50 * Math.max(0, all.length - 5);
+    const tall = RING_HIGH + 90 * Math.max(0, all.length - 5);
     const places = new Map(all.map((box, i) => {
       // Of three, two are above each other: there is room for the words of the arrows.
       const turn = 2 * Math.PI * (i / all.length - (all.length === 3 ? 1 / 3 : 1 / 4));

@@ -23,7 +23,8 @@ def circle(findings: Iterable[Finding]) -> dict | None:
     """Return the first circle of these waits, None if no chain of them closes.
 
     It has `boxes`, {id, name}; `arrows`, {from, to, label, says, hot}, in the order in which they
-    turn; `says`, all of it in a sentence; and `stuck`, the numbers of the boxes `run NUMBER`.
+    turn; `stuck`, the numbers of the boxes `run NUMBER`; and `says`, a sentence. Where several
+    circles hang together, the shortest has arrows, and the sentence tells of all.
     """
     waits = _closed(findings)
     starts = sorted(waits, key=_order)
@@ -88,17 +89,27 @@ class _Turn:
     def data(self) -> dict | None:
         """Return the circle on which the start is, None if it only leads to one."""
         first = next(iter(self.boxes.values()))['id']
-        arrows = [one for one in self.arrows if first in self._behind(one['to'])]
+        says = [one['says'] for one in self.arrows if first in self._behind(one['to'])]
+        if not says:
+            return None
+        arrows = self._back_to(first)
         on_it = {one['from'] for one in arrows}
         boxes = [box for box in self.boxes.values() if box['id'] in on_it]
-        if not arrows:
-            return None
         return {
             'stuck': [int(number) for box in boxes for number in RUN.findall(box['id'])],
             'boxes': boxes,
             'arrows': arrows,
-            'says': f'Nobody can go on: {"; ".join(one["says"] for one in arrows)}.',
+            'says': f'Nobody can go on: {"; ".join(says)}.',
         }
+
+    def _back_to(self, first: str) -> list[dict]:
+        """Return the shortest way from a box back to it."""
+        ways = [[one] for one in self.arrows if one['from'] == first]
+        for way in ways:  # it grows meanwhile
+            if way[-1]['to'] == first:
+                return way
+            ways += [[*way, one] for one in self.arrows if one['from'] == way[-1]['to']]
+        raise ValueError('No arrow leads back.')
 
     def _behind(self, start: str) -> set[str]:
         """Return a box, and all that the arrows from it lead to."""
@@ -180,7 +191,8 @@ class _Turn:
             what = held['name'] if len(runs) == 1 else 'one of them'
             for one in sorted(runs.values(), key=_order):
                 run = self._run(one)
-                self._arrow(held, run, 'held by', f'{run["name"]} {_of("holds", run)} {what}')
+                label = 'held by' if len(runs) == 1 else 'one held by'
+                self._arrow(held, run, label, f'{run["name"]} {_of("holds", run)} {what}')
                 self._from(one)
         elif stop.cause == 'itself':
             (waiter,) = stop.holders
