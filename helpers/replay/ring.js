@@ -1,7 +1,8 @@
 // The boxes and arrows of circle.js, on a ring.
 
 const [RING_WIDE, RING_HIGH] = [340, 260]; // pixels, of up to five boxes: letters keep their size on a phone
-const [LETTERS, NEAR] = [17, 14]; // of a line in a box, and in one beside the middle
+const LETTERS = 17; // of a line in a box
+const NEAR = 14; // of one beside the middle
 
 // Return the node of the picture, and `draw(now, last)`: what circle.js returns of this state, and of
 // the end. Only the boxes of the circle have a place, or those of a chain that is open.
