@@ -257,7 +257,7 @@ def test_an_interrupted_cell_that_computes_says_nothing_more():
 
 def test_a_cell_draws_the_circle_of_an_executor_behind_it():
     cell = CELL.replace('wait_until(lambda: answers)', 'wait_until(client._pending_requests.copy)')
-    asks = '    from helpers.replay import what_waits\n    what_waits()\n'
+    asks = '    from helpers.waits_view import what_waits\n    what_waits()\n'
     with Kernel() as kernel:
         said = kernel.run(f'{cell}{asks}')
         assert 'ask() waits for the answer of the service look.' in said

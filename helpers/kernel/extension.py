@@ -41,13 +41,13 @@ def load_ipython_extension(shell) -> None:
             line = own_line(
                 (frame.f_code.co_filename, number) for frame, number in _frames(traceback)
             )
-            # private: an error that IPython shows, IPython 9.18
             lines = [line for one in told for line in one.text.splitlines()]
+            # private: an error that IPython shows, IPython 9.18
             error._render_traceback_ = lambda: [f'Interrupted. {line}'.strip(), *lines]
         shell.showtraceback((kind, error, traceback), tb_offset=tb_offset)
         if kind is KeyboardInterrupt:
             if told and told[0].circle:
-                from helpers.replay import Circle  # only if there is one to draw
+                from helpers.waits_view import Circle  # only if there is one to draw
 
                 display(Circle(told[0].circle))
             return

@@ -15,11 +15,9 @@ from helpers.replay.free import FreePlay
 from helpers.replay.levels import level
 from helpers.replay.replays import Replay, picture_of, replay, side_by_side
 from helpers.replay.script import attribute, javascript, script, source, style
-from helpers.replay.waits import Circle, what_waits
 
 __all__ = [
     'ActionRecording',
-    'Circle',
     'FreePlay',
     'Replay',
     'attribute',
@@ -33,5 +31,4 @@ __all__ = [
     'side_by_side',
     'source',
     'style',
-    'what_waits',
 ]

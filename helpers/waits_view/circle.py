@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from html import escape
+from pathlib import Path
 
 from IPython.display import display
 
-from helpers.replay.script import attribute, script, style
+from helpers.replay import attribute, script, style
 from helpers.waits import NOTHING, tell
 
-SCRIPT = 'circle.js', 'ring.js', 'element.js', 'waits.js'
+SCRIPT = 'circle.js', 'ring.js', 'element.js', Path(__file__).with_name('waits.js')
 
 
 @dataclass(frozen=True)
