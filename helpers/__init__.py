@@ -11,6 +11,7 @@ it. A package imports only from those that stand above it in this list:
     robot       a small robot behind real messages; it also runs as a program
     recording   records of what callbacks did, and the model of a queue that explains them
     replay      step through a run: what waits, what runs, what is lost, and why
+    waits_view  how one sees what waits: the circle that has closed
     guesses     a guess as an object in a picture: what may be answered, and how it looks
     robot_view  how one sees the robot, and drives it by hand
     plots       pictures of recorded and of predicted runs, of graphs and of drives

@@ -1,9 +1,12 @@
 """What waits, and why: programs that hang for different reasons, and such as only take long.
 
-They are in tests/data/waits. A comment `# Says:` is a line that is explained; `# From:` names the
-public thread with a program of this form. Those whose name begins with `slow` must not be accused.
+They are in tests/data/waits. A comment `# Says:` is a line that is explained, `# Arrow:` one of the
+circle in which callbacks wait for each other, in their order; without them there is none. `# From:`
+names the public thread with a program of this form. Those whose name begins with `slow` must not be
+accused.
 """
 
+import json
 import os
 import re
 import shutil
@@ -19,6 +22,7 @@ from support.kernel import Kernel
 
 from helpers.lesson import outlines
 from helpers.ros.domain import reserve_domain_id
+from helpers.waits import NOTHING
 from helpers.waits.blockers import nearly
 from helpers.waits.sentences import CURES
 
@@ -103,6 +107,22 @@ def asked(forks, file, tmp_path):
     os.kill(pid, signal.SIGKILL)
 
 
+def arrows(file):
+    return re.findall(r'^# Arrow: (.*)$', file.read_text(), re.MULTILINE)
+
+
+def circles_in(answer):
+    """Return each circle that was said: its arrows, as in the comments of a program."""
+    found = []
+    for line in re.findall(r'^Circle: (.*)$', answer, re.MULTILINE):
+        said = json.loads(line) or {'boxes': [], 'arrows': []}
+        name = {box['id']: box['name'] for box in said['boxes']}
+        found.append(
+            [f'{name[a["from"]]} > {a["label"]} > {name[a["to"]]}' for a in said['arrows']]
+        )
+    return found
+
+
 def wanted(file):
     return re.findall(r'^# Says: (.*)$', file.read_text(), re.MULTILINE)
 
@@ -110,11 +130,16 @@ def wanted(file):
 @pytest.mark.parametrize('file', HANGS, ids=lambda file: file.stem)
 def test_a_program_that_hangs_is_explained(asked, file):
     def is_told(answer):
-        return all(line in answer for line in wanted(file)) and ACCUSES.search(answer)
+        return (
+            all(line in answer for line in wanted(file))
+            and ACCUSES.search(answer)
+            and circles_in(answer)[-1:] == [arrows(file)]
+        )
 
     answer = asked.ask_until(is_told)
     assert [line for line in wanted(file) if line not in answer] == [], answer
     assert ACCUSES.search(answer)
+    assert circles_in(answer)[-1:] == [arrows(file)], answer
 
 
 @pytest.mark.parametrize('file', SLOW, ids=lambda file: file.stem)
@@ -122,6 +147,7 @@ def test_a_program_that_only_takes_long_is_not_accused(asked, file):
     assert asked.wait(lambda said: 'now\n' in said), asked.said
     answers = [asked.ask_until(len) for _ in range(3)]
     assert [answer for answer in answers if ACCUSES.search(answer)] == []
+    assert [circle for answer in answers for circle in circles_in(answer) if circle] == []
     assert [line for line in wanted(file) if line not in answers[-1]] == [], answers
 
 
@@ -171,10 +197,26 @@ def error_of(kernel):
     )
 
 
+CIRCLE = (
+    'Nobody can go on: ask() waits for the answer of the service look; '
+    'a lambda would answer, but needs the only thread; ask() holds the only thread.'
+)
+
+
+def circles_of(outputs):
+    """Return the circles that a cell has drawn, in words."""
+    return [
+        output['data']['text/plain']
+        for output in outputs
+        if 'data-circle=' in output.get('data', {}).get('text/html', '')
+    ]
+
+
 def test_an_interrupted_cell_says_what_waited():
     with Interrupting() as kernel:
         kernel.run(CELL)
         said = error_of(kernel)
+        assert circles_of(kernel.nb.cells[-1].outputs) == [CIRCLE]
         assert said.startswith('Interrupted. Line 22: session.wait_until(lambda: answers)')
         assert 'ask() waits for the answer of the service look.' in said
         assert 'They cannot: ask() holds the only thread of its executor' in said
@@ -210,6 +252,18 @@ def test_an_interrupted_cell_that_computes_says_nothing_more():
         kernel.run('import rclpy\nprint("now it " + "hangs", flush=True)\nwhile True:\n    pass')
         assert error_of(kernel).startswith('Interrupted. Line ')
         assert '\n' not in error_of(kernel)
+        assert circles_of(kernel.nb.cells[-1].outputs) == []
+
+
+def test_a_cell_draws_the_circle_of_an_executor_behind_it():
+    cell = CELL.replace('wait_until(lambda: answers)', 'wait_until(client._pending_requests.copy)')
+    asks = '    from helpers.waits_view import what_waits\n    what_waits()\n'
+    with Kernel() as kernel:
+        said = kernel.run(f'{cell}{asks}')
+        assert 'ask() waits for the answer of the service look.' in said
+        assert circles_of(kernel.nb.cells[-1].outputs) == [CIRCLE]
+        # All that hung has ended with its cell.
+        assert kernel.run('what_waits()').strip() == NOTHING
 
 
 def test_what_helps_names_lessons_of_today():

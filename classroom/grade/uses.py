@@ -21,8 +21,8 @@ LEFT_OUT = {'__pycache__', '.ipynb_checkpoints'}  # copies, by Python and Jupyte
 # Packages and modules that draw, ask and remember: no verdict depends on them.
 SHOW_ONLY = (
     *('helpers.replay', 'helpers.robot_view', 'helpers.plots', 'helpers.guesses'),
-    *('helpers.checks.other_robots', 'helpers.checks.memory', 'helpers.checks.guesses'),
-    *('helpers.checks.classroom', 'helpers.checks.progress'),
+    *('helpers.waits_view', 'helpers.checks.other_robots', 'helpers.checks.memory'),
+    *('helpers.checks.guesses', 'helpers.checks.classroom', 'helpers.checks.progress'),
 )
 LOOKS_ONLY = {'.css', '.js', '.svg', '.png', '.md'}
 IMPORTS = re.compile(r'^\s*(?:from|import) +helpers\b.*', re.MULTILINE)

@@ -13,6 +13,7 @@ from traceback import walk_tb
 from types import FrameType, TracebackType
 
 from IPython.core.error import UsageError
+from IPython.display import display
 from IPython.utils.process import system
 
 from helpers.notebook import own_line, run_command
@@ -26,23 +27,29 @@ def load_ipython_extension(shell) -> None:
     """Let `!ros2` be found, and a name or a magic that is missing say what to run.
 
     An Interrupt of a `!command` ends its cell. That of any cell is one line; if the cell or a
-    callback waited for something, lines below it say for what, and why it has not come.
+    callback waited for something, lines below it say for what, and why it has not come; a picture
+    shows the circle, if callbacks waited for each other.
     """
     commands, path = os.path.join(sys.prefix, 'bin'), os.environ.get('PATH', os.defpath)
     if commands not in path.split(os.pathsep):
         os.environ['PATH'] = f'{commands}{os.pathsep}{path}'
 
-    waits = _watch_interrupts(shell)
+    told = _watch_interrupts(shell)
 
     def explain(shell, kind, error, traceback, tb_offset=None) -> None:
         if kind is KeyboardInterrupt and not _breaks_kernel(traceback):
             line = own_line(
                 (frame.f_code.co_filename, number) for frame, number in _frames(traceback)
             )
+            lines = [line for one in told for line in one.text.splitlines()]
             # private: an error that IPython shows, IPython 9.18
-            error._render_traceback_ = lambda: [f'Interrupted. {line}'.strip(), *waits]
+            error._render_traceback_ = lambda: [f'Interrupted. {line}'.strip(), *lines]
         shell.showtraceback((kind, error, traceback), tb_offset=tb_offset)
         if kind is KeyboardInterrupt:
+            if told and told[0].circle:
+                from helpers.waits_view import Circle  # only if there is one to draw
+
+                display(Circle(told[0].circle))
             return
         begun = any(module in sys.modules for module in OF_FIRST_CELLS)
         from helpers.checks import explain_missing_name  # no kernel waits for them when it starts
@@ -67,31 +74,31 @@ def load_ipython_extension(shell) -> None:
     shell.system = run
 
 
-def _watch_interrupts(shell) -> list[str]:
-    """Return a list that has, after an Interrupt of a cell, lines on what waited at that moment.
+def _watch_interrupts(shell) -> list:
+    """Return a list that has, after an Interrupt of a cell, what is told of that moment.
 
     Afterwards it is too late to look: the `with` blocks of the cell have ended all that ran.
     """
-    lines: list[str] = []
+    told = []
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         # Nothing must keep an Interrupt from ending the cell. Where no ROS is, nothing is known.
         if 'rclpy' in sys.modules:
             with contextlib.suppress(Exception):
-                from helpers.waits import explain_interrupt
+                from helpers.waits import tell_interrupt
 
-                lines[:] = explain_interrupt(frame).splitlines()
+                told[:] = [tell_interrupt(frame)]
         signal.default_int_handler(number, frame)
 
     def begin(*_) -> None:
-        lines.clear()
+        told.clear()
         main = threading.current_thread() is threading.main_thread()
         if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, interrupt)  # ipykernel sets its own after the cell
 
     shell.events.register('pre_run_cell', begin)
     _begins[shell] = begin
-    return lines
+    return told
 
 
 _begins: dict[object, object] = {}

@@ -5,31 +5,40 @@ import { change, element, seen, shape } from './element.js';
 import { keep } from './keep.js';
 import { model } from './model.js';
 
-const [RING_WIDE, RING_HIGH] = [340, 260]; // pixels: letters keep their size on a phone
+// Pixels, of up to five boxes, and how much higher it is for each further one: letters keep their size on a phone.
+const [RING_WIDE, RING_HIGH, MORE] = [340, 260, 90];
 const LETTERS = 17; // of a line in a box
+const NEAR = 14; // of one beside the middle
 
 const text = (words, x, y, kind) => shape('text', { x, y, class: kind }, words);
 
+// It begins with a capital letter, but a name of code keeps its letters.
+const sentence = says => (/^\w+\(\)/.test(says) ? says : model.capital(says));
+
+// A word with a space behind it. One that is too long for a line is cut behind a dot, a _ or a /.
+const cut = word => (word.length > LETTERS ? `${word} `.match(/[^._/]*[._/]|.+$/g) : [`${word} `]);
+
 // The lines of a name in a box.
-function lines(name) {
+function lines(name, most) {
   const found = [''];
-  name.split(' ').forEach(word => {
-    const longer = `${found.at(-1)} ${word}`.trim();
-    if (longer.length <= LETTERS || !found.at(-1)) found[found.length - 1] = longer;
-    else found.push(word);
+  name.split(' ').flatMap(cut).forEach(part => {
+    const longer = found.at(-1) + part;
+    if (longer.trim().length <= most || !found.at(-1)) found[found.length - 1] = longer;
+    else found.push(part);
   });
-  return found;
+  return found.map(line => line.trim());
 }
 
 // Where all boxes are. Of three, two are above each other: there is room for the words of the arrows.
-function placesOf(boxes) {
+function placesOf(boxes, high) {
   return new Map(boxes.map((box, i) => {
-    const words = lines(box.name);
-    const [w, h] = [Math.max(...words.map(line => line.length)) * 7.3 + 16, 16 * words.length + 10];
     const three = boxes.length === 3;
     const turn = 2 * Math.PI * (i / boxes.length - (three ? 1 / 3 : 1 / 4));
+    const words = lines(box.name, Math.abs(Math.sin(turn)) < 0.5 ? NEAR : LETTERS);
+    const [w, h] = [Math.max(...words.map(line => line.length)) * 7.3 + 16, 16 * words.length + 10];
     const x = three ? [85, 278, 85][i] : RING_WIDE / 2 + 105 * Math.cos(turn);
-    return [box.id, { x, y: RING_HIGH / 2 + (RING_HIGH - 62) / 2 * Math.sin(turn) * (three ? 1.15 : 1), w, h, words }];
+    const inside = Math.max(w / 2 + 2, Math.min(x, RING_WIDE - w / 2 - 2));
+    return [box.id, { x: inside, y: high / 2 + (high - 62) / 2 * Math.sin(turn) * (three ? 1.15 : 1), w, h, words }];
   }));
 }
 
@@ -63,7 +72,7 @@ function putArrow(node, from, to, hot, isNew) {
 // Return the node of the picture, and `draw(now, last)`: what circle.js returns of this state, and of
 // the end. Only the boxes of the circle have a place, or those of a chain that is open.
 export function ring() {
-  const svg = shape('svg', { viewBox: `0 0 ${RING_WIDE} ${RING_HIGH}` });
+  const svg = shape('svg');
   const node = element('div', { class: 'ring', hidden: '' }, svg);
   let known; // the arrows that are drawn already
 
@@ -71,14 +80,16 @@ export function ring() {
     const all = placed(last);
     node.hidden = !all.length;
     if (node.hidden) return;
-    const places = placesOf(all);
+    const high = RING_HIGH + MORE * Math.max(0, all.length - 5);
+    const places = placesOf(all, high);
+    change(svg, { viewBox: `0 0 ${RING_WIDE} ${high}` });
     const arrows = now.arrows.filter(({ from, to }) => places.has(from) && places.has(to));
     const result = now.stuck.length ? ['Nobody', 'can go on'] : now.isOpen ? ['The circle', 'is open'] : [];
     const middle = all.length === 3 ? 162 : RING_WIDE / 2;
     keep(svg, [
       ...arrows.map(({ label, from, to }) => ['arrow', label, from, to]),
       ...all.map(({ id }) => ['box', id, places.get(id)]),
-      ...result.map((line, i) => ['result', line, RING_HIGH / 2 + 18 * i - 2]),
+      ...result.map((line, i) => ['result', line, high / 2 + 18 * i - 2]),
     ], ([kind, what, where]) => {
       if (kind === 'arrow') return arrowOf(what);
       return kind === 'box' ? boxOf(what, where) : text(what, middle, where, 'ring-closed');
@@ -91,7 +102,7 @@ export function ring() {
       change(svg.children[arrows.length + i], { class: `ring-box ring-${id.split(' ')[0]}${isOn ? ' ring-on' : ''}`, visibility: isHere ? 'visible' : 'hidden' });
     });
     known = new Set(arrows.map(sameArrow));
-    const words = [...arrows.map(({ says }) => model.capital(says)), ...(result.length ? [result.join(' ')] : [])].join('. ');
+    const words = [...arrows.map(({ says }) => sentence(says)), ...(result.length ? [result.join(' ')] : [])].join('. ');
     seen(svg, words ? `${words}.` : 'Nobody holds or waits for anything.');
   }
 

@@ -8,16 +8,39 @@ this folder works beside any program, `python3 -m waits node.py`.
 from __future__ import annotations
 
 import threading
+from dataclasses import dataclass
 from types import FrameType
 
+from .circles import circle
 from .finding import Finding
 from .findings import find
 from .sentences import NOTHING, sentences
 from .snapshot import Snapshot
 
-__all__ = ['NOTHING', 'Finding', 'explain', 'explain_interrupt', 'find_waits', 'what_waits']
+__all__ = [
+    'NOTHING',
+    'Finding',
+    'Told',
+    'circle',
+    'explain',
+    'find_waits',
+    'tell',
+    'tell_interrupt',
+    'what_waits',
+]
 
 MOST = 3
+
+
+@dataclass(frozen=True)
+class Told:
+    """What waited at a moment: `text`, '' if nothing did, and `circle`, as circle() returns it.
+
+    It holds nothing of the program, and may be kept.
+    """
+
+    text: str
+    circle: dict | None
 
 
 def find_waits(main_frame: FrameType | None = None) -> list[Finding]:
@@ -30,34 +53,40 @@ def find_waits(main_frame: FrameType | None = None) -> list[Finding]:
     return find(Snapshot(main_frame, () if main_frame is not None else (own,)))
 
 
-def explain(most: int = MOST) -> str:
-    """Return what waits as text, '' if nothing does: what is stuck first, `most` waits at most."""
+def tell() -> Told:
+    """Return what waits: what is stuck first, three waits at most."""
     found = find_waits()
     stuck = [one for one in found if one.stuck]
     main = [one for one in found if one.activity.thread is threading.main_thread()]
     callbacks = [one for one in found if one.activity.task is not None]
-    return _text([*dict.fromkeys([*stuck, *main, *callbacks])], most)
+    return _told([*dict.fromkeys([*stuck, *main, *callbacks])])
 
 
-def explain_interrupt(frame: FrameType | None) -> str:
-    """Return what kept the main thread waiting when a signal came, in this frame; or ''.
+def explain() -> str:
+    """Return what waits as text, '' if nothing does."""
+    return tell().text
+
+
+def tell_interrupt(frame: FrameType | None) -> Told:
+    """Return what kept the main thread waiting when a signal came, in this frame.
 
     A cell that computes is not told about threads that wait for their next work.
     """
     found = find_waits(frame)
     main = [one for one in found if one.activity.thread is threading.main_thread()]
     stuck = [one for one in found if one.stuck and (main or one.activity.task is not None)]
-    return _text([*dict.fromkeys([*stuck, *main])], MOST)
+    return _told([*dict.fromkeys([*stuck, *main])])
 
 
-def _text(findings: list[Finding], most: int) -> str:
+def _told(findings: list[Finding]) -> Told:
+    turns = circle(findings)
     # While a callback is stuck, it is no news that its executor spins, or that others do not run.
     if any(one.stuck and one.activity.task for one in findings):
         findings = [one for one in findings if one.kind != 'spin' or one.activity.task]
-    lines = [line for finding in findings[:most] for line in sentences(finding)]
-    if len(findings) > most:
-        lines.append(f'{len(findings) - most} more wait.')
-    return '\n'.join(lines)
+    lines = [line for finding in findings[:MOST] for line in sentences(finding)]
+    if len(findings) > MOST:
+        lines.append(f'{len(findings) - MOST} more wait.')
+    return Told('\n'.join(lines), turns)
 
 
 def what_waits() -> None:

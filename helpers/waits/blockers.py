@@ -7,7 +7,7 @@ nothing is known that would keep the callback from running.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import product
 
@@ -45,7 +45,8 @@ class Blocker:
 
     cause: str
     text: str
-    holders: tuple[Activity, ...] = ()  # what holds the threads or the group: it may come to an end
+    holders: tuple[Activity, ...] = ()  # what must come to an end first, and may
+    thing: str = ''  # what they hold: the threads, the group
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,9 @@ class Ender:
     blockers: tuple[Blocker, ...] = ()
     now: str = ''
     activity: Activity | None = None  # what works on it
+    name: str = ''  # of the callback that would end it, or of the line
+    does: str = ''  # completes the name: 'would answer'
+    label: str = 'needs'  # of an arrow from what is waited for
 
 
 # --- Names
@@ -88,6 +92,13 @@ def name_of(snapshot: Snapshot, entity: object) -> str:
     if name is not None:
         return f'the client of the service {name}{where}'
     return f'{callback or "something"}{where}'
+
+
+def short_name_of(entity: object) -> str:
+    """Return what an entity is called in a picture."""
+    return name_of_callback(entity) or (
+        'a callback' if isinstance(entity, Subscription | Timer) else 'the client'
+    )
 
 
 def name_of_activity(activity: Activity) -> str:
@@ -157,7 +168,8 @@ def of_threads(count: int, held: list[Activity]) -> Blocker:
     names = sorted({name_of_activity(one) for one in held})
     only = 'the only thread' if count == 1 else f'each of the {count} threads'
     hold = 'holds' if len(names) == 1 else 'hold'
-    return Blocker('thread', f'{", ".join(names)} {hold} {only} of its executor', tuple(held))
+    text = f'{", ".join(names)} {hold} {only} of its executor'
+    return Blocker('thread', text, tuple(held), only if count == 1 else f'the {count} threads')
 
 
 def _of_group(snapshot: Snapshot, entity: object) -> list[Blocker]:
@@ -168,7 +180,8 @@ def _of_group(snapshot: Snapshot, entity: object) -> list[Blocker]:
     name = name_of_activity(activity) if activity is not None else name_of_callback(holder)
     waits = ' (an `await` does not give it back)' if activity and activity.suspended else ''
     holders = () if activity is None else (activity,)
-    return [Blocker('group', f'{name} holds its callback group{waits}', holders)]
+    text = f'{name} holds its callback group{waits}'
+    return [Blocker('group', text, holders, f'the group of {name}')]
 
 
 def _of_timer(snapshot: Snapshot, node: Node, entity: object) -> list[Blocker]:
@@ -190,7 +203,7 @@ def of_clock(snapshot: Snapshot, node: Node, clock: object) -> list[Blocker]:
     if subscription is None:
         return []
     return [
-        Blocker(blocker.cause, f'its time comes from /clock, and {blocker.text}')
+        replace(blocker, text=f'its time comes from /clock, and {blocker.text}')
         for blocker in blockers(snapshot, subscription)
     ]
 
@@ -300,15 +313,17 @@ def server_enders(snapshot: Snapshot, client: object) -> list[Ender]:
     for _, server in servers:
         running = [one for one in snapshot.activities if one.entity is server]
         text, one = f'{name_of(snapshot, server)}, would answer', next(iter(running), None)
+        answers = {'name': short_name_of(server), 'does': 'would answer', 'label': 'comes from'}
         if one is None:
-            enders.append(Ender(text, tuple(blockers(snapshot, server))))
+            enders.append(Ender(text, tuple(blockers(snapshot, server)), **answers))
         else:
             place = f', at {place_of(one)}' if place_of(one) else ''
-            enders.append(Ender(text, (), f'it works on it{place}', one))
+            enders.append(Ender(text, (), f'it works on it{place}', one, **answers))
     if not servers:
         enders.append(Ender(text, (), 'it is in another process, which cannot be seen from here'))
     takes = f'{name_of(snapshot, client)} would take the answer'
-    enders.append(Ender(takes, tuple(blockers(snapshot, client))))
+    stops = tuple(blockers(snapshot, client))
+    enders.append(Ender(takes, stops, name='the client', does='would take it'))
     return enders
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from types import FrameType
 
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
@@ -19,6 +21,7 @@ from .blockers import (
     of_topic,
     place_of,
     server_enders,
+    short_name_of,
 )
 from .snapshot import Activity, Snapshot, callback_of, code_of, done_callbacks, pending
 
@@ -99,7 +102,12 @@ def enders(
 def methods_of(snapshot: Snapshot, thing: object) -> list[Ender]:
     """Return the callbacks that are methods of a thing of Python, such as `heard.append`."""
     return [
-        Ender(f'{name_of(snapshot, entity)}, would change it', _stops(snapshot, node, entity))
+        Ender(
+            f'{name_of(snapshot, entity)}, would change it',
+            _stops(snapshot, node, entity),
+            name=short_name_of(entity),
+            does='would change it',
+        )
         for node, entity in snapshot.entities()
         if thing is not reading.UNKNOWN
         and getattr(callback_of(entity), '__self__', snapshot) is thing
@@ -123,12 +131,14 @@ def _enders_of(
         if _is(change, code_of(callback_of(entity))):
             stops = _stops(snapshot, node, entity)
             runs = [one for one in snapshot.activities if one.entity is entity]
+            name = short_name_of(entity)
             if any(one is waiter for one in runs):
-                stops, runs = (_itself(waiter),), []
+                stops, runs, name = (_itself(waiter, change),), [], f'line {change.line}'
             text = f'{name_of(snapshot, entity)}, {does}'
             # What runs is the work itself: its own wait is all that can keep it.
-            result.append(_at_work(text, runs[0]) if runs else Ender(text, stops))
-    result += _done_callbacks(snapshot, change, does)
+            ender = _at_work(text, runs[0]) if runs else Ender(text, stops)
+            result.append(replace(ender, name=name, does=f'would {what}'))
+    result += _done_callbacks(snapshot, change, what)
     for activity in snapshot.activities:
         if activity.entity is not None and result:
             continue  # a callback that was found above
@@ -136,16 +146,19 @@ def _enders_of(
             if not _is(change, frame.f_code):
                 continue
             if activity is waiter:
-                if change.line > frame.f_lineno or _in_loop(frame, change.line):
+                if _comes_after(frame, change):
                     stop = Blocker(
                         'itself',
                         f'line {change.line} comes after line {frame.f_lineno}, where it waits',
+                        (waiter,),
                     )
-                    result.append(Ender(f'{name_of_activity(activity)} itself, {does}', (stop,)))
+                    text = f'{name_of_activity(activity)} itself, {does}'
+                    line = {'name': f'line {change.line}', 'does': f'would {what}'}
+                    result.append(Ender(text, (stop,), **line))
                 continue
             name = activity.thread.name if activity.thread else 'a coroutine'
             text = f'{change.name} in the thread {name}, {does}'
-            result.append(_at_work(text, activity))
+            result.append(replace(_at_work(text, activity), does=f'would {what}'))
     if result or depth == 0 or not getattr(change.function, 'name', ''):
         return result
     for filename in _files(snapshot):
@@ -164,12 +177,22 @@ def _at_work(text: str, activity: Activity) -> Ender:
     return Ender(text, (), f'it is at {place}' if place else '', activity)
 
 
-def _in_loop(frame, line: int) -> bool:
-    return any(loop.lineno <= line <= loop.end_lineno for loop in reading.loops_around(frame))
+def _comes_after(frame: FrameType, change: Change) -> bool:
+    """Return whether the line of a change comes after the one at which its function stands."""
+    loops = reading.loops_around(frame)
+    return change.line > frame.f_lineno or any(
+        loop.lineno <= change.line <= loop.end_lineno for loop in loops
+    )
 
 
-def _itself(waiter: Activity) -> Blocker:
-    return Blocker('itself', f'it is {name_of_activity(waiter)} itself that waits')
+def _itself(waiter: Activity, change: Change) -> Blocker:
+    text = f'it is {name_of_activity(waiter)} itself that waits'
+    own = (frame for frame in waiter.own if _is(change, frame.f_code))
+    # Another call of it may come to that line, unless this one keeps its group.
+    group = getattr(waiter.entity, 'callback_group', None)
+    alone = isinstance(group, MutuallyExclusiveCallbackGroup)
+    holders = (waiter,) if alone and any(_comes_after(frame, change) for frame in own) else ()
+    return Blocker('itself', text, holders)
 
 
 def _is(change: Change, code) -> bool:
@@ -186,7 +209,7 @@ def _is(change: Change, code) -> bool:
     )
 
 
-def _done_callbacks(snapshot: Snapshot, change: Change, does: str) -> list[Ender]:
+def _done_callbacks(snapshot: Snapshot, change: Change, what: str) -> list[Ender]:
     """Return the futures whose done callback is this code."""
     found = []
     for _, client in snapshot.entities():
@@ -201,8 +224,11 @@ def _done_callbacks(snapshot: Snapshot, change: Change, does: str) -> list[Ender
                     name = name_of(snapshot, client)
                     found.append(
                         Ender(
-                            f'{change.name}, when {name} has an answer, {does}',
+                            f'{change.name}, when {name} has an answer, '
+                            f'would {what} in line {change.line}',
                             tuple(dict.fromkeys(stops)),
+                            name=change.name,
+                            does=f'would {what}',
                         )
                     )
     return found

@@ -20,6 +20,7 @@ class Finding:
     limited: bool = False  # a time-out ends the wait
     loops: bool = False  # it asks again and again
     spins: bool = False  # it spins an executor meanwhile
+    short: str = ''  # `what`, where a picture has less room
 
     @property
     def stuck(self) -> bool:

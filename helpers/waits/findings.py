@@ -129,10 +129,11 @@ class Look:
             if not one.innermost or not (one is activity or inner):
                 continue
             if one in self.open:
-                return (Blocker('circle', f'it waits, too, at {place_of(one)}'),)
+                return (Blocker('circle', f'it waits, too, at {place_of(one)}', (one,)),)
             found = self.at(one)
             if found is not None and found.stuck:
-                return (Blocker('held', f'it waits for {found.what}, at {place_of(one)}'),)
+                text = f'it waits for {found.what}, at {place_of(one)}'
+                return (Blocker('held', text, (one,)),)
         return ()
 
     def _look(self, activity: Activity) -> Finding | None:
@@ -190,7 +191,8 @@ class Look:
     def rate(self, activity: Activity, frame: FrameType) -> Finding:
         timer = timer_of(frame.f_locals['self'])
         stops = blockers(self.snapshot, timer) if is_there(timer) else [_GONE]
-        ends = [Ender('its timer would wake it, which an executor must run', tuple(stops))]
+        text = 'its timer would wake it, which an executor must run'
+        ends = [Ender(text, tuple(stops), name='its timer', does='would wake it')]
         return Finding(activity, 'rate', 'the next time of a Rate', ends, True)
 
     def clock(self, activity: Activity, frame: FrameType) -> Finding:
@@ -198,7 +200,8 @@ class Look:
         nodes = [node for node in self.snapshot.nodes if node.get_clock() is clock]
         stops = [stop for node in nodes for stop in of_clock(self.snapshot, node, clock)]
         left_s = (until - clock.now()).nanoseconds / 1e9
-        ends = [Ender('the clock would reach it', tuple(stops))]
+        text = 'the clock would reach it'
+        ends = [Ender(text, tuple(stops), name='the clock', does='would reach it')]
         what = f'a time of its clock that is {left_s:.0f} s ahead'
         return Finding(activity, 'clock', what, ends, True, limited=not stops)
 
@@ -331,8 +334,8 @@ class Look:
             return Ender(text, (Blocker('spins', spins),))
         found = self.at(one)
         if found is not None and found.stuck:
-            waits = f'it waits for {found.what}, at {place}'
-            return Ender(text, (Blocker('held', waits),))
+            waits = Blocker('held', f'it waits for {found.what}, at {place}', (one,))
+            return Ender(text, (waits,), activity=one, does='would end')
         if loop := is_endless(one):
             stop = f'`{head(loop)}` in line {loop.lineno} has no end'
             return Ender(text, (Blocker('endless', stop),))
@@ -401,8 +404,9 @@ class Look:
             for one in inner:
                 found = self.at(one)
                 if found is not None and found.stuck:
-                    stops = [Blocker('held', f'it waits for {found.what}')]
-        ends = [Ender('the executor would run the task to its end', tuple(stops))]
+                    stops = [Blocker('held', f'it waits for {found.what}', (one,))]
+        text = 'the executor would run the task to its end'
+        ends = [Ender(text, tuple(stops), name='the task', does='would end')]
         return Finding(activity, 'future', 'a task of an executor', ends, True)
 
     # --- A line that waits in C
@@ -443,22 +447,25 @@ class Look:
         for other, frame in self._holders(lock):
             where = f'in line {frame.f_lineno} of {frame.f_code.co_name}()'
             if other.thread is activity.thread and not other.suspended:
-                stop = Blocker(
-                    'itself', f'it is the same thread, {where}: a Lock lets no thread in twice'
-                )
-                ends.append(Ender('who holds it would leave its `with`', (stop,)))
+                text = f'it is the same thread, {where}: a Lock lets no thread in twice'
+                stop = Blocker('itself', text, (activity,))
+                line = f'the end of the `with` in line {frame.f_lineno}'
+                text = 'who holds it would leave its `with`'
+                ends.append(Ender(text, (stop,), name=line, does='would free it'))
                 continue
             ends.append(self._leaves(other, where))
         if not ends:
             found = changes(self.snapshot, reading.last_name(expression), {'release'})
             ends = self._changers(activity, found, 'release it')
             name += '; no `with` that runs now holds it, so somebody has called acquire()'
-        return Finding(activity, 'lock', f'a lock ({name})', ends)
+        short = f'a lock ({reading.text_of(expression)})'
+        return Finding(activity, 'lock', f'a lock ({name})', ends, short=short)
 
     def _leaves(self, holder: Activity, where: str) -> Ender:
         text = f'{name_of_activity(holder)}, {where}, would leave its `with`'
         stops = self._stops(holder)
-        return Ender(text, stops, '' if stops else f'it is at {place_of(holder)}')
+        now = '' if stops else f'it is at {place_of(holder)}'
+        return Ender(text, stops, now, holder, does='holds it', label='held by')
 
     def _holders(self, lock: object) -> list[tuple[Activity, FrameType]]:
         owner = re.search(r'owner=(\d+)', repr(lock))

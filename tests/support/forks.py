@@ -1,8 +1,10 @@
 """Begin programs below `helpers.waits` at once: forks of a process that has imported ROS already.
 
-It reads lines `PROGRAM DOMAIN OUTPUT` from stdin, and prints the process ID of each.
+It reads lines `PROGRAM DOMAIN OUTPUT` from stdin, and prints the process ID of each. What a program
+says when it is asked ends with its circle as JSON.
 """
 
+import json
 import os
 import signal
 import sys
@@ -13,8 +15,17 @@ import std_srvs.srv
 import test_msgs.action
 
 import helpers.waits.__main__ as waits
+from helpers.waits import NOTHING, tell
 
 LOADED = rclpy.action, std_msgs.msg, std_srvs.srv, test_msgs.action
+
+
+def say():
+    told = tell()
+    print(told.text or NOTHING, f'Circle: {json.dumps(told.circle)}', sep='\n', flush=True)
+
+
+waits.what_to_say = lambda: say
 program = None
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody waits for them
 for line in sys.stdin:

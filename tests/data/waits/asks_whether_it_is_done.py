@@ -24,3 +24,7 @@ class Plugin(Node):
 
 rclpy.init()
 rclpy.spin(Plugin())
+
+# Arrow: step() > waits for > the answer of the service send
+# Arrow: the answer of the service send > a lambda needs > the only thread
+# Arrow: the only thread > held by > step()

@@ -24,3 +24,7 @@ executor = rclpy.executors.SingleThreadedExecutor()
 executor.add_node(camera)
 executor.add_node(Brake())
 executor.spin()
+
+# Arrow: tick() > awaits > the answer of the service look
+# Arrow: the answer of the service look > the client needs > the group of tick()
+# Arrow: the group of tick() > held by > tick()

@@ -26,3 +26,7 @@ class Checker(Node):
 
 rclpy.init()
 rclpy.spin(Checker())
+
+# Arrow: measure() > waits for > the answer of the service device
+# Arrow: the answer of the service device > device() needs > the only thread
+# Arrow: the only thread > held by > measure()

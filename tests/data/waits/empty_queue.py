@@ -30,3 +30,7 @@ rclpy.init()
 executor = MultiThreadedExecutor(3)
 executor.add_node(Printer())
 executor.spin()
+
+# Arrow: show() > waits for > something in a queue that is empty (self.lines)
+# Arrow: something in a queue that is empty (self.lines) > hear() needs > the group of show()
+# Arrow: the group of show() > held by > show()

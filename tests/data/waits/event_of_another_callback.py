@@ -28,3 +28,7 @@ class Planner(Node):
 
 rclpy.init()
 rclpy.spin(Planner())
+
+# Arrow: plan() > waits for > an Event to be set (self.has_scan)
+# Arrow: an Event to be set (self.has_scan) > scan() needs > the only thread
+# Arrow: the only thread > held by > plan()

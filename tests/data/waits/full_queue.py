@@ -24,3 +24,7 @@ class Viewer(Node):
 
 rclpy.init()
 rclpy.spin(Viewer())
+
+# Arrow: image() > waits for > room in a queue that is full (1) (self.images)
+# Arrow: room in a queue that is full (1) (self.images) > draw() needs > the only thread
+# Arrow: the only thread > held by > image()

@@ -24,3 +24,7 @@ class Patrol(Node):
 
 rclpy.init()
 rclpy.spin(Patrol())
+
+# Arrow: begin() > waits for > the answer of the action patrol
+# Arrow: the answer of the action patrol > execute() needs > the only thread
+# Arrow: the only thread > held by > begin()

@@ -32,3 +32,8 @@ rclpy.init()
 executor = MultiThreadedExecutor(4)
 executor.add_node(Robot())
 executor.spin()
+
+# Arrow: drive() > waits for > the answer of the service state
+# Arrow: the answer of the service state > comes from > state()
+# Arrow: state() > waits for > a lock (self.lock)
+# Arrow: a lock (self.lock) > held by > drive()

@@ -27,3 +27,7 @@ class Listener(Node):
 
 rclpy.init()
 rclpy.spin(Listener())
+
+# Arrow: hear() > waits for > a lock (self.lock)
+# Arrow: a lock (self.lock) > needs > line 25
+# Arrow: line 25 > comes after > hear()

@@ -26,3 +26,7 @@ class Counter(Node):
 
 rclpy.init()
 rclpy.spin(Counter())
+
+# Arrow: tick() > waits for > a lock (self.lock)
+# Arrow: a lock (self.lock) > needs > the end of the with in line 24
+# Arrow: the end of the with in line 24 > comes after > tick()

@@ -20,3 +20,7 @@ class Driver(Node):
 
 rclpy.init()
 rclpy.spin(Driver())
+
+# Arrow: drive() > waits for > the next time of a Rate
+# Arrow: the next time of a Rate > its timer needs > the only thread
+# Arrow: the only thread > held by > drive()

@@ -35,3 +35,7 @@ executor = MultiThreadedExecutor(4)
 executor.add_node(Server())
 executor.add_node(Caller())
 executor.spin()
+
+# Arrow: tick() > waits for > the answer of the service test_service
+# Arrow: the answer of the service test_service > the client needs > the group of tick()
+# Arrow: the group of tick() > held by > tick()

@@ -26,3 +26,7 @@ class Server(Node):
 
 rclpy.init()
 rclpy.spin(Server())
+
+# Arrow: execute() > waits for > the answer of the service look
+# Arrow: the answer of the service look > look() needs > the group of execute()
+# Arrow: the group of execute() > held by > execute()

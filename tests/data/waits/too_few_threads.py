@@ -29,3 +29,7 @@ for callback in (left, right):
 executor.add_node(callers)
 executor.add_node(camera)
 executor.spin()
+
+# Arrow: left() and right() > wait for > the answer of the service look
+# Arrow: the answer of the service look > a lambda needs > the 2 threads
+# Arrow: the 2 threads > held by > left() and right()

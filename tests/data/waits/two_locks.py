@@ -34,3 +34,8 @@ node.create_timer(0.1, give, callback_group=group)
 executor = MultiThreadedExecutor(2)
 executor.add_node(node)
 executor.spin()
+
+# Arrow: give() > waits for > a lock (left)
+# Arrow: a lock (left) > held by > take()
+# Arrow: take() > waits for > a lock (right)
+# Arrow: a lock (right) > held by > give()

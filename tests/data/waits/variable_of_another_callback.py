@@ -31,3 +31,7 @@ rclpy.init()
 executor = MultiThreadedExecutor(4)
 executor.add_node(Driver())
 executor.spin()
+
+# Arrow: drive() > waits for > self.distance to change
+# Arrow: self.distance to change > hear() needs > the group of drive()
+# Arrow: the group of drive() > held by > drive()
