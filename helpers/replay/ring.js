@@ -62,8 +62,9 @@ function ring() {
       const words = lines(box.name, Math.abs(Math.sin(turn)) < 0.5 ? NEAR : LETTERS);
       const [w, h] = [Math.max(...words.map(line => line.length)) * 7.3 + 16, 16 * words.length + 10];
       const x = all.length === 3 ? [85, 278, 85][i] : RING_WIDE / 2 + 105 * Math.cos(turn);
-      const inside = Math.max(w / 2 + 2, Math.min(x, RING_WIDE - w / 2 - 2));
-      return [box.id, { x: inside, y: tall / 2 + (tall - 62) / 2 * Math.sin(turn) * (all.length === 3 ? 1.15 : 1), w, h, words }];
+      const y = tall / 2 + (tall - 62) / 2 * Math.sin(turn) * (all.length === 3 ? 1.15 : 1);
+      const inside = (at, size, whole) => Math.max(size / 2 + 2, Math.min(at, whole - size / 2 - 2));
+      return [box.id, { x: inside(x, w, RING_WIDE), y: inside(y, h, tall), w, h, words }];
     }));
     const here = now.boxes.filter(({ id }) => places.has(id));
     const arrows = now.arrows.filter(({ from, to }) => places.has(from) && places.has(to));
