@@ -5,6 +5,7 @@ import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from helpers.waits_view import Circle
+from tools.lessons.clean import NOTEBOOK_METADATA
 
 # Two threads take two locks, each in another order.
 SOURCE = """import threading
@@ -76,7 +77,8 @@ def test_names_of_any_length_stand_in_boxes_inside_of_the_picture(phone, many):
 
 def test_in_jupyterlab(lab):
     path = lab.server.folder / 'notebooks' / '98_hang.ipynb'
-    nbformat.write(new_notebook(cells=[new_markdown_cell('# 98'), new_code_cell(SOURCE)]), path)
+    cells = [new_markdown_cell('# 98'), new_code_cell(SOURCE)]
+    nbformat.write(new_notebook(cells=cells, metadata=NOTEBOOK_METADATA), path)
     lab.open(path.name)
     lab.run(1)
     cell = lab.show(1)
