@@ -37,8 +37,9 @@ function placesOf(boxes, high) {
     const words = lines(box.name, Math.abs(Math.sin(turn)) < 0.5 ? NEAR : LETTERS);
     const [w, h] = [Math.max(...words.map(line => line.length)) * 7.3 + 16, 16 * words.length + 10];
     const x = three ? [85, 278, 85][i] : RING_WIDE / 2 + 105 * Math.cos(turn);
-    const inside = Math.max(w / 2 + 2, Math.min(x, RING_WIDE - w / 2 - 2));
-    return [box.id, { x: inside, y: high / 2 + (high - 62) / 2 * Math.sin(turn) * (three ? 1.15 : 1), w, h, words }];
+    const y = high / 2 + (high - 62) / 2 * Math.sin(turn) * (three ? 1.15 : 1);
+    const inside = (at, size, whole) => Math.max(size / 2 + 2, Math.min(at, whole - size / 2 - 2));
+    return [box.id, { x: inside(x, w, RING_WIDE), y: inside(y, h, high), w, h, words }];
   }));
 }
 
