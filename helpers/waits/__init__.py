@@ -26,7 +26,6 @@ __all__ = [
     'find_waits',
     'tell',
     'tell_interrupt',
-    'what_waits',
 ]
 
 MOST = 3
@@ -87,13 +86,3 @@ def _told(findings: list[Finding]) -> Told:
     if len(findings) > MOST:
         lines.append(f'{len(findings) - MOST} more wait.')
     return Told('\n'.join(lines), turns)
-
-
-def what_waits() -> None:
-    """Print what waits in this process, for what, why it does not come, and what would help.
-
-    While a cell hangs, ask from a console of a subshell (in JupyterLab a right click on the
-    notebook, *New Subshell Console for Notebook*), or in a terminal with
-    `python -m helpers.waits --kernel`.
-    """
-    print(explain() or NOTHING)
