@@ -67,7 +67,8 @@ export function drive(record, root) {
     const now = latest(scans, ms);
     return {
       ...pose(ms), till: Math.floor(reached(ms)), fan: fan(now), old: taken === now ? '' : fan(taken), was: taken && pose(seen), age: taken && (till - seen) / 1000,
-      told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}, ${seconds(command[4])} s old`) : 'nothing yet',
+      // The one age that is shown is that of the ghost.
+      told: command ? speed(command) + (command[3] < 0 ? '' : `, by message ${command[3]}`) : 'nothing yet',
     };
   }
 
