@@ -40,7 +40,15 @@ PRIVATE = re.compile(r'_[a-zA-Z]\w*')
 COMMENT = re.compile(r'# private: (?P<owner>.+), (?P<version>\S+ [\d.]+)')
 # Documented by Python and IPython; and texts that only look like names.
 NO_SECRETS = {
-    *('_asdict', '_config', '_exit_code', '_fields', '_pose_rejection_threshold', '_session_log'),
+    *(
+        '_asdict',
+        '_config',
+        '_exit',
+        '_exit_code',
+        '_fields',
+        '_pose_rejection_threshold',
+        '_session_log',
+    ),
 }
 
 
