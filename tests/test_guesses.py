@@ -180,12 +180,12 @@ def test_a_wrong_form_is_said_at_once(capsys, on, typed, why):
 def test_a_point_is_typed_in_any_form(capsys, typed):
     made, printed = asked(capsys, typed, **POINT)
     assert made.value == [1.5, -0.5]
-    assert printed.endswith('You say: it is 1.50 m ahead of the robot, 0.50 m to its right.\n')
+    assert printed.endswith('You say: it is 1.50 m ahead of the start, 0.50 m to its right.\n')
 
 
 def test_two_numbers_are_a_point_too():
-    assert guess(END, 2, 0, **POINT).said() == 'it is 2.00 m ahead of the robot.'
-    assert guess(END, '0,0', **POINT).said() == 'it is where the robot is.'
+    assert guess(END, 2, 0, **POINT).said() == 'it is 2.00 m ahead of the start.'
+    assert guess(END, '0,0', **POINT).said() == 'it is where the robot starts.'
     assert guess(END, '2,1', **POINT).value == [2.0, 1.0]
 
 
@@ -250,7 +250,7 @@ def test_the_gap_to_a_drive_is_one_sentence(capsys, typed, record, said):
     assert capsys.readouterr().out.splitlines()[-1].strip() == said
 
 
-SIDE = 'It is 2.00 m ahead of the robot, 1.00 m to its right'
+SIDE = 'It is 2.00 m ahead of the start, 1.00 m to its right'
 
 
 @pytest.mark.parametrize(
@@ -300,10 +300,10 @@ def test_without_a_student_the_answer_is_words_that_never_move(capsys, monkeypat
 @pytest.mark.parametrize(
     ('end', 'said'),
     [
-        ((2.0, -1.0), 'ahead of the robot, to its right'),
-        ((-2.0, 0.2), 'behind the robot'),
+        ((2.0, -1.0), 'ahead of the start, to its right'),
+        ((-2.0, 0.2), 'behind the start'),
         ((0.1, 1.0), 'to its left'),
-        ((0.1, 0.2), 'where the robot is'),
+        ((0.1, 0.2), 'where the robot starts'),
     ],
 )
 def test_without_a_student_a_point_is_on_a_side_of_the_robot(capsys, monkeypatch, end, said):

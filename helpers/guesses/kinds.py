@@ -199,7 +199,7 @@ class Ticks(Options):
 
     @property
     def asks(self) -> str:
-        return 'Tick the cells of which you expect it.'
+        return 'Tick each cell in which you expect it.'
 
     def record(self) -> dict:
         names = [*self.values]

@@ -32,7 +32,7 @@ const rowsKind = (() => {
     let node;
     const { names } = rows[0];
     const alike = rows.every(one => `${one.names}` === `${names}`);
-    if (alike && (!matchMedia('(max-width: 600px)').matches || names.join('').length < 12)) {
+    if (alike && (!matchMedia('(max-width: 600px)').matches || (names.length < 6 && names.join('').length < 12))) {
       const head = element('tr', { 'aria-hidden': 'true' }, element('td'), ...names.map(name => element('th', {}, name)));
       const body = rows.map(({ name }, i) => {
         const cells = [...shown[i].node.children].map(button => element('td', { role: 'presentation' }, optionsKind.bare(button)));

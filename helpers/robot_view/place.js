@@ -43,9 +43,9 @@ const placeKind = (() => {
   };
 
   const words = ([x, y]) => {
-    const ahead = Math.abs(x) >= 0.005 && `${Math.abs(x).toFixed(2)} m ${x > 0 ? 'ahead of' : 'behind'} the robot`;
-    const side = Math.abs(y) >= 0.005 && `${Math.abs(y).toFixed(2)} m to ${ahead ? 'its' : "the robot's"} ${y > 0 ? 'left' : 'right'}`;
-    return [ahead, side].filter(Boolean).join(', ') || 'where the robot is';
+    const ahead = Math.abs(x) >= 0.005 && `${Math.abs(x).toFixed(2)} m ${x > 0 ? 'ahead of' : 'behind'} the start`;
+    const side = Math.abs(y) >= 0.005 && `${Math.abs(y).toFixed(2)} m to ${ahead ? 'its' : "the start's"} ${y > 0 ? 'left' : 'right'}`;
+    return [ahead, side].filter(Boolean).join(', ') || 'where the robot starts';
   };
 
   // On a plane a value is [x, y] (m), as the robot sees it from its start.
@@ -60,7 +60,7 @@ const placeKind = (() => {
       const [x, y] = onFloor(record, value);
       return fromRobot(record, [clamp(x, left, right), clamp(y, low, high)]).map(round);
     },
-    slider: (record, [x]) => ({ 'aria-label': 'Your point: metres from the robot', 'aria-valuenow': x.toFixed(2) }),
+    slider: (record, [x]) => ({ 'aria-label': 'Your point: metres from the start', 'aria-valuenow': x.toFixed(2) }),
     key(record, key, value) {
       if (key === 'Home') return [0, 0];
       const step = { ArrowRight: [STEP, 0], ArrowUp: [0, STEP], ArrowLeft: [-STEP, 0], ArrowDown: [0, -STEP] }[key];
@@ -162,7 +162,13 @@ const placeKind = (() => {
 
     function put(value) {
       now = value;
-      at(you, along(value ?? kind.unset(record)));
+      const where = along(value ?? kind.unset(record));
+      at(you, where);
+      if (record.plane) { // its word stays inside the floor
+        const isLow = where[1] - record.plane[1] < 40 / scale;
+        name.setAttribute('y', isLow ? -16 : 12);
+        name.setAttribute('dy', isLow ? 0 : '1em');
+      }
       name.textContent = value === null ? 'you?' : 'you';
       you.style.display = value === null && record.outcome ? 'none' : '';
     }

@@ -134,7 +134,7 @@ class Point:
     axis = None
     asks = 'Put your point on the floor: click there, drag it, or press the arrow keys.'
     forms = (
-        'Typed in place of the dots: (x, y) in metres from the robot, x ahead and y to its left, '
+        'Typed in place of the dots: (x, y) in metres from the start, x ahead and y to its left, '
         'such as (1.5, -0.5).'
     )
 
@@ -217,14 +217,14 @@ class Point:
         }
 
     def answer(self, outcome: Mapping) -> str:
-        """Return on which side of the robot it is: that is the same in each run."""
+        """Return on which side of the start it is: that is the same in each run."""
         x, y = outcome['at']
         far = max(outcome['tolerance'], RADIUS_M)
         sides = [
-            'ahead of the robot' if x > far else 'behind the robot' if x < -far else '',
+            'ahead of the start' if x > far else 'behind the start' if x < -far else '',
             'to its left' if y > far else 'to its right' if y < -far else '',
         ]
-        return ', '.join(filter(None, sides)) or 'where the robot is'
+        return ', '.join(filter(None, sides)) or 'where the robot starts'
 
 
 def _are_two(found: object) -> bool:

@@ -176,15 +176,15 @@ def test_a_point_on_a_floor_by_keys(phone, artefacts):
     assert group(page, POINT).get_by_text('GPS', exact=True).is_visible()
     point.focus()
     page.keyboard.press('Home')
-    assert says(page, POINT) == 'You say: it is where the robot is.'
+    assert says(page, POINT) == 'You say: it is where the robot starts.'
     for key in ['ArrowRight'] * 4 + ['ArrowDown'] * 2 + ['ArrowUp'] * 3:
         page.keyboard.press(key)
-    said = 'it is 0.20 m ahead of the robot, 0.05 m to its left.'
+    said = 'it is 0.20 m ahead of the start, 0.05 m to its left.'
     assert says(page, POINT) == f'You say: {said}'
     assert point.get_attribute('aria-valuetext') == said
     for _ in range(40):
         page.keyboard.press('ArrowLeft')  # not beyond the wall
-    assert says(page, POINT) == 'You say: it is 0.90 m behind the robot, 0.05 m to its left.'
+    assert says(page, POINT) == 'You say: it is 0.90 m behind the start, 0.05 m to its left.'
     page.wait_for_function("() => localStorage.getItem('guess: Where is it?') === '[-0.9,0.05]'")
     assert not page.evaluate(WIDER)
     page.screenshot(path=artefacts / 'guess_point.png', full_page=True)
@@ -193,7 +193,7 @@ def test_a_point_on_a_floor_by_keys(phone, artefacts):
     page = phone(Gap(POINT, out))
     page.evaluate("() => localStorage.setItem('guess: Where is it?', '[2.0, 0.0]')")
     page.reload()
-    answer = 'It is 2.17 m ahead of the robot, 1.25 m to its right'
+    answer = 'It is 2.17 m ahead of the start, 1.25 m to its right'
     assert says(page, POINT) == f'{answer}: 1.26 m from your point.'
     assert group(page, POINT).locator('.gap').get_attribute('d')
     assert group(page, POINT).locator('.came-path').get_attribute('d') == 'M1.250 1.750L3.420 0.500'

@@ -35,7 +35,12 @@ PHOTOGRAPH = re.compile(r'data:image/png;base64,([^"]*)')
 
 # What each lesson shows first. What a learner guesses is not told.
 FIRST = {
-    'publish_and_subscribe': partial(drive_picture, cell_id='drive-the-square'),
+    'publish_and_subscribe': partial(
+        drive_picture,
+        cell_id='drive-the-square',
+        around_m=(2.2, 0.4),
+        asks='Which messages make it drive this square?',
+    ),
     'lose_messages': partial(queue_picture, cell_id='step-through-run'),
     'run_callbacks_in_parallel': partial(
         threads_picture, cell_id='step-c-and-d-run', name='D', seconds=1.0
@@ -43,7 +48,13 @@ FIRST = {
     'choose_the_number_of_threads': partial(gate_picture, cell_id='lesson-04-11'),
     'keep_what_is_fresh': one_brake_picture,
     'call_a_service_from_a_callback': partial(call_picture, cell_id='drive-deadlock'),
-    'run_a_long_job': partial(drive_picture, cell_id='lesson-07-19', share=0.5),
+    'run_a_long_job': partial(
+        drive_picture,
+        cell_id='lesson-07-19',
+        share=0.5,
+        around_m=(9.0, 0.35),
+        asks='Here the drive is canceled. What must your program do?',
+    ),
     'set_parameters': partial(
         command_picture,
         cell_id='drive-15',
@@ -61,7 +72,12 @@ FIRST = {
             ('nodes-08', '/'),
         ],
     ),
-    'bring_in_a_package': partial(drive_picture, cell_id='l09-careful'),
+    'bring_in_a_package': partial(
+        drive_picture,
+        cell_id='l09-careful',
+        around_m=(1.6, 0.7),
+        asks='Whose code drives this robot?',
+    ),
     'use_a_message_in_your_own_interface': partial(
         camera_picture, cell_id='lesson-10-45', degrees=[0, 45, 90, 135]
     ),
@@ -110,7 +126,13 @@ FIRST = {
         cells={'ada': 'drive-ada', 'bo': 'take-bo', 'cleo': 'take-cleo', 'dan': 'take-dan'},
     ),
     'build_a_robot_program': partial(drive_picture, cell_id='project-082'),
-    'put_a_program_on_a_robot': partial(drive_picture, cell_id='crash-run', share=0.4),
+    'put_a_program_on_a_robot': partial(
+        drive_picture,
+        cell_id='crash-run',
+        share=0.4,
+        around_m=(9.0, 0.35),
+        asks='Here its program is killed. What stops the robot?',
+    ),
 }
 
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 from helpers.lesson import Lesson
 from tools.lessons.first_pictures.look import (
     PLAYS_S,
+    WIDTH,
     colour,
     output_of,
     percent,
@@ -16,10 +17,20 @@ from tools.lessons.first_pictures.look import (
 )
 
 TRAIL = 2.6  # pixels
+BAND = 44  # pixels, below the floor, for a line of text
 
 
-def drive_picture(lesson: Lesson, cell_id: str, share: float = 1) -> str:
-    """Return a saved drive, a share of its way. Its end is not told before it happens."""
+def drive_picture(
+    lesson: Lesson,
+    cell_id: str,
+    share: float = 1,
+    around_m: tuple[float, float] | None = None,
+    asks: str = '',
+) -> str:
+    """Return a saved drive, a share of its way. Its end is not told before it happens.
+
+    With `around_m` it shows only the floor so far (x, y in m) beside the way, and below it `asks`.
+    """
     page = output_of(lesson, cell_id)
     svg, run = svg_of(page), runs_of(page)[0]
     last = int(share * (len(run['poses']) - 1))
@@ -42,6 +53,9 @@ def drive_picture(lesson: Lesson, cell_id: str, share: float = 1) -> str:
             trail += f'{when}{{stroke-dashoffset:{1 - far[i] / far[-1]:.3f}}}'
     bump_s = PLAYS_S * min(1, run['bumps'][0] / 1000 / run['step'] / last) if run['bumps'] else 0
     scale = float(re.search(r'scale\(([\d.]+) ', svg)[1])
+    if around_m:
+        svg, zoom = _cropped(svg, poses, around_m, asks)
+        scale *= zoom
     svg = re.sub(r"<path[^>]* class='driven'[^>]*/>", '', svg)
     svg = svg.replace(" class='all'", " class='all' pathLength='1'")
     style = (
@@ -57,3 +71,33 @@ def drive_picture(lesson: Lesson, cell_id: str, share: float = 1) -> str:
         '@media(prefers-reduced-motion:reduce){svg *{animation:none!important}}'
     )
     return styled(svg, style)
+
+
+def _cropped(svg: str, poses: list, around_m: tuple[float, float], asks: str) -> tuple[str, float]:
+    """Return the part of a floor around a way, with a line of text, and how much larger it is."""
+    wide, high = map(float, re.search(r"viewBox='0 0 ([\d.]+) ([\d.]+)'", svg).groups())
+    dx, dy, scale = map(
+        float, re.search(r'translate\(([-\d.]+) ([-\d.]+)\) scale\(([\d.]+) ', svg).groups()
+    )
+    (x_m, y_m), xs, ys = around_m, [pose[0] for pose in poses], [pose[1] for pose in poses]
+    left, right = max(0, dx + scale * (min(xs) - x_m)), min(wide, dx + scale * (max(xs) + x_m))
+    top, low = max(0, dy - scale * (max(ys) + y_m)), min(high, dy - scale * (min(ys) - y_m))
+    zoom = WIDTH / (right - left)
+    band = BAND / zoom
+    frame = (
+        f"viewBox='{left:.1f} {top:.1f} {right - left:.1f} {low - top + band:.1f}' "
+        f"width='{WIDTH}' height='{zoom * (low - top) + BAND:.0f}'"
+    )
+    svg = re.sub(r"viewBox='[^']*' width='[^']*' height='[^']*'", frame, svg)
+    # What lies below the part must not be seen behind the text.
+    inside = (
+        f"<clipPath id='part'><path d='M{left:.1f} {top:.1f}H{right:.1f}V{low:.1f}H{left:.1f}z'/>"
+        f'</clipPath><style>.asks{{font-size:{19 / zoom:.2f}px;fill:currentColor;font-weight:bold}}'
+        f'@media(max-width:560px){{.asks{{font-size:{30 / zoom:.2f}px}}}}</style>'
+        "<g clip-path='url(#part)'>"
+    )
+    line = (
+        f"</g><text class='asks' x='{left + 6 / zoom:.2f}' y='{low + 0.7 * band:.2f}'>{asks}</text>"
+    )
+    start = svg.index('>') + 1
+    return f'{svg[:start]}{inside}{svg[start:].replace("</svg>", f"{line}</svg>")}', zoom
