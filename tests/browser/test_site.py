@@ -134,7 +134,7 @@ def test_a_guess_comes_before_its_answer(file_page):
         assert not explains.is_visible()
         answer.locator('summary').click()
         assert explains.is_visible()
-        assert 'The answer is no.' in answer.inner_text()
+        assert 'The answer is in the wall.' in answer.inner_text()
 
 
 def test_questions_from_memory_need_no_kernel(file_page):

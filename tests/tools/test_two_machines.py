@@ -11,7 +11,11 @@ from collections.abc import Iterator
 import pytest
 from support.waits import START_LIMIT_S, wait_for
 
-MACHINES = {'ros2-one': '192.0.2.1', 'ros2-two': '192.0.2.2'}  # reserved for documentation
+# Each worker of pytest has two of its own; their addresses are reserved for documentation.
+MACHINES = {
+    f'ros2-{name}-{os.getpid()}': f'192.0.2.{number}'
+    for number, name in enumerate(('one', 'two'), 1)
+}
 ONE, TWO = MACHINES
 # With shared memory of its own: otherwise Fast DDS would take both for one machine. It is held by a
 # process that ends with its input.
