@@ -1,5 +1,7 @@
 """Guesses that one makes in a picture: by keys, with a finger, in JupyterLab and without it."""
 
+import re
+
 import nbformat
 import pytest
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
@@ -288,3 +290,31 @@ def test_the_drive_goes_through_it_in_jupyterlab(lab):
     shown.focus()
     page.keyboard.press('Home')
     assert not shown.locator('.gap').get_attribute('d')
+
+
+POINT_ASK = """from helpers.checks import compare_prediction, guess
+from helpers.robot import ROOMS
+my_point = guess('Where does the beam end?', ..., on=ROOMS, point=True)"""
+POINT_CAME = "compare_prediction('Where does the beam end?', my_point, [(0, 0), (2.2, -1.2)])"
+
+
+def test_a_point_is_put_and_answered_in_jupyterlab(lab):
+    cells = [new_markdown_cell('# 96 Guess'), new_code_cell(POINT_ASK), new_code_cell(POINT_CAME)]
+    path = lab.server.folder / 'notebooks' / '96_guess.ipynb'
+    nbformat.write(new_notebook(cells=cells, metadata=NOTEBOOK_METADATA), path)
+    lab.open(path.name)
+    page = lab.page
+    lab.run(1)
+    lab.show(1)
+    floor = page.locator('.guess svg').bounding_box()
+    page.mouse.click(floor['x'] + 0.5 * floor['width'], floor['y'] + 0.5 * floor['height'])
+    page.keyboard.press('ArrowRight')
+    said = page.locator('.guess-says').inner_text()
+    assert re.fullmatch(r'You say: it is \d\.\d\d m ahead of the start, .* left\.', said)
+    page.wait_for_function("""() => document.querySelector('.guess-line input').value !== ''""")
+    lab.screenshot('guess_point_lab')
+    assert said in lab.run(2)
+    assert 'It is 2.20 m ahead of the start, 1.20 m to its right' in printed(lab.cells()[2])
+    lab.show(2)
+    assert page.locator('.guess .came-path').last.get_attribute('d')
+    lab.screenshot('guess_point_lab_came')
