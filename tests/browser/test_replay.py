@@ -196,20 +196,12 @@ def test_in_jupyterlab(lab, axe, prediction):
     lab.page.add_script_tag(path=axe)
     # JupyterLab's body has no height: for axe, nothing in it can be seen.
     lab.page.add_style_tag(content='body { height: 100vh }')
-    for theme, is_light in (('Dark', 'false'), ('Light', 'true')):
-        lab.page.evaluate(
-            "theme => window.jupyterapp.commands.execute('apputils:change-theme', { theme })",
-            f'JupyterLab {theme}',
-        )
-        lab.page.wait_for_function(
-            'is_light => document.body.dataset.jpThemeLight === is_light', arg=is_light
-        )
-        lab.page.wait_for_selector('#jupyterlab-splash', state='detached')
+    for theme in lab.themes():
         shown.evaluate('shown => shown.scrollIntoView()')  # what is covered has no contrast
         pale, clear = lab.page.evaluate(CONTRAST)
         assert pale == []
         assert any(PUSHED_OUT in text for text in clear)
-        lab.screenshot(f'replay_{theme.lower()}')
+        lab.screenshot(f'replay_{theme}')
     # A notebook that this server has saved is trusted when it is opened again, if all was run here.
     lab.page.evaluate(f'() => {PANEL}.content.model.sharedModel.deleteCell({saved})')
     lab.page.evaluate(f'() => {PANEL}.context.save()')

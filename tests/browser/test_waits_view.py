@@ -85,19 +85,11 @@ def test_in_jupyterlab(lab):
     assert 'take() waits for a lock (right)' in cell.inner_text()
     drawn = lab.page.locator('.ring svg')
     assert drawn.get_attribute('aria-label') == SAYS
-    for theme, is_light in (('Dark', 'false'), ('Light', 'true')):
-        lab.page.evaluate(
-            "theme => window.jupyterapp.commands.execute('apputils:change-theme', { theme })",
-            f'JupyterLab {theme}',
-        )
-        lab.page.wait_for_function(
-            'is_light => document.body.dataset.jpThemeLight === is_light', arg=is_light
-        )
-        lab.page.wait_for_selector('#jupyterlab-splash', state='detached')
+    for theme in lab.themes():
         drawn.scroll_into_view_if_needed()
         ink, paper = (
             lab.page.evaluate('name => getComputedStyle(document.querySelector(name)).color', one)
             for one in ('.ring text', '.jp-RenderedHTMLCommon')
         )
         assert ink == paper  # its letters are those of the page
-        lab.screenshot(f'circle_{theme.lower()}')
+        lab.screenshot(f'circle_{theme}')

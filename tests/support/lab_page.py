@@ -6,6 +6,7 @@ a cell has run, a slide is shown. `window.jupyterapp` gives them (--LabApp.expos
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -135,6 +136,19 @@ class LabPage:
             f'before => {PANEL}.content.activeCellIndex !== before', arg=before
         )
         return self.active()
+
+    def themes(self) -> Iterator[str]:
+        """Yield 'dark', then 'light', when the page has this theme."""
+        for theme, is_light in (('Dark', 'false'), ('Light', 'true')):
+            self.page.evaluate(
+                "theme => window.jupyterapp.commands.execute('apputils:change-theme', { theme })",
+                f'JupyterLab {theme}',
+            )
+            self.page.wait_for_function(
+                'is_light => document.body.dataset.jpThemeLight === is_light', arg=is_light
+            )
+            self.page.wait_for_selector('#jupyterlab-splash', state='detached')
+            yield theme.lower()
 
     # What a test keeps
 
