@@ -137,17 +137,12 @@ def kept_guess(question: str, kind: str) -> object:
         with suppress(ValueError, TypeError, IndexError):
             _, lesson, text = line.split(' ', 2)
             asked, *rest = json.loads(text)
-            if (
-                asked == question
-                and rest[0] == kind
-                and here in (lesson, _home_of(lesson, question))
-            ):
+            if (asked, rest[0]) != (question, kind):
+                continue
+            # To look where a question has moved reads all lessons.
+            if lesson == here or home_of_guess(lesson, question, outlines(folder())) == here:
                 found = rest[1]
     return found
-
-
-def _home_of(lesson: str, question: str) -> str:
-    return home_of_guess(lesson, question, outlines(folder()))
 
 
 def keep_gap(record: Mapping) -> None:

@@ -149,8 +149,8 @@ class Drive:
         because = ''
         if (acted := self.acted_on()) is not None:
             because = f'the scan was {acted[0]:.1f} s old.'
-        elif self.held_s is not None:
-            because = f'the callback had not returned for {self.held_s:.1f} s.'
+        elif (held_s := self.held_s) is not None:
+            because = f'the callback had not returned for {held_s:.1f} s.'
         return f'{what.partition(" after ")[0].rstrip(".")}: {because}' if because else what
 
     @property
@@ -227,9 +227,9 @@ class Drive:
         if (acted := self.acted_on()) is not None:
             did = 'acted' if hit else 'braked'
             cause = f'It {did} on a scan that was {_times(*acted, "s old")}'
-        elif self.held_s is not None:
+        elif (held_s := self.held_s) is not None:
             speed = next(row.v for row in reversed(self.record_.poses) if row.v)
-            cause = f'The callback had not returned for {_times(self.held_s, speed)}'
+            cause = f'The callback had not returned for {_times(held_s, speed)}'
         elif (late := self.late_s()) is not None:
             cause = f'After the last command it drove on for {_times(*late)}'
         at = RADIUS_M if hit else round(guessed.distance_m(x, y), 2)
