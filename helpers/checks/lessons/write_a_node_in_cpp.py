@@ -293,7 +293,8 @@ def its_cmakelists(workspace):
 
 # What the student's brake commands, scan by scan: it runs in our program, so only we let it go on.
 # What it commands while it handles a scan is the answer, all else is its timer's. A line that
-# begins with @ says: after how many ms, what has come, the speeds.
+# begins with @ says: after how many ms, what has come, the speeds. On a busy machine, a new scan
+# may be old before its turn comes: then it is `late`, is not judged, and another one is shown.
 TRY_BRAKE = """#define _GLIBCXX_ASSERTIONS
 #define main main_of_the_student
 #include "brake.cpp"
@@ -303,6 +304,8 @@ TRY_BRAKE = """#define _GLIBCXX_ASSERTIONS
 #include <iostream>
 #include <memory>
 #include <string>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 using Steady = std::chrono::steady_clock;
@@ -342,7 +345,7 @@ int main(int argc, char ** argv)
       std::cout << std::endl;
       speeds.clear();
     };
-  const auto show = [&](double wall, double age_s, int times) {
+  const auto show_once = [&](double wall, double age_s, int times, bool may_be_late) {
       sensor_msgs::msg::LaserScan scan;
       scan.range_min = 0.1;
       scan.range_max = 3.5;
@@ -358,10 +361,19 @@ int main(int argc, char ** argv)
       say("timer");
       last_scan = Steady::now();
       int handled = handle(ready);
-      say(std::to_string(wall), true);
+      const bool has_aged = brake->now().nanoseconds() - stamp_ns > 400'000'000;
+      const bool is_late = may_be_late && age_s < 0.4 && has_aged;
+      say(is_late ? "late" : std::to_string(wall), true);
       while ((ready = brake->wait()).size() > 0) {
         handled += handle(ready);
         last_scan = Steady::now();
+      }
+      return std::pair{handled, is_late};
+    };
+  const auto show = [&](double wall, double age_s, int times) {
+      auto [handled, is_late] = show_once(wall, age_s, times, true);
+      for (int left = 9; is_late && left > 0; --left) {
+        std::tie(handled, is_late) = show_once(wall, age_s, times, left > 1);
       }
       return handled;
     };
@@ -404,7 +416,7 @@ class Tried:
         """Return what it commanded for each scan of a part. Raises Failed if it ended before."""
         if part not in self.parts:
             raise Failed(f'of no known beam {READS_EMPTY}' if self.reads_empty else 'it ended')
-        return [speeds for _, what, speeds in self.parts[part] if what != 'timer']
+        return [speeds for _, what, speeds in self.parts[part] if what not in ('timer', 'late')]
 
     def of_timer(self, part):
         """Return pairs of the ms since the last scan and what it commanded beside its answers."""
@@ -455,18 +467,26 @@ def a_node_of_your_own(workspace):
         again = [speed for speeds in tried().answers('silence') for speed in speeds]
         return expect(again, [0.5], 'scans come again: its speed (m/s) is')
 
-    def stops_at_ctrl_c():
-        runs()
+    def send_ctrl_c():
+        """Return whether the program ends at Ctrl+C, and the last speed that we have heard."""
         with Bench() as bench, Program(workspace.run('brake', 'brake')) as brake:
             commands = bench.hear('cmd_vel', Twist, RELIABLE)
             meet(bench, brake, 'cmd_vel')
             show(bench, brake, 3, lambda: last(commands) == 0.5)
-            if not brake.end(limit_s=STOP_S):
-                return 'Ctrl+C does not end it'
-            bench.wait(lambda: last(commands) == 0.0, STOP_S)
+            has_ended = brake.end(limit_s=STOP_S)
+            bench.wait(lambda: last(commands) == 0.0, STOP_S if has_ended else 0)
+            return has_ended, last(commands)
+
+    def stops_at_ctrl_c():
+        runs()
+        has_ended, speed = send_ctrl_c()
+        if not has_ended:  # a right program may hang, too, but seldom: tools/UPGRADING.md, Fast DDS
+            has_ended, speed = send_ctrl_c()
+        if not has_ended:
+            return 'Ctrl+C does not end it'
         if 'shutdown' not in code_of(workspace, 'src/brake/src/brake.cpp'):
             return 'main ends without shutdown()'
-        return expect(last(commands), 0.0, 'the last speed (m/s) that the robot hears is')
+        return expect(speed, 0.0, 'the last speed (m/s) that the robot hears is')
 
     def is_called_brake():
         names = runs()
