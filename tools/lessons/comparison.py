@@ -35,11 +35,15 @@ NOT_COMPARED = {
 class NamedCell(IPyNbCell):
     """A cell that a report calls as the rules do, and not by its number."""
 
+    unexpected = ()
+
     def reportinfo(self) -> tuple:
         return self.path, 0, f'{self.path.name}::{self.name}'
 
     def repr_failure(self, excinfo: object) -> str:
-        return super().repr_failure(excinfo).replace(f'Cell {self.cell_num}: ', f'{self.name}: ', 1)
+        """Begin with what the cell says now and did not say: pytest's last lines have this line."""
+        said = super().repr_failure(excinfo).replace(f'Cell {self.cell_num}: ', f'{self.name}: ', 1)
+        return '\n'.join([' | '.join(self.unexpected), said] if self.unexpected else [said])
 
     def compare_outputs(self, test: list, ref: list, skip_compare: object = None) -> bool:
         """Compare as nbval does. If they differ, say all that the cell has printed, too."""
@@ -47,6 +51,8 @@ class NamedCell(IPyNbCell):
         if not same:
             printed = [output['text'] for output in test if output.get('output_type') == 'stream']
             self.comparison_traceback.append(f'All that it has printed: {"".join(printed)!r}')
+            expected = _lines(ref)
+            self.unexpected = [line for line in _lines(test) if line not in expected]
         return same
 
 
@@ -55,6 +61,11 @@ def masked(text: str) -> str:
     for pattern, replacement in get_sanitize_patterns(MASKS.read_text(encoding='utf-8')):
         text = re.sub(pattern, replacement, text)
     return text
+
+
+def _lines(outputs: list[NotebookNode]) -> list[str]:
+    texts = [each.get('text') or each.get('data', {}).get('text/plain', '') for each in outputs]
+    return masked('\n'.join(texts)).splitlines()
 
 
 def compared(outputs: list[NotebookNode]) -> dict[str, list]:
