@@ -81,7 +81,7 @@ lint: set_up ## check style and format with ruff
 test-ros2: set_up ## test the `ros2` command
 	@$(PYTHON) -m pytest -n 2 --dist loadscope --max-worker-restart 0 -o faulthandler_timeout=600 ros2 $(PYTEST_ARGS)
 
-test-tools: set_up ## test an installation from nothing, a new lesson, two machines
+test-tools: set_up ## test an installation from nothing, a new lesson, two machines, the rules of wrong answers
 	@$(PYTHON) -m pytest -n 2 $(slow) tests/tools $(PYTEST_ARGS)
 
 test-packages: set_up ## build and test the packages that learners end with: LESSON="09 12"
