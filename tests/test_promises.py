@@ -1,8 +1,10 @@
 """What the documents promise, and no other test tries: links, commands, numbers, licences."""
 
+import ast
 import re
 import subprocess
-from importlib.metadata import PackageNotFoundError, metadata
+import tomllib
+from importlib.metadata import PackageNotFoundError, metadata, packages_distributions
 
 import pytest
 import yaml
@@ -155,3 +157,26 @@ def test_packages_with_copyleft_are_named():
     said = re.search(r'stay beside the package\. (.*?) have copyleft', ENVIRONMENT, re.S)[1]
     # empy names its licence in its source only; docutils has a file under GPL, but not its wheel.
     assert set(re.findall(r'`([^`]+)`', said)) - {'empy'} == copyleft - {'docutils'}
+
+
+def test_pyproject_asks_for_each_package_that_is_imported():
+    """Beside the messages of ROS, which rclpy brings."""
+    project = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))
+    asked = [
+        *project['project']['dependencies'],
+        *project['project']['optional-dependencies']['ros'],
+        *(words for group in project['dependency-groups'].values() for words in group),
+    ]
+    asked = {re.split(r'[^\w-]', words)[0] for words in asked}
+    imported = set()
+    for room in ('helpers', 'classroom', 'tools', 'tests'):
+        for path in (ROOT / room).rglob('*.py'):
+            for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+                if isinstance(node, ast.Import):
+                    imported |= {name.name.partition('.')[0] for name in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    imported.add(node.module.partition('.')[0])
+    brought = packages_distributions()
+    names = [name for module in imported for name in brought.get(module, [])[:1]]
+    needed = {name.lower().replace('_', '-') for name in names}
+    assert sorted(name for name in needed - asked if not name.startswith('ros-')) == []
