@@ -34,6 +34,7 @@ import pytest
 from nbformat.v4 import new_code_cell
 from support.leftovers import processes_that_stay
 
+from helpers.checks.verdict import KEY
 from helpers.lesson import ROOT
 from tools.lessons.comparison import IPyNbFile, NamedCell, RunningKernel
 
@@ -53,7 +54,10 @@ SHORTEST_S, LONGEST_S = 0.001, 10.0
 ANSWER_TIMEOUT_S = 60.0  # of a kernel that is alive, on a busy machine
 REPLY_S = 0.2  # after its 'idle', a kernel's reply to the same message is there
 # From the second try on, the check of an exercise also prints hints. A fresh run has none.
-HINTS = re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE)
+HINTS = {
+    'text/plain': re.compile(r'^ {4}Hint: .*\n(?: {10}.*\n)*', re.MULTILINE),
+    'text/html': re.compile(r'<div style="[^"]*"><b>Hint</b> .*?</div>'),
+}
 KERNEL_LOST = (Empty, RuntimeError, ValueError)  # no answer, a dead kernel, a broken message
 # In IPython's traceback: the top level of a module, or the cell's own import where Python has left
 # out all frames below it.
@@ -175,8 +179,11 @@ class Again(NamedCell):
     def compare_outputs(self, test, ref, skip_compare=None) -> bool:
         """Compare as nbval does, without the hints that an exercise gives at the second try."""
         for output in test:
-            if output.output_type == 'stream':
-                output.text = HINTS.sub('', output.text)
+            if verdict := output.get('metadata', {}).get(KEY):
+                for kind, hint in HINTS.items():
+                    output.data[kind] = hint.sub('', output.data[kind])
+                for point in verdict['points']:
+                    point.pop('hint', None)
         return super().compare_outputs(test, ref, skip_compare)
 
 
