@@ -1,8 +1,11 @@
 """What checks say of packages, programs and launches that fail."""
 
 import signal
+from pathlib import Path
 
 import pytest
+from support.processes import segments
+from support.waits import START_LIMIT_S
 
 from helpers.checks.errors import Failed
 from helpers.checks.programs import launch, line_of, manifest, run_python
@@ -83,3 +86,57 @@ def test_a_program_that_ends_by_itself_says_its_error(workspace):
     ):
         program.wait(lambda: False)
     assert program.exit_code() == 1
+
+
+# A signal ends the context between the look and the shutdown of try_shutdown.
+SIGNALLED = """import rclpy
+rclpy.init()
+context = rclpy.get_default_context()
+
+class Signalled:
+    def __init__(self, handle):
+        self.handle = handle
+    def __enter__(self):
+        return self.handle.__enter__()
+    def __exit__(self, *exception):
+        return self.handle.__exit__(*exception)
+    def ok(self):
+        self.handle.shutdown()
+        return True
+    def shutdown(self):
+        self.handle.shutdown()
+
+context._Context__context = Signalled(context.handle)
+rclpy.try_shutdown()
+"""
+
+# A student's own: after a signal, shutdown() has nothing to end any more.
+ENDED_TWICE = """import rclpy
+rclpy.init()
+rclpy.get_default_context().handle.shutdown()
+rclpy.shutdown()
+"""
+
+
+@pytest.mark.parametrize(
+    ('code', 'fails'),
+    [(SIGNALLED, False), (ENDED_TWICE, True)],
+)
+def test_what_rclpy_itself_raises_when_a_signal_comes_is_no_failure(workspace, code, fails):
+    workspace.write('program.py', code)
+    with run_python(workspace, 'program.py') as program:
+        assert program.has_ended(START_LIMIT_S)
+    assert program.says('rcl_shutdown already called')
+    assert program.failed == fails
+
+
+def test_a_killed_program_leaves_no_shared_memory(workspace):
+    code = (
+        'import rclpy, time; rclpy.init(); node = rclpy.create_node("n"); print("up", flush=True); '
+    )
+    with run_python(workspace, '-c', f'{code}time.sleep(60)') as program:
+        assert program.wait(lambda: program.says('up'), START_LIMIT_S)
+        held = segments(program.pid)
+        assert program.end(signal.SIGKILL)
+        assert [Path(file).exists() for file in held] == [True]
+    assert [Path(file).exists() for file in held] == [False]

@@ -35,9 +35,12 @@ from helpers.workspace import (
 )
 
 PROGRAM_S = 8.0  # for a program to start, to say something, to end
-# spin() looks whether the context is valid, and makes its wait set afterwards: a signal between the
-# two ends it with this error, in a right program, too (executors.py of rclpy 7.1.5).
-RACE = 'failed to initialize wait set: the given context is not valid'
+# Between a look whether the context is valid and its use, a signal may end it. Then a right program
+# ends with an error, too, in which these texts stand (executors.py and context.py of rclpy 7.1.5).
+RACES = (
+    ('failed to initialize wait set: the given context is not valid',),  # spin()
+    ('in try_shutdown', 'rcl_shutdown already called on the given context'),
+)
 
 
 # --- Packages
@@ -127,7 +130,8 @@ class Program:
     @property
     def failed(self) -> bool:
         """Whether it has printed a traceback, but for one that rclpy makes by itself."""
-        return self.says(TRACEBACK) and not self.says(RACE)
+        is_race = any(all(map(self.says, texts)) for texts in RACES)
+        return self.says(TRACEBACK) and not is_race
 
     @property
     def error(self) -> str:

@@ -19,7 +19,7 @@ import psutil
 
 from helpers.machine import locks_of_workspaces
 from helpers.notebook import uninterrupted
-from helpers.ros import NOT_OF_A_LESSON, nearly
+from helpers.ros import NOT_OF_A_LESSON, nearly, remove_dead_segments
 
 STOP_TIMEOUT_S = 5.0
 DIED = 'process has died'  # what a launch prints of a program
@@ -177,6 +177,8 @@ class Process:
         with uninterrupted():
             if self.running:
                 self._stop()
+            if self._process.returncode:  # one that was killed has left its shared memory
+                remove_dead_segments()
             for end in self._window or ():
                 os.close(end)
             self._window = None

@@ -137,19 +137,21 @@ def _look_after(cell: NamedCell, name: str) -> NamedCell:
 class Machine(pytest.Item):
     """What is on the machine after a notebook. pytest has ended its kernel before.
 
-    Nobody removes the ports of a program that a lesson kills.
+    Nobody removes the ports of a program that a lesson kills: the next participant that wants their
+    numbers takes them.
     """
 
     kills = False
 
     def runtest(self) -> None:
         known = self.config.stash[KNOWN]
+        now = _on_the_machine(self.config)
         left = {
             key: sentence
-            for key, sentence in _on_the_machine(self.config).items()
+            for key, sentence in now.items()
             if key not in known and not (self.kills and 'fastrtps_port' in key)
         }
-        known.update(left)
+        known.update(now)
         if left:
             pytest.fail('\n'.join(left.values()), pytrace=False)
 
