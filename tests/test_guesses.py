@@ -84,6 +84,13 @@ def test_the_reason_follows_only_a_guess(capsys):
         assert told(capsys, nothing, 20, because=reason) == [f'  {NO_GUESS}']
 
 
+def test_without_a_student_the_answer_is_said_if_it_does_not_move(capsys, monkeypatch):
+    monkeypatch.setattr('helpers.checks.guesses._has_student', lambda: False)
+    reason = 'The queue keeps the last 10.'
+    assert told(capsys, ..., 20, because=reason) == ['  The answer is 20.', f'  {reason}']
+    assert told(capsys, ..., 20, tolerance=2, because=reason) == [f'  {reason}']
+
+
 def test_an_outcome_of_no_known_kind_is_refused(capsys):
     with pytest.raises(TypeError, match='^The outcome of a prediction cannot be of type dict[.]$'):
         compare_prediction(QUESTION, 1, {'a': 1})
