@@ -30,7 +30,7 @@ from helpers.machine import folders
 from helpers.ros import ros_session
 from helpers.ros.domain import reserve_domain_id
 from helpers.workspace import Workspace, given, processes
-from helpers.workspace.build_output import lines_that_matter
+from helpers.workspace.build_output import _packages, lines_that_matter
 from helpers.workspace.processes import Process
 from helpers.workspace.wheels import fix_wheels
 
@@ -423,6 +423,23 @@ def test_deaf_and_orphaned_processes_are_killed(built, monkeypatch):
         leaving.wait_for('up')
     assert leaving.wait() == -signal.SIGINT
     wait_for(lambda: processes_of(built.path) == [], timeout_s=2)
+
+
+def test_a_package_whose_build_was_interrupted_is_aborted(tmp_path):
+    events = tmp_path / 'events.log'
+    events.write_text(
+        '[0.1] (done) JobQueued: {}\n[0.1] (broken) JobQueued: {}\n'
+        '[0.1] (stopped) JobQueued: {}\n[0.1] (waits) JobQueued: {}\n'
+        "[0.2] (done) JobEnded: {'identifier': 'done', 'rc': 0}\n"
+        "[0.2] (broken) JobEnded: {'identifier': 'broken', 'rc': 1}\n"
+        "[0.2] (stopped) JobEnded: {'identifier': 'stopped', 'rc': 'SIGINT'}\n"
+    )
+    assert _packages(events) == {
+        'done': 'finished',
+        'broken': 'failed',
+        'stopped': 'aborted',
+        'waits': 'aborted',
+    }
 
 
 def test_a_killed_kernel_takes_its_nodes_with_it(built):
