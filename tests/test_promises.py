@@ -1,6 +1,5 @@
 """What the documents promise, and no other test tries: links, commands, numbers, licences."""
 
-import ast
 import re
 import subprocess
 import tomllib
@@ -8,6 +7,7 @@ from importlib.metadata import PackageNotFoundError, metadata, packages_distribu
 
 import pytest
 import yaml
+from support.imports import imported_packages
 
 from helpers.lesson import ROOT, path_of, read
 
@@ -171,11 +171,7 @@ def test_pyproject_asks_for_each_package_that_is_imported():
     imported = set()
     for room in ('helpers', 'classroom', 'tools', 'tests'):
         for path in (ROOT / room).rglob('*.py'):
-            for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
-                if isinstance(node, ast.Import):
-                    imported |= {name.name.partition('.')[0] for name in node.names}
-                elif isinstance(node, ast.ImportFrom) and node.module:
-                    imported.add(node.module.partition('.')[0])
+            imported |= imported_packages(path.read_text(encoding='utf-8'))
     brought = packages_distributions()
     names = [name for module in imported for name in brought.get(module, [])[:1]]
     needed = {name.lower().replace('_', '-') for name in names}

@@ -4,13 +4,13 @@ Another dependency may bring it along today, as `sensor_msgs` brings `std_msgs`,
 builds and runs in an environment of what it names. Its own manifest must name it all the same.
 """
 
-import ast
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 from catkin_pkg.package import Package
 from support.environments import SHARE
+from support.imports import imported_packages
 
 KEYS = {'numpy': 'python3-numpy', 'pytest': 'python3-pytest', 'yaml': 'python3-yaml'}
 
@@ -55,16 +55,6 @@ def undeclared(package: Package, folder: Path, ours: set[str]) -> Iterator[str]:
         yield f'{package.name} has launch files, and its package.xml does not name ros2launch.'
 
 
-def _imports(text: str) -> set[str]:
-    found = set()
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name.partition('.')[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            found.add(node.module.partition('.')[0])
-    return found
-
-
 def _includes(text: str) -> set[str]:
     return {*re.findall(r'^\s*#include [<"](\w+)/', text, re.MULTILINE)}
 
@@ -78,7 +68,7 @@ def _started(text: str) -> set[str]:
 
 
 READERS = {
-    '.py': (_imports, 'imports'),
+    '.py': (imported_packages, 'imports'),
     '.cpp': (_includes, 'includes'),
     '.hpp': (_includes, 'includes'),
     '.txt': (_found_by_cmake, 'finds'),
