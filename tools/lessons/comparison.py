@@ -43,7 +43,7 @@ class NamedCell(IPyNbCell):
     def repr_failure(self, excinfo: object) -> str:
         """Begin with what the cell says now and did not say: pytest's last lines have this line."""
         said = super().repr_failure(excinfo).replace(f'Cell {self.cell_num}: ', f'{self.name}: ', 1)
-        return '\n'.join([' | '.join(self.unexpected), said] if self.unexpected else [said])
+        return f'{" | ".join(self.unexpected)}\n{said}' if self.unexpected else said
 
     def compare_outputs(self, test: list, ref: list, skip_compare: object = None) -> bool:
         """Compare as nbval does. If they differ, say all that the cell has printed, too."""
