@@ -118,7 +118,7 @@ def _knows_both_ends_of_services(node: Node) -> bool:
 
     A participant tells of its readers and of its writers in two streams of messages. Where packets
     are lost, as on a busy machine, one stream may come a second after the other: then `ros2 topic
-    info` would miss a subscription, in 8 of 120 runs beside four busy programs.
+    info` would miss a subscription, in 8 of 120 runs at a load of nine on two processors.
     """
     topics = [topic for topic, _ in node.get_topic_names_and_types(no_demangle=True)]
 
