@@ -95,6 +95,25 @@ def test_from_join_to_the_end(lab_page, tabs, student_server, artefacts):
         page.close()
 
 
+def test_a_class_sees_the_last_slide_though_an_earlier_one_is_told_late(lab_page, tabs, tmp_path):
+    with (
+        server(tmp_path, 'present', 'LESSON=lose_messages') as presenter,
+        made(tmp_path, STARTED, 'class') as (_, started),
+        lab_page(presenter, 'class_last_slide', DeckPage) as deck,
+    ):
+        held = []
+        deck.page.route('**/slide', lambda route: held.append(route), times=1)
+        with deck.page.expect_request('**/slide'):
+            deck.present(LESSON)
+        deck.walk_to(GUESS.id)
+        held[0].continue_()
+        assert held[0].request.response().ok
+        page = tabs.new_page()
+        page.goto(started[2])
+        page.locator('#guesses').get_by_text('0 of 0 have answered').wait_for()
+        page.close()
+
+
 def test_a_slide_shows_the_guesses_of_the_class(lab_page, tmp_path):
     with (
         server(tmp_path, 'present', 'LESSON=lose_messages') as presenter,

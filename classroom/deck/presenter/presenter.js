@@ -453,7 +453,7 @@ async function tell(place) {
   }
   const minutes = { own, planned, all: inAll };
   const path = context.path;
-  void tellClass({ lesson: path.match(/\d\d_(\w+)\.ipynb$/)?.[1], cell: cells[at].id, began_s: began ?? null, ...minutes });
+  tellClass({ lesson: path.match(/\d\d_(\w+)\.ipynb$/)?.[1], cell: cells[at].id, began_s: began ?? null, ...minutes });
   const following = (all[here() + 1] ?? []).map(index => cells[index]);
   const until = all[here() + 1]?.[0] ?? cells.length;
   const rest = cells.filter((_, index) => index > all[here()][0] && index < until && isRest(content.widgets[index]));
@@ -475,15 +475,23 @@ async function tell(place) {
 
 // --- The class page ------------------------------------------------------------------------------
 
-let page; // a promise of its address: no text if no class is open
+// The address of its page: no text if no class is open.
+const pageOfClass = () => server.ask('deck/class').then(answer => answer.text()).catch(() => '');
 
-const pageOfClass = () => (page = server.ask('deck/class').then(answer => answer.text()).catch(() => ''));
+let wanted; // the slide that the class is to see
+let telling = Promise.resolve();
 
-// The answer of another server cannot be read, and need not be.
-async function tellClass(slide) {
-  const address = await pageOfClass();
-  const init = { method: 'POST', mode: 'no-cors', body: JSON.stringify(slide) };
-  if (address) await fetch(`${address}slide`, init).catch(() => {}); // it is over
+// Of slides that are passed quickly the class sees the last one: one request after the other, because
+// of two at once the earlier one may arrive last. The answer of another server cannot be read, and
+// need not be.
+function tellClass(slide) {
+  wanted = slide;
+  telling = telling.then(async () => {
+    if (slide !== wanted) return;
+    const address = await pageOfClass();
+    const init = { method: 'POST', mode: 'no-cors', body: JSON.stringify(slide) };
+    if (address) await fetch(`${address}slide`, init).catch(() => {}); // it is over
+  });
 }
 
 function hasGuess({ model }) {
@@ -492,7 +500,7 @@ function hasGuess({ model }) {
 }
 
 async function showGuesses({ model, node }, place) {
-  const address = await page;
+  const address = await pageOfClass();
   const reached = address && (await fetch(address, { mode: 'no-cors' }).catch(() => null));
   if (!reached || place !== shownPlace) return;
   document.getElementById('deck-guesses')?.remove(); // of a second call
