@@ -23,6 +23,7 @@ from helpers.lesson import (
     is_check,
     is_solution,
     lessons,
+    magic_of,
     tags,
 )
 
@@ -30,7 +31,6 @@ CHECKS = re.compile(r'^from helpers\.checks\.lessons\.(\w+) import ', re.MULTILI
 SEED = re.compile(r'^SEED *= *(\d{1,9})\b.*$', re.MULTILINE)
 # The lesson whose tasks ask for what a cell of the student's own has printed.
 LOOKS_FIRST = 'find_the_fault'
-LOOK = '%%terminal'
 LARGEST_SOURCE = 200_000  # letters of a cell
 
 
@@ -188,7 +188,7 @@ def _looks(cells: list[Node], known: set[str]) -> dict[str, list[str]]:
         if cell.id in known:
             if waiting:
                 looks[cell.id], waiting = waiting, []
-        elif cell.cell_type == 'code' and cell.source.startswith(LOOK):
+        elif cell.cell_type == 'code' and magic_of(cell.source).name == 'terminal':
             waiting.append(cell.source[:LARGEST_SOURCE])
     return looks
 

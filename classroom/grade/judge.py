@@ -54,6 +54,7 @@ from nbformat.v4 import output_from_msg
 from classroom.grade import limits
 from helpers.checks.progress import IS_GRADED
 from helpers.checks.verdict import KEY
+from helpers.lesson import magic_of
 
 PR_SET_DUMPABLE, PR_SET_CHILD_SUBREAPER = 4, 36  # linux/prctl.h
 INTERRUPT_S = 5  # for a cell to end after an interrupt
@@ -394,7 +395,7 @@ def _canaries(kernel: Kernel, job: dict, passed: set[str]) -> Iterator[dict]:
     for task in dict.fromkeys(cell['task'] for cell in job['cells'] if cell['task'] in passed):
         cells = [cell for cell in job['cells'] if cell['task'] == task]
         starters = [cell['starter'] for cell in cells if cell['kind'] == 'exercise']
-        if not starters or any(one.startswith('%%terminal') for one in starters):
+        if not starters or any(magic_of(one).name == 'terminal' for one in starters):
             continue
         try:
             for starter in starters:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import io
-import re
 import tokenize
 
-CPP = re.compile(r'\A\s*%%write\s.*\.(?:cpp|hpp|h)\s*$', re.MULTILINE)
+from helpers.lesson import magic_of, path_and_part
+
+CPP = '.cpp', '.hpp', '.h'
 SKIPPED = {tokenize.COMMENT, tokenize.NL, tokenize.ENCODING}
 BLOCKS = {tokenize.INDENT: '{', tokenize.DEDENT: '}', tokenize.NEWLINE: '\n'}
 
@@ -16,13 +17,15 @@ def code_only(source: str) -> str:
 
     Of a source that is not Python, whole lines of comments are left out, and the ends of lines.
     """
+    magic = magic_of(source)
+    is_cpp = magic.name == 'write' and path_and_part(magic.line)[0].endswith(CPP)
     try:
-        if CPP.match(source):
+        if is_cpp:
             raise ValueError
         tokens = tokenize.generate_tokens(io.StringIO(f'{source.strip()}\n').readline)
         words = [BLOCKS.get(t.type, t.string) for t in tokens if t.type not in SKIPPED]
         return ' '.join(words).strip()
     except (tokenize.TokenError, SyntaxError, ValueError):
-        mark = '//' if CPP.match(source) else '#'
+        mark = '//' if is_cpp else '#'
         lines = (line.rstrip() for line in source.strip().splitlines())
         return '\n'.join(line for line in lines if line and not line.lstrip().startswith(mark))

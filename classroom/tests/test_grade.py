@@ -628,6 +628,7 @@ def task_of(lesson):
         ("s = '# no comment'", "s = '# another'", False),
         ('%%write a.xml\n<a>\n', '%%write a.xml\n<a>', True),
         ('%%write a.cpp\n// old\n#include <a>', '%%write a.cpp\n#include <a>', True),
+        ('%%write a.cpp part 2\n// old\n#include <a>', '%%write a.cpp part 2\n#include <a>', True),
         ('%%write a.cpp\n#include <b>', '%%write a.cpp\n#include <a>', False),
         ('%%terminal\n# old\nros2 topic list', '%%terminal\nros2 topic list', True),
     ],

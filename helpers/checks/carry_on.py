@@ -23,10 +23,13 @@ from helpers.checks import progress
 from helpers.lesson import (
     FOLDER,
     Lesson,
+    Magic,
     Task,
     code_of_solution,
     kept_solution,
+    magic_of,
     outline,
+    path_and_part,
     path_of,
     tags,
 )
@@ -35,7 +38,6 @@ from helpers.notebook import wrap
 if TYPE_CHECKING:
     from helpers.workspace import BuildResult, Workspace
 
-WRITE, TERMINAL = '%%write ', '%%terminal\n'
 CPU_LIMIT_S, LIMIT_S = 60.0, 90.0  # of each point of the check that takes the whole
 MADE = shutil.ignore_patterns('__pycache__', '.pytest_cache', '*.egg-info')
 
@@ -129,20 +131,11 @@ def _parts(lesson: Lesson) -> Iterator[Part]:
             if cell in task.checks and not task.solutions and task.name in borrowed:
                 code = kept_solution(cell)
         name = task.name if task else ''
-        if written := _written(code):
-            yield Part(*written, name)
-        elif code.startswith(TERMINAL):
-            yield Part('', None, code.removeprefix(TERMINAL), name)
-
-
-def _written(code: str) -> tuple[str, int | None, str] | None:
-    """Return the file that a cell writes, which part of it, and the text; None for other cells."""
-    from helpers.workspace import path_and_part
-
-    if not code.startswith(WRITE):
-        return None
-    line, _, text = code.removeprefix(WRITE).partition('\n')
-    return *path_and_part(line), text
+        match magic_of(code):
+            case Magic('write', line, text):
+                yield Part(*path_and_part(line), text, name)
+            case Magic('terminal', '', commands):
+                yield Part('', None, commands, name)
 
 
 def _files(lesson: Lesson, solved: set[str]) -> set[str]:
@@ -150,8 +143,9 @@ def _files(lesson: Lesson, solved: set[str]) -> set[str]:
     owners = {cell.id: task.name for task in lesson.tasks for cell in task.cells}
     writers: dict[str, set[str]] = {}
     for cell in lesson.code_cells():
-        if written := _written(code_of_solution(cell.source)):
-            writers.setdefault(written[0], set()).add(owners.get(cell.id, ''))
+        magic = magic_of(code_of_solution(cell.source))
+        if magic.name == 'write':
+            writers.setdefault(path_and_part(magic.line)[0], set()).add(owners.get(cell.id, ''))
     return {file for file, tasks in writers.items() if tasks <= solved | {''}}
 
 

@@ -19,10 +19,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from helpers.lesson import Lesson, Task, check_call, code_of_solution
+from helpers.lesson import Lesson, Task, check_call, code_of_solution, magic_of
 from helpers.notebook import names_of
 
-WRITES_FILES = '%%write ', '%%terminal'
+USE_FILES = 'write', 'terminal'
 
 
 @dataclass
@@ -74,7 +74,8 @@ def needs_of(lesson: Lesson) -> Needs:
             if _writes_files(task) and not task.star and task.name not in found.files:
                 found.files.append(task.name)
         else:
-            uses_files = source.startswith('%%terminal') or names.taken & {'workspace', 'terminals'}
+            in_terminal = magic_of(source).name == 'terminal'
+            uses_files = in_terminal or names.taken & {'workspace', 'terminals'}
             found.cells[source.strip()] = Cell(
                 names.taken,
                 found.in_order(need),
@@ -103,7 +104,7 @@ def _owners(lesson: Lesson) -> dict[str, Task]:
 def _writes_files(task: Task) -> bool:
     calls = [check_call(cell.source) for cell in task.checks]
     hands_over = any('workspace' in call[1] for call in calls if call)
-    return hands_over and any(cell.source.startswith(WRITES_FILES) for cell in task.exercises)
+    return hands_over and any(magic_of(cell.source).name in USE_FILES for cell in task.exercises)
 
 
 def _first_line(source: str) -> str:

@@ -20,6 +20,8 @@ The grammar of a lesson:
     note       a raw cell with the tag `notes` that begins with `For the instructor: 4 minutes`; the
                first one also says `Part: nodes`, and perhaps `When time runs out, leave out: ...`
     workspace  `Workspace('lose_messages')`
+    magic      `%%write PATH`, or `%%write PATH part 2`, writes the rest of a code cell to a file of
+               the workspace; `%%terminal`, or `%%terminal NAME`, runs it there
     mention    a link: `[lesson 05](05_keep_what_is_fresh.ipynb)`, `[task 3](#✎-Task-3:-A-driver)`.
                `with_mentions` writes the numbers of today into it.
 
@@ -33,6 +35,7 @@ The grammar of a lesson:
 """
 
 from helpers.lesson.cells import (
+    Magic,
     Node,
     called,
     cells_of,
@@ -42,6 +45,8 @@ from helpers.lesson.cells import (
     is_question,
     keep_solution,
     kept_solution,
+    magic_of,
+    path_and_part,
     tags,
 )
 from helpers.lesson.earlier import earlier_name
@@ -112,6 +117,7 @@ __all__ = [
     'WRITTEN',
     'Guess',
     'Lesson',
+    'Magic',
     'Message',
     'Node',
     'Task',
@@ -140,11 +146,13 @@ __all__ = [
     'kept_solution',
     'lessons',
     'links_to_tasks',
+    'magic_of',
     'messages',
     'minutes_of_note',
     'names_of_memory',
     'outline',
     'outlines',
+    'path_and_part',
     'path_of',
     'paths',
     'read',

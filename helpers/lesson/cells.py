@@ -6,10 +6,13 @@ import base64
 import json
 import re
 import zlib
+from typing import NamedTuple
 
 LONGEST_NAME = 40  # letters of a cell's first line that are enough to find it
 KEPT = 'ros2_notebooks_lends'  # in the metadata of a check: what it lends
 QUESTION = '### Question '
+MAGIC = re.compile(r'\s*%%(\w+)[ \t]*(.*)\n?')
+FILE = re.compile(r'(.*?)(?: part (\d+))?')
 FOR_INSTRUCTORS = r'## \d+\. For instructors'
 
 
@@ -76,6 +79,27 @@ def _why_no_json(data: bytes | str) -> str:
 def tags(cell: Node) -> set[str]:
     """Return the tags of a cell."""
     return set(cell.metadata.get('tags', []))
+
+
+class Magic(NamedTuple):
+    """A cell as IPython reads it: `%%NAME LINE`, and a body. The name of other cells is empty."""
+
+    name: str
+    line: str
+    body: str
+
+
+def magic_of(source: str) -> Magic:
+    """Return the magic with which a cell begins, its line, and the rest of the cell."""
+    if not (found := MAGIC.match(source)):
+        return Magic('', '', source)
+    return Magic(found[1], found[2].strip(), source[found.end() :])
+
+
+def path_and_part(line: str) -> tuple[str, int | None]:
+    """Return the file that a line of `%%write` names, and which part of it, None for all of it."""
+    path, part = FILE.fullmatch(line.strip()).groups()
+    return path.strip('\'"'), part and int(part)
 
 
 def keep_solution(cell: Node, source: str) -> None:

@@ -33,7 +33,7 @@ from helpers.workspace.processes import DIED, Process, end_together, show_launch
 from helpers.workspace.rosdep import rosdep, run_rosdep
 from helpers.workspace.tf2_msgs import begin_tf2_msgs, provide_tf2_msgs
 from helpers.workspace.wheels import fix_wheels
-from helpers.workspace.workspace import SMALL_RCLCPP, Workspace, path_and_part
+from helpers.workspace.workspace import SMALL_RCLCPP, Workspace
 
 __all__ = [
     'play_colleague',
@@ -60,7 +60,6 @@ __all__ = [
     'Workspace',
     'fix_wheels',
     'lines_that_matter',
-    'path_and_part',
     'begin_tf2_msgs',
     'provide_tf2_msgs',
     'without_folders',

@@ -14,6 +14,7 @@ from pathlib import Path, PurePosixPath
 
 from ros2_command.api import CommandError, command_of
 
+from helpers.lesson import path_and_part
 from helpers.machine import (
     BUILT,
     OWNED,
@@ -480,12 +481,6 @@ def _packages_done(lines: Sequence[str]) -> float:
 
 
 # --- In a notebook -------------------------------------------------------------------------------
-
-
-def path_and_part(line: str) -> tuple[str, int | None]:
-    """Return the file that a line of `%%write` names, and which part of it, None for all of it."""
-    path, part = re.fullmatch(r'(.*?)(?: part (\d+))?', line.strip()).groups()
-    return path.strip('\'"'), part and int(part)
 
 
 def write(line: str, cell: str) -> None:

@@ -15,6 +15,7 @@ from hashlib import blake2s
 import libcst as cst
 from support.answers import source_of
 
+from helpers.lesson import magic_of, path_and_part
 from mutants import files
 from mutants.program import Program
 from mutants.rules import RULES
@@ -188,12 +189,11 @@ def _made(source: str, written: set[int]) -> Iterator[tuple[str, str]]:
 
 def _parts(source: str) -> tuple[str, str, str]:
     """Return the magic that a cell begins with, the rest, and its kind."""
-    if not source.startswith('%%'):
+    name, line, body = magic_of(source)
+    if not name:
         return '', source, 'python'
-    magic, _, body = source.partition('\n')
-    words = magic.split()
-    kind = files.kind_of(words[1]) if words[0] == '%%write' else 'commands'
-    return magic + '\n', body, kind
+    kind = files.kind_of(path_and_part(line)[0]) if name == 'write' else 'commands'
+    return source.removesuffix(body), body, kind
 
 
 def _of_lines(lines: list[str], written: set[int], kind: str) -> Iterator[tuple[str, list[str]]]:

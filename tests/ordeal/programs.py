@@ -15,15 +15,23 @@ from typing import Any
 
 import yaml
 
-from helpers.lesson import ROOT, Lesson, code_of_solution, paths, read, tags
-from helpers.workspace import Workspace, path_and_part, why_it_failed
+from helpers.lesson import (
+    ROOT,
+    Lesson,
+    code_of_solution,
+    magic_of,
+    path_and_part,
+    paths,
+    read,
+    tags,
+)
+from helpers.workspace import Workspace, why_it_failed
 
 HERE = Path(__file__).parent
 PROGRAMS, INSIDE = HERE / 'programs.yaml', HERE / 'inside'
 NOT_RUN = {'exercise', 'check', 'predict'}
 OF_LESSONS = ('helpers.checks', 'helpers.plots')  # what a program does not need
 PUBLISHES = re.compile(r'create_publisher\b[^)]*cmd_vel')
-MAGIC = re.compile(r'%%(write|terminal)(?: (.*))?\n')
 
 
 @cache
@@ -66,9 +74,9 @@ def publishers(lesson: Lesson) -> Iterator[tuple[str, str]]:
     A class that only inherits its publisher is not found.
     """
     for cell, code in shown(lesson):
-        magic = MAGIC.match(code)
-        if magic and magic[1] == 'write' and PUBLISHES.search(code):
-            yield cell, magic[2].split()[0]
+        magic, line, _ = magic_of(code)
+        if magic == 'write' and PUBLISHES.search(code):
+            yield cell, path_and_part(line)[0]
         for statement in [] if magic else statements(code):
             if isinstance(statement, ast.ClassDef) and PUBLISHES.search(ast.unparse(statement)):
                 yield cell, statement.name
@@ -146,13 +154,12 @@ def fill(lesson: Lesson, workspace: Workspace, also: dict[str, str | None]) -> N
     names: dict[str, Any] = {'workspace': workspace, 'shutil': shutil, 're': re}
     left = {*also}
     for cell, code in shown(lesson):
-        magic = MAGIC.match(code)
-        body = code[magic.end() :] if magic else code
-        if magic and magic[1] == 'write':
-            path, part = path_and_part(magic[2])
+        magic, line, body = magic_of(code)
+        if magic == 'write':
+            path, part = path_and_part(line)
             if not path.startswith('overlay/') or cell in also:
                 workspace.write(path, body, part)
-        elif magic and (cell in also or ('pkg create' in body and not magic[2])):
+        elif magic and (cell in also or ('pkg create' in body and not line)):
             workspace.terminal(body)
         elif cell in also and not magic:
             kept = [one for one in ast.parse(code).body if not _opens_or_checks(one)]

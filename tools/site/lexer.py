@@ -5,18 +5,21 @@ from pygments.lexers import TextLexer, get_lexer_for_filename
 from pygments.token import Comment
 from pygments.util import ClassNotFound
 
+from helpers.lesson import magic_of, path_and_part
+
 
 class CellLexer(IPython3Lexer):
     def get_tokens_unprocessed(self, text):
         """Yield (index, token, value) of a cell's source."""
-        first, newline, rest = text.partition('\n')
-        if not first.startswith('%%write '):
+        name, line, body = magic_of(text)
+        if name != 'write':
             yield from super().get_tokens_unprocessed(text)
             return
-        yield 0, Comment.Special, first + newline
+        first = text.removesuffix(body)
+        yield 0, Comment.Special, first
         try:
-            lexer = get_lexer_for_filename(first.split()[1].replace('.urdf', '.xml'))
+            lexer = get_lexer_for_filename(path_and_part(line)[0].replace('.urdf', '.xml'))
         except ClassNotFound:  # of an interface
             lexer = TextLexer()
-        for index, token, value in lexer.get_tokens_unprocessed(rest):
-            yield len(first) + len(newline) + index, token, value
+        for index, token, value in lexer.get_tokens_unprocessed(body):
+            yield len(first) + index, token, value

@@ -2,7 +2,7 @@
 
 from html import escape
 
-from helpers.lesson import Lesson
+from helpers.lesson import Lesson, magic_of
 from tools.lessons.first_pictures import lanes
 from tools.lessons.first_pictures.lanes import Lane, way_of
 from tools.lessons.first_pictures.look import (
@@ -74,8 +74,9 @@ def program_picture(lesson: Lesson, cell_id: str, lines: list[str], drive: str) 
 
     Each of `lines` is how a line of the cell begins. What is not there raises ValueError.
     """
-    file, *code = cell(lesson, cell_id).source.splitlines()
-    shown = [('typed ink', file.removeprefix('%%write '))]
+    _, file, body = magic_of(cell(lesson, cell_id).source)
+    code = body.splitlines()
+    shown = [('typed ink', file)]
     for line in lines:
         if not any(one.startswith(line) for one in code):
             raise ValueError(f'{cell_id} of {lesson.name} has no line {line!r} any more.')
