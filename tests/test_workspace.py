@@ -307,6 +307,7 @@ def test_wheels_are_fixed_once_outside_the_cache(tmp_path):
 def used(built, monkeypatch):
     for name in ('AMENT_PREFIX_PATH', 'LD_LIBRARY_PATH'):
         monkeypatch.setenv(name, os.environ.get(name, ''))
+    monkeypatch.setattr(sys, 'path', [*sys.path])  # later tests do not find its packages
     built.use()
     return built
 
