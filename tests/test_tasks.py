@@ -1,6 +1,7 @@
 """The verdict on a task: its text, its data, its card, and what becomes of the student's code."""
 
 import threading
+import time
 from html.parser import HTMLParser
 
 import numpy as np
@@ -12,7 +13,7 @@ from helpers.checks import showing
 from helpers.checks import tasks as module
 from helpers.checks.errors import Failed, sentence
 from helpers.checks.points import needs
-from helpers.checks.tasks import NOT_TRIED, Tasks
+from helpers.checks.tasks import NO_TIME, NOT_TRIED, Tasks
 from helpers.checks.verdict import AGAIN, Point, Verdict, bundle
 from helpers.ros import graph_environment
 
@@ -140,6 +141,21 @@ def test_after_an_endless_point_the_others_wait(capsys, lesson):
     text = ' '.join(' '.join(lines).split())
     assert 'TimeoutError: it did not end. Is there an endless loop' in text
     assert f'[not yet] and again Found: {NOT_TRIED}' in text
+
+
+@pytest.mark.parametrize(('load', 'says'), [(0, NO_TIME), (1e4, 'it took 1 s')])
+def test_after_a_wrong_point_the_others_have_little_time(capsys, lesson, monkeypatch, load, says):
+    """They have more of it while other programs use the machine."""
+    monkeypatch.setattr('os.getloadavg', lambda: (load, 0.0, 0.0))
+    monkeypatch.setattr('helpers.checks.sandbox.MOST_PATIENCE', 1e3)
+    monkeypatch.setattr('helpers.checks.tasks.TOGETHER_S', 0.1)
+
+    def slow():
+        time.sleep(1)
+        return 'it took 1 s'
+
+    lines = judged(capsys, lesson, ('one', lambda: 'no', ''), ('two', slow, ''))
+    assert f'    Found: {says}' in lines
 
 
 def test_what_it_prints_is_shown_and_bounded(capsys, lesson):

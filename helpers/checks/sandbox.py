@@ -75,11 +75,11 @@ class Sandbox:
     `function(send)` gets a function that sends any object that can be pickled. Each message begins
     the limits anew: `cpu_s` seconds of CPU of the worker itself, and `limit_s` seconds of the
     clock, which are more while other programs use this machine. A message may bring its own limits:
-    `send(message, cpu_s=20)`. `deadline`, of `time.monotonic()`, may be set at any message: then
-    the worker ends at the latest.
+    `send(message, cpu_s=20)`. `since` and `together_s` may be set at any message: so long after
+    that time of `time.monotonic()` the worker ends at the latest, on an idle machine.
     """
 
-    deadline = math.inf
+    since, together_s = 0.0, math.inf
 
     def __init__(self, function: Callable, cpu_s: float, limit_s: float) -> None:
         self._function, self._limits = function, (cpu_s, limit_s)
@@ -100,7 +100,7 @@ class Sandbox:
                 guards_end.close()
                 os.close(alive)
             while True:
-                if not _comes(messages, self.deadline):
+                if not self._comes(messages):
                     self.ending = Ending('late')
                     return
                 try:
@@ -118,12 +118,12 @@ class Sandbox:
                 if guard:
                     os.waitpid(guard, 0)
 
-
-def _comes(messages: Connection, deadline: float) -> bool:
-    """Wait for a message, or for the end of those that send any, at most until the deadline."""
-    if deadline == math.inf:
+    def _comes(self, messages: Connection) -> bool:
+        """Wait for a message, or for the end of those that send any, while there is time."""
+        while not messages.poll(POLL_S):
+            if time.monotonic() - self.since > self.together_s * _patience():
+                return False
         return True
-    return messages.poll(max(0.0, deadline - time.monotonic()))
 
 
 # --- The guard ------------------------------------------------------------------------------------

@@ -429,10 +429,10 @@ def try_points(
                 if hint is not None:
                     hints[tried] = hint  # that of the point would be for another mistake
                 tried += 1
-                if not verdict.points[tried - 1].ok and sandbox.deadline == math.inf:
+                if not verdict.points[tried - 1].ok and sandbox.together_s == math.inf:
                     # What builds or starts programs has needed its time before.
-                    since = started if limit_s <= LIMIT_S else time.monotonic()
-                    sandbox.deadline = since + TOGETHER_S
+                    sandbox.since = started if limit_s <= LIMIT_S else time.monotonic()
+                    sandbox.together_s = TOGETHER_S
             running.update(time.monotonic() - started)
     verdict.seconds = time.monotonic() - started
     _add_ending(verdict, tried, sandbox.ending)
