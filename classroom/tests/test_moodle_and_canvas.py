@@ -206,3 +206,13 @@ def test_canvas_takes_no_grades_of_anonymous_students_and_it_is_said(submit, cap
     assert not (folder.with_name('submissions_graded') / 'canvas.csv').exists()
     points = {row['name']: (row['points'], row['late']) for row in rows_of(folder)}
     assert points == {'anon_x7Yz1': ('1', ''), 'anon_LATE': ('1', ''), 'anon_b2C': ('0', 'late')}
+
+
+def test_only_students_with_a_name_in_canvas_are_in_its_gradebook(submit):
+    """Beside them, a folder may have anonymous ones, and some who hand in elsewhere."""
+    known, hidden = 'lovelaceada_55_4567_x.ipynb', 'anon_x7Yz1_4567_x.ipynb'
+    files = {one: with_answer(RIGHT) for one in (known, hidden, 'Bob/x.ipynb')}
+    folder = submit(**files, **moodle_class(1))
+    assert main([str(folder)], Stand()) == 0
+    _, ada = rows_of(folder, 'canvas.csv')
+    assert ada['ID'] == '55'
