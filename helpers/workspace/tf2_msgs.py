@@ -40,7 +40,7 @@ _begun: dict[Path, Build] = {}  # by the path of a workspace
 
 def begin_tf2_msgs(workspace: Workspace) -> None:
     """Begin to build the package, which takes some seconds. If ROS has it, nothing is built."""
-    if find_spec('tf2_msgs'):
+    if _is_there():
         return
     workspace.write('src/tf2_msgs/msg/TFMessage.msg', MESSAGE)
     workspace.write('src/tf2_msgs/CMakeLists.txt', CMAKE_LISTS)
@@ -53,7 +53,7 @@ def provide_tf2_msgs(workspace: Workspace) -> None:
 
     Raises RuntimeError, with what colcon says, if the build fails.
     """
-    if find_spec('tf2_msgs'):
+    if _is_there():
         return
     if workspace.path not in _begun:
         begin_tf2_msgs(workspace)
@@ -61,3 +61,9 @@ def provide_tf2_msgs(workspace: Workspace) -> None:
     if not result.ok:
         raise RuntimeError(str(result))
     workspace.use()
+
+
+def _is_there() -> bool:
+    """Whether it can be imported: ROS has it, or a workspace that has not been emptied since."""
+    spec = find_spec('tf2_msgs')
+    return spec is not None and Path(spec.origin).is_file()
