@@ -1,14 +1,18 @@
 """What checks say of packages, programs and launches that fail."""
 
 import signal
+import subprocess
+import sys
 from pathlib import Path
 
+import psutil
 import pytest
 from support.processes import segments
 from support.waits import START_LIMIT_S
 
 from helpers.checks.errors import Failed
 from helpers.checks.programs import launch, line_of, manifest, run_python
+from helpers.checks.tasks import Tasks
 from helpers.workspace import Workspace, started, wait_until
 
 
@@ -130,13 +134,48 @@ def test_what_rclpy_itself_raises_when_a_signal_comes_is_no_failure(workspace, c
     assert program.failed == fails
 
 
+TALKS_TO_DDS = """import rclpy, time
+rclpy.init()
+node = rclpy.create_node("n")
+print("up", flush=True)
+time.sleep(60)
+"""
+
+
 def test_a_killed_program_leaves_no_shared_memory(workspace):
-    code = (
-        'import rclpy, time; rclpy.init(); node = rclpy.create_node("n"); print("up", flush=True); '
-    )
-    with run_python(workspace, '-c', f'{code}time.sleep(60)') as program:
+    with run_python(workspace, '-c', TALKS_TO_DDS) as program:
         assert program.wait(lambda: program.says('up'), START_LIMIT_S)
         held = segments(program.pid)
         assert program.end(signal.SIGKILL)
         assert [Path(file).exists() for file in held] == [True]
     assert [Path(file).exists() for file in held] == [False]
+
+
+def test_a_program_that_is_killed_by_its_parent_leaves_no_shared_memory(workspace):
+    """As a launch does, if a node does not end in time."""
+    workspace.write('node.py', TALKS_TO_DDS)
+    with workspace.start('python node.py & sleep 60; true', 'both') as both:
+        both.wait_for('up', START_LIMIT_S)
+        node = psutil.Process(both.pid).children()[0]
+        held = segments(node.pid)
+        node.kill()
+        assert [Path(file).exists() for file in held] == [True]
+    assert [Path(file).exists() for file in held] == [False]
+
+
+def test_a_program_that_a_judge_kills_leaves_no_shared_memory(workspace, tmp_path):
+    def judge(_answer):
+        def goes_on():
+            program = subprocess.Popen([sys.executable, '-c', TALKS_TO_DDS], stdout=subprocess.PIPE)
+            program.stdout.readline()
+            (tmp_path / 'held').write_text('\n'.join(segments(program.pid)))
+            program.kill()
+            return program.wait() != 0
+
+        return [('it goes on', goes_on, '')]
+
+    tasks = Tasks()
+    tasks.add(judge, name='it', cpu_s=START_LIMIT_S, limit_s=START_LIMIT_S)
+    tasks.check('it', None)
+    [held] = (tmp_path / 'held').read_text().split()
+    assert not Path(held).exists()

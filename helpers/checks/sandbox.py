@@ -14,7 +14,8 @@ Three processes take part:
 - the child of the guard, the worker, runs the function.
 
 A worker opens a ROS session like any process; a session that is still open here is closed before.
-What a killed worker leaves in shared memory is removed.
+What a killed worker leaves in shared memory is removed, and what is left by programs that a judge
+has killed, to see what a student's code does then.
 """
 
 from __future__ import annotations
@@ -150,8 +151,7 @@ def _be_guard(
             os.close(printer)
             ending = _watch(worker, limits, from_worker, printed, messages, alive, dump.fileno())
         _end_all()
-        if ending.reason != 'done' or ending.left:
-            remove_dead_segments()
+        remove_dead_segments()
         _send(messages, ending)
     finally:
         _end_all()

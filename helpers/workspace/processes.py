@@ -22,6 +22,7 @@ from helpers.notebook import uninterrupted
 from helpers.ros import NOT_OF_A_LESSON, nearly, remove_dead_segments
 
 STOP_TIMEOUT_S = 5.0
+GROUP_S = 0.2  # for a group that was killed to be gone
 DIED = 'process has died'  # what a launch prints of a program
 LAUNCH_ENDS_S = 15.0  # it waits 5 s, and once more, for a program that does not end
 POLL_S = 0.02
@@ -177,8 +178,7 @@ class Process:
         with uninterrupted():
             if self.running:
                 self._stop()
-            if self._process.returncode:  # one that was killed has left its shared memory
-                remove_dead_segments()
+            remove_dead_segments()  # if it was killed, or one that it has started
             for end in self._window or ():
                 os.close(end)
             self._window = None
@@ -191,11 +191,16 @@ class Process:
             # SIGKILL also ends what it has started and left, such as a compiler.
             (signal.SIGKILL, STOP_TIMEOUT_S),
         ):
-            if self.running or sent == signal.SIGKILL:
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(self._process.pid, sent)
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    self._process.wait(timeout_s)
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._process.pid, sent)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(timeout_s)
+        # Until the others of its group have ended, too, their shared memory is in use.
+        end = time.monotonic() + GROUP_S
+        with contextlib.suppress(ProcessLookupError):
+            while time.monotonic() < end:
+                os.killpg(self._process.pid, 0)
+                time.sleep(POLL_S)
 
     def __enter__(self) -> Process:
         return self
