@@ -1,7 +1,12 @@
 """Forged answers: what equals everything passes nothing, and a changed judge is noticed."""
 
+import sys
+from types import ModuleType
+
 import pytest
 from support.kernel import Kernel
+
+from helpers.checks.honest import Untouched
 
 LESSON = """
 from helpers.checks.tasks import Tasks
@@ -88,3 +93,22 @@ def test_a_forged_pass_is_not_recorded(notes, forgery):
         said, solved = run(kernel, notes, forgery)
         assert solved == [False], said
         assert not notes.exists()
+
+
+@pytest.mark.parametrize('path', ['alone', 'Box.first', 'Box.last'])
+def test_each_function_of_a_judge_is_watched(monkeypatch, path):
+    class Box:
+        def first(self):
+            return 1
+
+        def last(self):
+            return 2
+
+    made = ModuleType('helpers.checks.made')
+    made.alone, made.Box, Box.__module__ = (lambda: 0), Box, made.__name__
+    monkeypatch.setitem(sys.modules, made.__name__, made)
+    watch = Untouched()
+    assert watch.look() == ''
+    owner, _, name = path.rpartition('.')
+    monkeypatch.setattr(getattr(made, owner, made), name, lambda *_: 3)
+    assert watch.look() == f'{made.__name__}.{path}'
