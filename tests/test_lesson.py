@@ -13,7 +13,9 @@ from helpers.lesson import (
     check_call,
     earlier_name,
     lessons,
+    magic_of,
     outlines,
+    path_and_part,
     with_mentions,
     with_slugs,
     without_links,
@@ -56,6 +58,27 @@ def test_a_task_has_a_name_for_ever_and_the_number_of_its_place():
 )
 def test_a_check_says_its_task_and_what_it_hands_over(source, call):
     assert check_call(source) == call
+
+
+@pytest.mark.parametrize(
+    ('source', 'magic'),
+    [
+        ('%%write src/a b.py part 2\nx = 1\n', ('write', 'src/a b.py part 2', 'x = 1\n')),
+        ('\n%%terminal\nls', ('terminal', '', 'ls')),
+        ('%%terminal robot ', ('terminal', 'robot', '')),
+        ('x = 1\n%%terminal', ('', '', 'x = 1\n%%terminal')),
+    ],
+)
+def test_a_magic_is_read_with_its_line_and_what_is_below(source, magic):
+    assert magic_of(source) == magic
+
+
+@pytest.mark.parametrize(
+    ('line', 'found'),
+    [('a.py', ('a.py', None)), ('"a b.py" part 12 ', ('a b.py', 12)), ('part 2', ('part 2', None))],
+)
+def test_a_line_of_write_names_a_file_and_perhaps_a_part(line, found):
+    assert path_and_part(line) == found
 
 
 def test_links_get_the_numbers_of_today():

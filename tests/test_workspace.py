@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import threading
+from importlib.util import find_spec, module_from_spec
 from pathlib import Path
 
 import psutil
@@ -29,7 +30,7 @@ from support.waits import wait_for
 from helpers.machine import folders
 from helpers.ros import ros_session
 from helpers.ros.domain import reserve_domain_id
-from helpers.workspace import Workspace, given, processes
+from helpers.workspace import Workspace, begin_tf2_msgs, given, processes
 from helpers.workspace.build_output import _packages, lines_that_matter
 from helpers.workspace.processes import Process
 from helpers.workspace.wheels import fix_wheels
@@ -310,6 +311,20 @@ def used(built, monkeypatch):
     monkeypatch.setattr(sys, 'path', [*sys.path])  # later tests do not find its packages
     built.use()
     return built
+
+
+def test_tf2_msgs_is_built_anew_where_an_emptied_workspace_had_it(other, monkeypatch, tmp_path):
+    module = tmp_path / 'tf2_msgs/__init__.py'
+    module.parent.mkdir()
+    module.touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    loaded = module_from_spec(find_spec('tf2_msgs'))
+    monkeypatch.setitem(sys.modules, 'tf2_msgs', loaded)
+    begin_tf2_msgs(other)
+    assert not (other.path / 'src/tf2_msgs').exists()
+    module.unlink()
+    begin_tf2_msgs(other)
+    assert (other.path / 'src/tf2_msgs/package.xml').is_file()
 
 
 def test_a_built_library_is_one_of_this_process(used):

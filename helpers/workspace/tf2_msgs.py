@@ -66,4 +66,4 @@ def provide_tf2_msgs(workspace: Workspace) -> None:
 def _is_there() -> bool:
     """Whether it can be imported: ROS has it, or a workspace that has not been emptied since."""
     spec = find_spec('tf2_msgs')
-    return spec is not None and Path(spec.origin).is_file()
+    return spec is not None and Path(spec.origin or '').is_file()
