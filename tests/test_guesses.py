@@ -1,7 +1,9 @@
 """What a reader reads about a guess."""
 
+import cmath
 import math
 import os
+from dataclasses import replace
 from html import unescape
 
 import numpy as np
@@ -15,6 +17,7 @@ from helpers.checks.progress import FILE_VARIABLE
 from helpers.guesses import Level
 from helpers.robot import CORRIDOR, EMPTY, ROOMS, DriveRecord, Floor, Pose
 from helpers.robot.record import Command, Event, Step
+from helpers.robot_view.place import Point
 
 QUESTION = 'How many of 41 messages are heard?'
 
@@ -331,6 +334,15 @@ def test_a_line_on_the_way_has_a_name_and_the_way_a_start():
     assert (kind.record()['line'], kind.record()['label']) == (1.0, 'it breaks')
     assert ' A line, it breaks, is 1 m before the wall.' in kind.words()
     assert guess(END, ..., on=CORRIDOR, line_m=0.6).kind.record()['label'] == 'limit: 0.6 m'
+
+
+@pytest.mark.parametrize('degrees', [0, 90, 210])
+def test_a_point_is_put_where_the_robot_sees_it(degrees):
+    yaw = math.radians(degrees)
+    point = Point(replace(EMPTY, start=Pose(2.0, 3.0, yaw)))
+    x, y = point.on_floor(1.5, -0.5)
+    ahead_and_left = complex(x - 2.0, y - 3.0) * cmath.exp(-1j * yaw)
+    assert ahead_and_left == pytest.approx(1.5 - 0.5j)
 
 
 def test_a_floor_without_a_wall_takes_no_place():
