@@ -35,7 +35,7 @@ from nbformat.v4 import new_code_cell
 from support.leftovers import processes_that_stay
 
 from helpers.checks.verdict import KEY
-from helpers.lesson import ROOT, code_of_solution, is_solution, magic_of
+from helpers.lesson import ROOT, is_solution
 from tools.lessons.comparison import IPyNbFile, NamedCell, RunningKernel
 
 CONDITIONS = ('idle', 'busy', 'twice', 'interrupt', 'kill')
@@ -181,10 +181,9 @@ class Again(NamedCell):
     def compare_outputs(self, test, ref, skip_compare=None) -> bool:
         """Compare as nbval does, without the hints that an exercise gives at the second try.
 
-        Of a solution with commands the verdict is compared: they may say that all is done already.
+        Of a solution its verdict is compared: commands may say that all is done already.
         """
-        code = code_of_solution(self.cell.source)
-        if is_solution(self.cell) and magic_of(code).name == 'terminal':
+        if is_solution(self.cell):
             test = [output for output in test if output.output_type != 'stream']
             ref = [output for output in ref if output.output_type != 'stream']
         for output in test:
