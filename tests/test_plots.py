@@ -16,6 +16,7 @@ from matplotlib.text import Text
 
 from helpers import plots
 from helpers.plots.alt_text import alt_text
+from helpers.plots.runs import _remove_overlaps
 
 HEARD = [0, 1, 2, 3, 7, 11, 15, 19, 23, 27, *range(31, 41)]  # the slow subscriber of lesson 02
 PERIOD_S, CALLBACK_S = 0.05, 0.2
@@ -174,6 +175,13 @@ def test_labels_neither_overlap_nor_leave_the_axes(published):
     assert len(ax.texts) > 1
     assert all(text.get_window_extent().x0 >= ax.bbox.x0 for text in ax.texts)
     assert not overlap(ax.texts)
+
+
+def test_a_text_is_left_out_if_it_covers_any_earlier_one():
+    _, ax = plt.subplots()
+    texts = [ax.annotate('lost', (place, 0.5)) for place in (0.2, 0.6, 0.2)]
+    _remove_overlaps(ax, texts, np.empty((0, 2)))
+    assert list(ax.texts) == texts[:2]
 
 
 def test_two_runs_beside_each_other(slow, parallel):
