@@ -1,11 +1,14 @@
-"""The rules that make wrong answers make those that they say, and each once."""
+"""The rules of wrong answers make those that they say, each once, and enough for each task."""
 
 import ast
 from textwrap import dedent
 
 import pytest
 from mutants import drawn, entry_of, mutants_of, same_program
-from support.answers import equal_of, source_of
+from mutants.lessons import of_lesson
+from support.answers import LEAST, answers_of, equal_of, source_of
+
+from helpers.lesson import ROOT, lessons
 
 
 def program(text):
@@ -338,3 +341,22 @@ def test_an_equal_mutant_needs_a_reason():
     assert equal_of({}, 'a') == []
     with pytest.raises(ValueError, match='because'):
         equal_of({'a equal': [{'x': 'y'}]}, 'a')
+
+
+@pytest.mark.parametrize('lesson', lessons(), ids=lambda lesson: lesson.file)
+def test_answers_and_the_rules_of_wrong_ones_fit_together(lesson):
+    file = ROOT / f'tests/answers/{lesson.name}.yaml'
+    if not lesson.tasks:
+        return
+    answers, of_tasks = answers_of(file), of_lesson(lesson.name)
+    stale = [f'{task}: {old}' for task, of in of_tasks.items() for old in of.stale]
+    assert not stale, f'No rule makes these any more, below `equal:` of {file.name}: {stale}'
+    for task, of in of_tasks.items():
+        known = '\n\n'.join(of.known)
+        assert not known, f'{task}: take out of {file.name} what a rule makes as well:\n{known}'
+    found = {
+        task: len(answers.get(f'{task} wrong', [])) + len(of.mutants)
+        for task, of in of_tasks.items()
+    }
+    few = {task: number for task, number in found.items() if number < LEAST['wrong']}
+    assert not few, f'There must be {LEAST["wrong"]} wrong answers, with those of rules: {few}'
