@@ -5,6 +5,7 @@ import fcntl
 import os
 import random
 import socket
+import time
 from collections import Counter
 from pathlib import Path
 
@@ -271,13 +272,19 @@ def test_participants_are_made_and_ended_in_turn(turn, monkeypatch):
 
 
 def test_what_a_killed_process_left_in_shared_memory_is_removed():
-    dead, living = (Path('/dev/shm', f'fastrtps_{number:016x}') for number in (os.getpid(), 1))
-    for name in dead, living:
+    dead, living, young = (
+        Path('/dev/shm', f'fastrtps_{number:016x}') for number in (os.getpid(), 1, 2)
+    )
+    for name in dead, living, young:
         name.touch()
         Path(f'{name}_el').touch()
+    os.utime(f'{dead}_el', (0, 0))
+    os.utime(f'{living}_el', (0, 0))
+    os.utime(f'{young}_el', (time.time() + 60,) * 2)  # somebody is about to take it
     with open(f'{living}_el') as lock:
         fcntl.flock(lock, fcntl.LOCK_SH)
         remove_dead_segments()
-        assert [dead.exists(), living.exists()] == [False, True]
+        assert [one.exists() for one in (dead, living, young)] == [False, True, True]
+    os.utime(f'{young}_el', (0, 0))
     remove_dead_segments()
-    assert not living.exists()
+    assert [living.exists(), young.exists()] == [False, False]

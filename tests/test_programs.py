@@ -17,7 +17,8 @@ from helpers.workspace import Workspace, started, wait_until
 
 
 @pytest.fixture
-def workspace():
+def workspace(monkeypatch):
+    monkeypatch.setattr('helpers.ros.domain.YOUNG_S', 0.0)  # programs that were killed at once
     workspace = Workspace('test_programs')
     yield workspace
     workspace.close()

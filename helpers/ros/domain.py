@@ -19,6 +19,7 @@ DOMAIN_IDS = range(1, 101)  # those of domain_coordinator
 FIRST_PORT, PORTS_PER_DOMAIN = 7400, 250
 MARK_ADDRESS = '127.0.0.2'  # of this machine; no connection comes from it
 TURN_TIMEOUT_S = 5.0
+YOUNG_S = 0.2  # a lock of a process that is just about to take it
 POLL_S = 0.01
 ANNOUNCEMENTS = Path(__file__).with_name('announcements.xml')
 
@@ -149,10 +150,13 @@ def remove_dead_segments() -> None:
     """Remove what killed processes have left in shared memory, as `fastdds shm clean` does.
 
     Fast DDS holds a lock on a file beside each segment and each port, as long as its owner lives.
+    A port that only writers have opened has no such file: if they are killed, it stays.
     """
-    with one_process_at_a_time():  # nobody is just making one
+    with one_process_at_a_time():  # none of ours is just making one, but a student's program may
         for lock in Path(SHARED_MEMORY).glob('fastrtps_*_[es]l'):
             with contextlib.suppress(OSError), lock.open('rb') as file:
+                if time.time() - os.fstat(file.fileno()).st_mtime < YOUNG_S:
+                    continue
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 name = lock.name[:-3]
                 for left in (lock.name, name, f'sem.{name}_mutex'):
