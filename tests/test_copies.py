@@ -10,7 +10,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
-from helpers.ros import ros_session
+from helpers.ros import fork, ros_session
 from helpers.trials import in_copies
 
 
@@ -129,4 +129,18 @@ def test_an_interrupt_ends_all_copies_in_order(tmp_path):
         in_copies({number: lambda number=number: wait(number) for number in range(3)})
     assert len([*tmp_path.iterdir()]) == 3
     with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+
+
+def test_an_interrupt_while_a_copy_begins_ends_it(monkeypatch):
+    def fork_and_interrupt():
+        pid = fork()
+        if pid:
+            signal.raise_signal(signal.SIGINT)
+        return pid
+
+    monkeypatch.setattr('helpers.trials.copies.fork', fork_and_interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        in_copies({1: lambda: time.sleep(60)})
+    with pytest.raises(ChildProcessError):  # there is none
         os.waitpid(-1, os.WNOHANG)

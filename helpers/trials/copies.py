@@ -42,12 +42,12 @@ def in_copies(runs: Mapping[Name, Callable[[], Result]], most: int = 6) -> dict[
     with _copies() as running:
         while left or running:
             while left and len(running) < most:
-                name, function = left.pop(0)
-                running[_start(function)] = name
+                _start(*left.pop(0), running)
             for answers in wait([*running], POLL_S):
-                results[running[answers]] = _answer_of(answers, running[answers])
-                _reap(answers)
-                del running[answers]
+                with uninterrupted():
+                    results[running[answers]] = _answer_of(answers, running[answers])
+                    _reap(answers)
+                    del running[answers]
     for name in runs:
         _show(results[name][1])
     return {name: results[name][0] for name in runs}
@@ -77,17 +77,24 @@ def _copies() -> Iterator[dict[_Answers, Hashable]]:
                 remove_dead_segments()
 
 
-def _start(function: Callable[[], object]) -> _Answers:
+def _start(
+    name: Hashable, function: Callable[[], object], running: dict[_Answers, Hashable]
+) -> None:
+    """Start a copy, and note it among those that run: an Interrupt finds it there."""
     receiver, sender = Pipe(duplex=False)
     answers = _Answers(os.dup(receiver.fileno()), writable=False)
     receiver.close()
     parent = os.getpid()
     with uninterrupted():
-        answers.pid = fork()
-        if answers.pid == 0:
-            _be_copy(function, sender, parent)
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # until the copy has its handler
+        try:
+            answers.pid = fork()
+            if answers.pid == 0:
+                _be_copy(function, sender, parent)
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        running[answers] = name
     sender.close()
-    return answers
 
 
 def _show(bundles: list[tuple[dict, dict]]) -> None:
@@ -126,6 +133,7 @@ def _be_copy(function: Callable[[], object], sender: Connection, parent: int) ->
     try:
         os.setsid()  # an Interrupt of the kernel's group must not reach it: its owner sends one
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:
             return
