@@ -209,7 +209,7 @@ def test_canvas_takes_no_grades_of_anonymous_students_and_it_is_said(submit, cap
 
 
 def test_only_students_with_a_name_in_canvas_are_in_its_gradebook(submit):
-    """Beside them, a folder may have anonymous ones, and some who hand in elsewhere."""
+    """A folder may also have anonymous students, and those of another system."""
     known, hidden = 'lovelaceada_55_4567_x.ipynb', 'anon_x7Yz1_4567_x.ipynb'
     files = {one: with_answer(RIGHT) for one in (known, hidden, 'Bob/x.ipynb')}
     folder = submit(**files, **moodle_class(1))
