@@ -71,6 +71,7 @@ def test_a_check_says_its_task_and_what_it_hands_over(source, call):
 )
 def test_a_magic_is_read_with_its_line_and_what_is_below(source, magic):
     assert magic_of(source) == magic
+    assert magic_of(source).file == ('src/a b.py' if magic[0] == 'write' else '')
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import pytest
 import yaml
 from support.imports import imported_packages
 
+from helpers.checks import tasks
 from helpers.lesson import ROOT, path_of, read
 
 DOCUMENTS = [
@@ -147,6 +148,12 @@ def licence(name):
     short = about.get('License-Expression') or (about.get('License') or '').partition('\n')[0]
     kinds = about.get_all('Classifier', [])
     return ' '.join([short, *(kind for kind in kinds if kind.startswith('License'))])
+
+
+def test_the_limits_of_a_point_are_as_contributing_says():
+    form = r'may use (\d+) s of CPU and (\d+) s of the clock.* all others together have (\d+) s'
+    said = [int(seconds) for seconds in re.search(form, CONTRIBUTING, re.DOTALL).groups()]
+    assert said == [tasks.CPU_LIMIT_S, tasks.LIMIT_S, tasks.TOGETHER_S]
 
 
 def test_packages_with_copyleft_are_named():

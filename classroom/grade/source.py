@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import tokenize
 
-from helpers.lesson import magic_of, path_and_part
+from helpers.lesson import magic_of
 
 CPP = '.cpp', '.hpp', '.h'
 SKIPPED = {tokenize.COMMENT, tokenize.NL, tokenize.ENCODING}
@@ -17,8 +17,7 @@ def code_only(source: str) -> str:
 
     Of a source that is not Python, whole lines of comments are left out, and the ends of lines.
     """
-    magic = magic_of(source)
-    is_cpp = magic.name == 'write' and path_and_part(magic.line)[0].endswith(CPP)
+    is_cpp = magic_of(source).file.endswith(CPP)
     try:
         if is_cpp:
             raise ValueError

@@ -143,9 +143,8 @@ def _files(lesson: Lesson, solved: set[str]) -> set[str]:
     owners = {cell.id: task.name for task in lesson.tasks for cell in task.cells}
     writers: dict[str, set[str]] = {}
     for cell in lesson.code_cells():
-        magic = magic_of(code_of_solution(cell.source))
-        if magic.name == 'write':
-            writers.setdefault(path_and_part(magic.line)[0], set()).add(owners.get(cell.id, ''))
+        if file := magic_of(code_of_solution(cell.source)).file:
+            writers.setdefault(file, set()).add(owners.get(cell.id, ''))
     return {file for file, tasks in writers.items() if tasks <= solved | {''}}
 
 

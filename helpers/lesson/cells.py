@@ -88,6 +88,11 @@ class Magic(NamedTuple):
     line: str
     body: str
 
+    @property
+    def file(self) -> str:
+        """The file that `%%write` makes, or a part of it; empty for other cells."""
+        return path_and_part(self.line)[0] if self.name == 'write' else ''
+
 
 def magic_of(source: str) -> Magic:
     """Return the magic with which a cell begins, its line, and the rest of the cell."""

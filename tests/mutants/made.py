@@ -15,7 +15,7 @@ from hashlib import blake2s
 import libcst as cst
 from support.answers import source_of
 
-from helpers.lesson import magic_of, path_and_part
+from helpers.lesson import magic_of
 from mutants import files
 from mutants.program import Program
 from mutants.rules import RULES
@@ -189,11 +189,11 @@ def _made(source: str, written: set[int]) -> Iterator[tuple[str, str]]:
 
 def _parts(source: str) -> tuple[str, str, str]:
     """Return the magic that a cell begins with, the rest, and its kind."""
-    name, line, body = magic_of(source)
-    if not name:
+    magic = magic_of(source)
+    if not magic.name:
         return '', source, 'python'
-    kind = files.kind_of(path_and_part(line)[0]) if name == 'write' else 'commands'
-    return source.removesuffix(body), body, kind
+    kind = files.kind_of(magic.file) if magic.file else 'commands'
+    return source.removesuffix(magic.body), magic.body, kind
 
 
 def _of_lines(lines: list[str], written: set[int], kind: str) -> Iterator[tuple[str, list[str]]]:

@@ -74,10 +74,10 @@ def publishers(lesson: Lesson) -> Iterator[tuple[str, str]]:
     A class that only inherits its publisher is not found.
     """
     for cell, code in shown(lesson):
-        magic, line, _ = magic_of(code)
-        if magic == 'write' and PUBLISHES.search(code):
-            yield cell, path_and_part(line)[0]
-        for statement in [] if magic else statements(code):
+        magic = magic_of(code)
+        if magic.file and PUBLISHES.search(code):
+            yield cell, magic.file
+        for statement in [] if magic.name else statements(code):
             if isinstance(statement, ast.ClassDef) and PUBLISHES.search(ast.unparse(statement)):
                 yield cell, statement.name
 

@@ -5,21 +5,21 @@ from pygments.lexers import TextLexer, get_lexer_for_filename
 from pygments.token import Comment
 from pygments.util import ClassNotFound
 
-from helpers.lesson import magic_of, path_and_part
+from helpers.lesson import magic_of
 
 
 class CellLexer(IPython3Lexer):
     def get_tokens_unprocessed(self, text):
         """Yield (index, token, value) of a cell's source."""
-        name, line, body = magic_of(text)
-        if name != 'write':
+        magic = magic_of(text)
+        if not magic.file:
             yield from super().get_tokens_unprocessed(text)
             return
-        first = text.removesuffix(body)
+        first = text.removesuffix(magic.body)
         yield 0, Comment.Special, first
         try:
-            lexer = get_lexer_for_filename(path_and_part(line)[0].replace('.urdf', '.xml'))
+            lexer = get_lexer_for_filename(magic.file.replace('.urdf', '.xml'))
         except ClassNotFound:  # of an interface
             lexer = TextLexer()
-        for index, token, value in lexer.get_tokens_unprocessed(body):
+        for index, token, value in lexer.get_tokens_unprocessed(magic.body):
             yield len(first) + index, token, value

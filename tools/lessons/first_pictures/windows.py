@@ -74,9 +74,8 @@ def program_picture(lesson: Lesson, cell_id: str, lines: list[str], drive: str) 
 
     Each of `lines` is how a line of the cell begins. What is not there raises ValueError.
     """
-    _, file, body = magic_of(cell(lesson, cell_id).source)
-    code = body.splitlines()
-    shown = [('typed ink', file)]
+    magic = magic_of(cell(lesson, cell_id).source)
+    code, shown = magic.body.splitlines(), [('typed ink', magic.line)]
     for line in lines:
         if not any(one.startswith(line) for one in code):
             raise ValueError(f'{cell_id} of {lesson.name} has no line {line!r} any more.')
