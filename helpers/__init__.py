@@ -5,8 +5,8 @@ it. A package imports only from those that stand above it in this list:
 
     lesson      what a lesson is: steps, tasks, guesses and notes, read from its notebook
     notebook    what a cell needs before ROS comes: interrupts, a bar, lines, letters, colours
-    ros         a session in a kernel: its domain, its threads, its log, what waits for what
     waits       what waits in any program, for what, and why that does not come
+    ros         a session in a kernel: its domain, its threads, its log, what is not connected
     machine     this machine: what it has, what is missing, tools of a build, folders of workspaces
     robot       a small robot behind real messages; it also runs as a program
     recording   records of what callbacks did, and the model of a queue that explains them

@@ -1,4 +1,4 @@
-"""A ROS session in a kernel: its domain, its threads, its log, and what waits for what."""
+"""A ROS session in a kernel: its domain, its threads, its log, and what is not connected."""
 
 from helpers.ros.connections import NOT_OF_A_LESSON, nearly
 from helpers.ros.conversions import START_NS, STATUS, quaternion, seconds_of, stamp_of, yaw_of
@@ -10,7 +10,6 @@ from helpers.ros.session import (
     Session,
     current_session,
     find,
-    frames,
     graph_environment,
     leave_ros,
     ros_session,
@@ -25,7 +24,6 @@ __all__ = [
     'current_session',
     'find',
     'fork',
-    'frames',
     'graph_environment',
     'leave_ros',
     'nearly',

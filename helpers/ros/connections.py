@@ -5,40 +5,24 @@ Each finding is one sentence. Their order is fixed.
 
 from __future__ import annotations
 
-import linecache
-import re
-import sysconfig
 from collections.abc import Container, Iterable, Iterator
-from difflib import get_close_matches
 from itertools import product
-from pathlib import Path
-from types import FrameType
 
 from rclpy.action import ActionClient, ActionServer, get_action_names_and_types
 from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
-from helpers.ros.private import action_name
+from helpers.waits import action_name, nearest
 
 NOT_OF_A_LESSON = ('/rosout', '/parameter_events')
-# Code that is in no callback of a lesson.
-FOREIGN = re.compile(
-    '|'.join(
-        [re.escape(sysconfig.get_path('stdlib')), re.escape(str(Path(__file__).parents[1]))]
-        + ['/(site|dist)-packages/', '<frozen']
-    )
-)
-WAITS_AT_A_LOCK = re.compile(r'(async )?with |.*\.acquire\(')
 
 
-def findings(
-    nodes: Iterable[Node], spinning: Container[Executor], frames: Iterable[FrameType]
-) -> list[str]:
-    """Return a sentence for everything that keeps messages, answers and callbacks away.
+def findings(nodes: Iterable[Node], spinning: Container[Executor]) -> list[str]:
+    """Return a sentence for everything that keeps messages and answers away.
 
-    `nodes` are all nodes of this process, `spinning` its executors that spin, and `frames` the
-    innermost frames of their threads.
+    `nodes` are all nodes of this process, `spinning` its executors that spin. Callbacks that wait
+    are not among them: `helpers.waits` finds those.
     """
     nodes = sorted(nodes, key=lambda node: node.get_fully_qualified_name())
     return [
@@ -46,7 +30,6 @@ def findings(
         *_topics(nodes),
         *_services(nodes),
         *_actions(nodes),
-        *sorted(filter(None, map(_wait_of_callback, frames))),
     ]
 
 
@@ -109,9 +92,8 @@ def _node_name(end) -> str:
 
 def nearly(name: str, others: list[str]) -> str:
     """Return a sentence that names which of the other names may be meant, or nothing."""
-    by_lower = {other.lower(): other for other in others}
-    matches = get_close_matches(name.lower(), by_lower, n=1, cutoff=0.8)
-    return f' Nearly the same name: {by_lower[matches[0]]}.' if matches else ''
+    near = nearest(name, others)
+    return f' Nearly the same name: {near}.' if near else ''
 
 
 def _pairs_that_do_not_fit(name: str, publishers: list, subscriptions: list) -> Iterator[str]:
@@ -151,19 +133,3 @@ def _actions(nodes: list[Node]) -> Iterator[str]:
         for name in sorted(missing):
             near = nearly(name, sorted(known - missing))
             yield f'{node.get_name()} sends goals to {name}, and nobody serves it.{near}'
-
-
-def _wait_of_callback(frame: FrameType) -> str | None:
-    """Return which callback of a lesson a thread is in, and the line at which it waits."""
-    in_threading = frame.f_code.co_filename.endswith('/threading.py')
-    own = []
-    while frame is not None:
-        if not FOREIGN.search(frame.f_code.co_filename):
-            own.append(frame)
-        frame = frame.f_back
-    if not own:
-        return None
-    line = linecache.getline(own[0].f_code.co_filename, own[0].f_lineno).strip()
-    if not (in_threading or WAITS_AT_A_LOCK.match(line)):
-        return None  # it works
-    return f'The callback {own[-1].f_code.co_name} waits at: {line}'

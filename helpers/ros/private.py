@@ -14,7 +14,6 @@ from concurrent.futures import thread as thread_pool
 from types import FrameType
 from typing import NamedTuple
 
-from rclpy.action import ActionClient
 from rclpy.client import Client
 from rclpy.executors import Executor
 from rclpy.node import Node
@@ -82,10 +81,6 @@ def end_lifecycle(node: Node) -> None:
     machine = getattr(node, '_state_machine', None)  # private: a lifecycle node, rclpy 7.1.6
     if machine is not None:
         machine.destroy_when_not_in_use()
-
-
-def action_name(client: ActionClient) -> str:
-    return client._action_name  # private: an action client, rclpy 7.1.6
 
 
 def states_of(executor: Executor, spin_thread: threading.Thread) -> set[str]:

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator
 from itertools import chain
 from traceback import clear_frames
 
-from helpers.notebook import ProgressBar, at_each_signal, frames, uninterrupted
+from helpers.notebook import ProgressBar, at_each_signal, uninterrupted
 from helpers.ros.domain import (
     check_domain,
     configure_discovery,
@@ -43,6 +43,7 @@ try:
 
     from helpers.ros import connections, private
     from helpers.ros.rosout import Record, Rosout
+    from helpers.waits import explain_callbacks
 except ImportError as error:
     raise ImportError(
         f'rclpy cannot be imported in this Python ({error}): start JupyterLab with `make lab`, '
@@ -281,8 +282,8 @@ class Session:
     def _findings(self) -> list[str]:
         nodes = [node for node in find(Node, self._context) if is_used(node)]
         nodes = [node for node in nodes if node.get_name() != LOG_NODE]
-        places = [frame for _, frame in frames(self.threads())]
-        return connections.findings(nodes, self._spinning, places)
+        callbacks = explain_callbacks()
+        return [*connections.findings(nodes, self._spinning), *([callbacks] if callbacks else [])]
 
     def wait_until_quiet(self, executor: Executor, timeout_s: float = 30.0) -> bool:
         """Wait until nothing happens in an executor any more, timers and time-outs apart.

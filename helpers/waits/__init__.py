@@ -7,23 +7,28 @@ this folder works beside any program, `python3 -m waits node.py`.
 
 from __future__ import annotations
 
+import inspect
 import threading
 from dataclasses import dataclass
 from types import FrameType
 
+from .blockers import nearest
 from .circles import circle
 from .finding import Finding
 from .findings import find
 from .sentences import NOTHING, sentences
-from .snapshot import Snapshot
+from .snapshot import Snapshot, action_name
 
 __all__ = [
     'NOTHING',
     'Finding',
     'Told',
+    'action_name',
     'circle',
     'explain',
+    'explain_callbacks',
     'find_waits',
+    'nearest',
     'tell',
     'tell_interrupt',
 ]
@@ -45,8 +50,8 @@ class Told:
 def find_waits(main_frame: FrameType | None = None) -> list[Finding]:
     """Return what waits in this process, what is stuck first, but for the thread that asks.
 
-    With `main_frame` it is the main thread that asks, in a signal handler, and this is the frame in
-    which the signal found it.
+    With `main_frame` it is the main thread that asks, and its code from this frame outwards is
+    looked at too: a signal handler gives the frame in which the signal found it.
     """
     own = threading.get_ident()
     return find(Snapshot(main_frame, () if main_frame is not None else (own,)))
@@ -64,6 +69,13 @@ def tell() -> Told:
 def explain() -> str:
     """Return what waits as text, '' if nothing does."""
     return tell().text
+
+
+def explain_callbacks() -> str:
+    """Return what callbacks wait, as text; a thread that asks may hold what they wait for."""
+    in_main = threading.current_thread() is threading.main_thread()
+    frame = inspect.currentframe() if in_main else None
+    return _told([one for one in find_waits(frame) if one.activity.task is not None]).text
 
 
 def tell_interrupt(frame: FrameType | None) -> Told:

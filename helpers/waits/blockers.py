@@ -243,10 +243,16 @@ def _who_would_spin(snapshot: Snapshot) -> str:
 # --- Peers
 
 
-def nearly(name: str, others: Iterable[str]) -> str:
+def nearest(name: str, others: Iterable[str]) -> str | None:
+    """Return which of the other names may be meant: nearly the same letters, small or capital."""
     by_lower = {other.lower(): other for other in others if other != name}
     matches = get_close_matches(name.lower(), by_lower, n=1, cutoff=0.8)
-    return f' (nearly the same name: {by_lower[matches[0]]})' if matches else ''
+    return by_lower[matches[0]] if matches else None
+
+
+def nearly(name: str, others: Iterable[str]) -> str:
+    near = nearest(name, others)
+    return f' (nearly the same name: {near})' if near else ''
 
 
 def of_topic(subscription: Subscription, node: Node) -> list[Blocker]:

@@ -165,6 +165,7 @@ def is_there(thing: object) -> bool:
 
 
 def action_name(client: ActionClient) -> str:
+    """Return the name of an action as its client was given it."""
     return client._action_name  # private: an action client, rclpy 7.1.6
 
 
