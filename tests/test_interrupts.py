@@ -1,12 +1,15 @@
 """An Interrupt waits for the end of what must not be cut in two."""
 
+import importlib
 import signal
+import sys
 import threading
 
 import pytest
 from support.kernel import Kernel
 
-from helpers.notebook.interrupts import uninterrupted
+from helpers.notebook import interrupts
+from helpers.notebook.interrupts import AfterImports, uninterrupted
 
 
 def test_an_interrupt_waits_for_the_end():
@@ -35,3 +38,29 @@ def test_a_command_of_a_cell_can_be_interrupted_and_knows_its_variables():
         assert kernel.run('!echo the kernel lives').strip() == 'the kernel lives'
         in_a_function = 'def say(word):\n    !echo {word} $word\n\nsay("twice")'
         assert kernel.run(in_a_function).strip() == 'twice twice'
+
+
+PRESS = 'import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\n'
+LONG = 'time.sleep(60)\n'
+
+
+@pytest.mark.parametrize(
+    ('name', 'source', 'is_whole'),
+    [
+        ('a_library', f'{PRESS}whole = True\n', True),
+        ('a_library_that_hangs', f'{PRESS}{PRESS}{LONG}', False),
+        ('my_module', f'{PRESS}{LONG}', False),
+    ],
+)
+def test_an_interrupt_comes_after_an_import(name, source, is_whole, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / f'{name}.py').write_text(source)
+    monkeypatch.setattr(interrupts, 'is_students', lambda file: file.endswith('my_module.py'))
+    before = signal.signal(signal.SIGINT, AfterImports(signal.default_int_handler))
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            importlib.import_module(name)
+            threading.Event().wait(60)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert (name in sys.modules) == is_whole

@@ -16,7 +16,7 @@ from IPython.core.error import UsageError
 from IPython.display import display
 from IPython.utils.process import system
 
-from helpers.notebook import own_line, run_command
+from helpers.notebook import AfterImports, own_line, run_command
 
 # The first cells of each lesson load one of them.
 IN_IMPORT, IN_TRACKER = '<frozen importlib', 'resource_tracker.py'
@@ -90,11 +90,13 @@ def _watch_interrupts(shell) -> list:
                 told[:] = [tell_interrupt(frame)]
         signal.default_int_handler(number, frame)
 
+    handler = AfterImports(interrupt)
+
     def begin(*_) -> None:
         told.clear()
         main = threading.current_thread() is threading.main_thread()
         if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            signal.signal(signal.SIGINT, interrupt)  # ipykernel sets its own after the cell
+            signal.signal(signal.SIGINT, handler)  # ipykernel sets its own after the cell
 
     shell.events.register('pre_run_cell', begin)
     _begins[shell] = begin

@@ -10,6 +10,8 @@ import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 
+from helpers.notebook.own_code import is_students, places
+
 MOMENT_S = 0.1
 
 
@@ -61,6 +63,46 @@ def at_each_signal(call: Callable[[], None]) -> Iterator[None]:
         writer.close()
         thread.join()
         reader.close()
+
+
+class AfterImports:
+    """A handler of SIGINT that lets an import end first, then calls `interrupt` with the signal.
+
+    Python cannot repeat an import of NumPy or PyYAML that was cut in two: from then on each cell
+    would fail. A second Interrupt does not wait, nor one in a module that the student has written.
+    """
+
+    def __init__(self, interrupt: Callable[[int, FrameType | None], object]) -> None:
+        self._interrupt = interrupt
+        self._again: threading.Timer | None = None
+        self._asked = False  # the signal is that of the timer
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        pressed_again = self._again is not None and not self._asked
+        if _is_importing(frame) and not pressed_again:
+            self._asked = False
+            self._again = threading.Timer(MOMENT_S, self._ask, (number,))
+            self._again.daemon = True
+            self._again.start()
+            return
+        if pressed_again:
+            self._again.cancel()
+        self._again, self._asked = None, False
+        self._interrupt(number, frame)
+
+    def _ask(self, number: int) -> None:
+        self._asked = True
+        os.kill(os.getpid(), number)
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    """Return whether a module is being imported in this frame, and it is none of the student's."""
+    for file, _ in places(frame):
+        if file.startswith('<frozen importlib'):
+            return True
+        if is_students(file):
+            return False
+    return False
 
 
 def run_command(run: Callable[[str], int], command: str) -> int:

@@ -59,10 +59,6 @@ HINTS = {
     'text/html': re.compile(r'<div style="[^"]*"><b>Hint</b> .*?</div>'),
 }
 KERNEL_LOST = (Empty, RuntimeError, ValueError)  # no answer, a dead kernel, a broken message
-# In IPython's traceback: the top level of a module, or the cell's own import where Python has left
-# out all frames below it.
-IN_IMPORT = re.compile(r'^File (<frozen importlib|.+\.py:\d+$)|^-+> \d+ (import|from) ', re.M)
-IMPORTS = re.compile(r'^(import|from) ', re.M)
 # Python's helper of a pool of processes: its child that was not yet noted is a zombie.
 IN_TRACKER = re.compile(r'resource_tracker\.py:\d+, in ResourceTracker\.(ensure_running|_launch)')
 COLOURS = re.compile(r'\x1b\[[0-9;]*m')  # of IPython's tracebacks
@@ -203,7 +199,7 @@ class Interrupted(NamedCell):
         after_s = random_time_s()
         for _ in range(2):
             try:
-                sent, error = self._interrupt(after_s)
+                error = self._interrupt(after_s)
                 break
             except KERNEL_LOST as lost:
                 why = repr(lost)
@@ -211,27 +207,25 @@ class Interrupted(NamedCell):
         else:  # ipykernel does so by itself, a lesson that is wrong does it twice
             self.raise_cell_error(f'Run for {after_s:.3f} s. The kernel is lost: {why}')
         traceback = COLOURS.sub('', '\n'.join(error.get('traceback', [])))
-        unsaid = sent and not traceback and IMPORTS.search(self.cell.source)
-        if unsaid or IN_IMPORT.search(traceback) or IN_TRACKER.search(traceback):
-            # Python cannot repeat a half-done import of NumPy: the reader restarts the kernel.
-            fresh_kernel(self, self.cell_num)
+        if IN_TRACKER.search(traceback):
+            fresh_kernel(self, self.cell_num)  # the student sees it in the traceback
         elif error.get('ename', 'KeyboardInterrupt') != 'KeyboardInterrupt':
             self.raise_cell_error(f'Interrupted after {after_s:.3f} s, it fails', traceback)
 
-    def _interrupt(self, after_s: float) -> tuple[bool, dict]:
-        """Return whether the cell was interrupted, and its error. Raises one of KERNEL_LOST."""
+    def _interrupt(self, after_s: float) -> dict:
+        """Interrupt the cell if it still runs, and return its error. Raises one of KERNEL_LOST."""
         kernel = self.parent.kernel
         message = kernel.execute_cell_input(self.cell.source, allow_stdin=False)
         listen(kernel, message, 'execute_input', ANSWER_TIMEOUT_S)
         try:
-            return False, listen(kernel, message, 'idle', after_s)
+            return listen(kernel, message, 'idle', after_s)
         except Empty:
             kernel.interrupt()
             # When the signal meets ipykernel beside the cell, it sends no reply, or a broken one.
             error = listen(kernel, message, 'idle', ANSWER_TIMEOUT_S)
             with suppress(Empty):
                 kernel.get_message('shell', timeout=REPLY_S)
-            return True, error
+            return error
 
 
 class Killed(NamedCell):
