@@ -91,7 +91,7 @@ class Copies:
             if kind:
                 cell.metadata.slideshow = nbformat.from_dict({'slide_type': kind})
             if folded(cell):
-                cell.metadata.jupyter = {'source_hidden': True}
+                cell.metadata.update(nbformat.from_dict(lesson.FOLD))
             if cell.cell_type == 'code':
                 cell.outputs, cell.execution_count = [], None
         notebook.cells = shortened(notebook.cells, types)

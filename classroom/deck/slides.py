@@ -14,7 +14,7 @@ import ast
 
 from nbformat import NotebookNode
 
-from helpers.lesson import WRITTEN, has_heading, tags
+from helpers.lesson import WRITTEN, has_heading, is_folded, tags
 
 LINES = 18  # of code that is not folded: more of it is on the next slide
 HELPERS = ast.Import, ast.ImportFrom, ast.FunctionDef, ast.Assign  # of a cell that runs nothing
@@ -73,7 +73,7 @@ def folded(cell: NotebookNode) -> bool:
     """
     if cell.cell_type != 'code' or WRITTEN & tags(cell):
         return False
-    if cell.metadata.get('jupyter', {}).get('source_hidden'):
+    if is_folded(cell):
         return True
     try:
         kinds = {type(statement) for statement in ast.parse(cell.source).body}

@@ -53,7 +53,7 @@ from nbformat.v4 import output_from_msg
 
 from classroom.grade import limits
 from helpers.checks.progress import IS_GRADED
-from helpers.checks.verdict import KEY
+from helpers.checks.verdict import verdict_in
 from helpers.lesson import magic_of
 
 PR_SET_DUMPABLE, PR_SET_CHILD_SUBREAPER = 4, 36  # linux/prctl.h
@@ -288,8 +288,7 @@ class Witness:
 
 def _what_is_forged(task: str, outputs: list[dict], changed: str, told: list[tuple]) -> str:
     """Return why a verdict that says solved does not count, or nothing."""
-    shown = [output.get('metadata', {}).get(KEY) for output in outputs]
-    points = [one.get('points') for one in shown if isinstance(one, dict)]
+    points = [shown.get('points') for shown in filter(None, map(verdict_in, outputs))]
     seen = [line[2:] for line in told if line[1] == 'point']
     changed = changed or next((line[-1] for line in seen if line[-1]), '')
     if changed:
@@ -411,8 +410,7 @@ def _canaries(kernel: Kernel, job: dict, passed: set[str]) -> Iterator[dict]:
 
 
 def _is_solved(outputs: list[dict]) -> bool:
-    verdicts = [output.get('metadata', {}).get(KEY) for output in outputs]
-    return any(isinstance(one, dict) and one.get('solved') is True for one in verdicts)
+    return any(one.get('solved') is True for one in filter(None, map(verdict_in, outputs)))
 
 
 # In the kernel of the student: what the archive has takes the place of what the cells wrote.

@@ -17,7 +17,7 @@ from classroom.grade.runner import LATE, Said
 from classroom.grade.source import code_only
 from classroom.grade.uses import digest_of_uses
 from classroom.handout import lesson_for_students
-from helpers.checks.verdict import KEY
+from helpers.checks.verdict import verdict_in
 from helpers.lesson import ROOT, Task, tags
 from tools.lessons.clean import text_of
 
@@ -157,9 +157,8 @@ def _verdict(task: str, outputs: list[dict]) -> dict | None:
     """Return the one verdict of a check's outputs. If there are two, one is forged: none counts."""
     found = []
     for output in outputs:
-        metadata = output.get('metadata')
-        data = metadata.get(KEY) if isinstance(metadata, dict) else None
-        if isinstance(data, dict):
+        data = verdict_in(output)
+        if data is not None:
             points = data.setdefault('points', [])
             if not isinstance(points, list) or not all(isinstance(p, dict) for p in points):
                 return None

@@ -133,6 +133,16 @@ class Verdict:
         return f'<div style="{CARD.format(colour)}">{"".join(rows)}</div>'
 
 
+def verdict_in(output: dict) -> dict | None:
+    """Return the data of the verdict that an output of a cell shows, if it shows one.
+
+    A student's notebook may have anything in their place.
+    """
+    metadata = output.get('metadata')
+    data = metadata.get(KEY) if isinstance(metadata, dict) else None
+    return data if isinstance(data, dict) else None
+
+
 def _without_empty(data: dict) -> dict:
     return {key: value for key, value in data.items() if value != ''}
 

@@ -35,12 +35,14 @@ The grammar of a lesson:
 """
 
 from helpers.lesson.cells import (
+    FOLD,
     Magic,
     Node,
     called,
     cells_of,
     first_heading,
     has_heading,
+    is_folded,
     is_for_instructors,
     is_question,
     keep_solution,
@@ -104,6 +106,7 @@ from helpers.lesson.moved import home_of_cell, home_of_guess, home_of_task
 
 __all__ = [
     'CHECK_BEGINS',
+    'FOLD',
     'FOLDED',
     'FOLDER',
     'GLOSSARY',
@@ -139,6 +142,7 @@ __all__ = [
     'home_of_task',
     'name_of_solution',
     'is_check',
+    'is_folded',
     'is_for_instructors',
     'is_question',
     'is_solution',

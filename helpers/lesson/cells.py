@@ -9,6 +9,7 @@ import zlib
 from typing import NamedTuple
 
 LONGEST_NAME = 40  # letters of a cell's first line that are enough to find it
+FOLD = {'jupyter': {'source_hidden': True}}  # the metadata of a cell that JupyterLab folds
 KEPT = 'ros2_notebooks_lends'  # in the metadata of a check: what it lends
 QUESTION = '### Question '
 MAGIC = re.compile(r'\s*%%(\w+)[ \t]*(.*)\n?')
@@ -79,6 +80,11 @@ def _why_no_json(data: bytes | str) -> str:
 def tags(cell: Node) -> set[str]:
     """Return the tags of a cell."""
     return set(cell.metadata.get('tags', []))
+
+
+def is_folded(cell: Node) -> bool:
+    """Return whether JupyterLab shows only the first line of a cell."""
+    return bool(cell.metadata.get('jupyter', {}).get('source_hidden'))
 
 
 class Magic(NamedTuple):

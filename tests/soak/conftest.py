@@ -34,7 +34,7 @@ import pytest
 from nbformat.v4 import new_code_cell
 from support.leftovers import processes_that_stay
 
-from helpers.checks.verdict import KEY
+from helpers.checks.verdict import verdict_in
 from helpers.lesson import ROOT, is_solution
 from tools.lessons.comparison import IPyNbFile, NamedCell, RunningKernel
 
@@ -183,7 +183,7 @@ class Again(NamedCell):
             test = [output for output in test if output.output_type != 'stream']
             ref = [output for output in ref if output.output_type != 'stream']
         for output in test:
-            if verdict := output.get('metadata', {}).get(KEY):
+            if verdict := verdict_in(output):
                 for kind, hint in HINTS.items():
                     output.data[kind] = hint.sub('', output.data[kind])
                 for point in verdict['points']:

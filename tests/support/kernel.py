@@ -5,7 +5,7 @@ from pathlib import Path
 import nbformat
 from nbclient import NotebookClient
 
-from helpers.checks.verdict import KEY
+from helpers.checks.verdict import verdict_in
 
 OWN_ERROR = 'ended with an error. Mend it'  # in the note of an answer that was not judged
 NOTEBOOKS = Path(__file__).resolve().parents[2] / 'notebooks'
@@ -37,8 +37,7 @@ class Kernel(NotebookClient):
         cell = nbformat.v4.new_code_cell(source)
         self.nb.cells.append(cell)
         self.execute_cell(cell, len(self.nb.cells) - 1)
-        data = [output.get('metadata', {}).get(KEY) for output in cell.outputs]
-        self.verdicts = [verdict for verdict in data if verdict]
+        self.verdicts = list(filter(None, map(verdict_in, cell.outputs)))
         self._has_error = any(output['output_type'] == 'error' for output in cell.outputs)
         return ''.join(map(_text, cell.outputs))
 

@@ -3,14 +3,13 @@
 import hashlib
 import re
 import shutil
-from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
 
-from helpers.lesson import compares, guess_of
+from helpers.lesson import FOLD, compares, guess_of, is_folded
 from helpers.notebook import AS_SAVED, MARK
 
 NOTEBOOK_METADATA = {
@@ -48,7 +47,7 @@ def clean(notebook: NotebookNode) -> NotebookNode:
         if cell.get('id') is None or cell.id in ids:
             cell.id = hashlib.sha256(f'{number} {cell.source}'.encode()).hexdigest()[:8]
         ids.add(cell.id)
-        cell.metadata = nbformat.from_dict(dict(_kept_metadata(cell.metadata)))
+        cell.metadata = nbformat.from_dict(_kept_metadata(cell))
         if cell.cell_type == 'markdown' and '<details' in cell.source:
             cell.metadata.editable = False  # a double click on an answer must not show the source
         if cell.cell_type == 'code':
@@ -70,11 +69,9 @@ def _mark_explanations(cells: list[NotebookNode]) -> None:
             guess = None
 
 
-def _kept_metadata(metadata: NotebookNode) -> Iterator[tuple[str, object]]:
-    if metadata.get('tags'):
-        yield 'tags', metadata['tags']
-    if metadata.get('jupyter', {}).get('source_hidden'):
-        yield 'jupyter', {'source_hidden': True}
+def _kept_metadata(cell: NotebookNode) -> dict:
+    named = {'tags': cell.metadata['tags']} if cell.metadata.get('tags') else {}
+    return named | (FOLD if is_folded(cell) else {})
 
 
 def _clean_outputs(cell: NotebookNode) -> list[NotebookNode]:

@@ -20,7 +20,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
-from helpers.lesson import FOLDED, GLOSSARY, ROOT, START, chosen, paths
+from helpers.lesson import FOLD, FOLDED, GLOSSARY, ROOT, START, chosen, paths
 from tools.lessons import tables
 from tools.lessons.clean import clean, text_of, write
 
@@ -46,7 +46,7 @@ def template(stem: str = '90_write_a_lesson', part: str = 'nodes') -> NotebookNo
         kind, *tags = head.split()
         metadata = {'tags': tags}
         if FOLDED.keys() & {*tags}:
-            metadata['jupyter'] = {'source_hidden': True}
+            metadata |= FOLD
         new_cell = getattr(nbformat.v4, f'new_{kind}_cell')
         cells.append(new_cell(source.strip('\n'), metadata=metadata))
     return clean(nbformat.v4.new_notebook(cells=cells))

@@ -13,7 +13,7 @@ from pathlib import Path
 from nbformat import NotebookNode
 
 from helpers.checks import questions
-from helpers.checks.verdict import KEY
+from helpers.checks.verdict import verdict_in
 from helpers.lesson import (
     FOLDED,
     FOLDER,
@@ -28,6 +28,7 @@ from helpers.lesson import (
     check_call,
     code_of_solution,
     has_heading,
+    is_folded,
     is_question,
     links_to_tasks,
     name_of_solution,
@@ -81,8 +82,7 @@ def texts(cell: NotebookNode) -> Iterator[str]:
 
 def verdicts(cell: NotebookNode) -> list[dict]:
     """Return what the checks of a cell found, as data."""
-    data = [output.get('metadata', {}).get(KEY) for output in cell.outputs]
-    return [verdict for verdict in data if verdict]
+    return list(filter(None, map(verdict_in, cell.outputs)))
 
 
 def said(found: list[dict]) -> str:
@@ -228,7 +228,7 @@ def tagged(lesson: Lesson) -> Iterator[str]:
         for tag in sorted(tags(cell) - TAGS):
             yield f'{name} has the unknown tag {tag!r}.'
         folded = tags(cell) & FOLDED.keys()
-        if ('jupyter' in cell.metadata) != bool(folded):
+        if is_folded(cell) != bool(folded):
             yield (
                 f'{name}: fold cells with the tag {" or ".join(FOLDED)}, by a click on the bar '
                 'at their left, and no others.'

@@ -17,7 +17,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
-from helpers.lesson import FOLDED, ROOT, Lesson, chosen, chosen_tasks, read
+from helpers.lesson import FOLD, FOLDED, ROOT, Lesson, chosen, chosen_tasks, read
 from tools.lessons import tables
 from tools.lessons.clean import clean, text_of, write
 from tools.lessons.new import judges_of
@@ -70,7 +70,7 @@ def new_cells(name: str) -> list[NotebookNode]:
     for kind, tag, text in CELLS:
         metadata = {'tags': [tag]} if tag else {}
         if tag in FOLDED:
-            metadata['jupyter'] = {'source_hidden': True}
+            metadata |= FOLD
         make = getattr(nbformat.v4, f'new_{kind}_cell')
         cells.append(make(text.replace('{name}', name), metadata=metadata))
     return cells

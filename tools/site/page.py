@@ -27,6 +27,7 @@ from helpers.lesson import (
     first_heading,
     guess_of,
     has_heading,
+    is_folded,
     names_of_memory,
     slug_of_myst,
     tags,
@@ -127,7 +128,7 @@ def _fold(cell: NotebookNode) -> None:
     elif _is_plumbing(cell):
         kind = 'imports'
         cell.metadata['tags'] = ['hide-input', kind]
-    elif cell.metadata.get('jupyter', {}).get('source_hidden'):
+    elif is_folded(cell):
         kind = 'code'
         cell.metadata['tags'] = ['hide-input', kind]
     if kind:
