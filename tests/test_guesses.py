@@ -399,7 +399,7 @@ def test_what_is_kept_is_known_again_unless_it_fits_another_kind_only(
     """A question may get another kind between two releases."""
     monkeypatch.setenv(FILE_VARIABLE, str(tmp_path / 'progress.txt'))
     monkeypatch.setenv('JPY_SESSION_NAME', 'notebooks/05_keep_what_is_fresh.ipynb')
-    monkeypatch.setattr('helpers.checks.classroom.somebody_watches', lambda: True)
+    monkeypatch.setattr('helpers.checks.guesses.somebody_watches', lambda: True)
     made = guess('What is it?', typed, on=on, **more)
     assert guess('What is it?', ..., on=on, **more).value == made.value
     others = [guess('What is it?', ..., on=one, **its_own) for one, its_own, _ in KINDS]

@@ -1,8 +1,6 @@
 """A class that sees itself: guesses, tasks and steps, told to the class that one has joined.
 
     join_class('192.0.2.5:8765', 'blue-otter-lamp')   once, from what is on the wall
-    my_guess = guess('How many are heard?', 41)       returns 41, and sends it
-    my_place = guess('Where does it end?', ..., on=CORRIDOR)   in the picture
     raise_hand(), lower_hand(), leave_class()
 
 Without a class nothing is sent, shown or waited for. With one, a thread in the background writes
@@ -42,19 +40,15 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Mapping, Set
+from collections.abc import Set
 from contextlib import closing, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from helpers.checks import progress
-from helpers.notebook import BEGIN_EMPTY, somebody_watches, wrap
+from helpers.notebook import wrap
 
-if TYPE_CHECKING:
-    from helpers.guesses import Guess, Kind
-    from helpers.robot import Pose
-
-__all__ = ['guess', 'join_class', 'leave_class', 'lower_hand', 'raise_hand']
+__all__ = ['join_class', 'leave_class', 'lower_hand', 'raise_hand']
 
 HUB_VARIABLE = 'ROS2_NOTEBOOKS_CLASS'  # on a JupyterHub: the address of its class
 JOINED_FOR_S = 12 * 3600  # a class that was not left is forgotten, so that nothing is sent at home
@@ -79,14 +73,6 @@ SILENT = (
 OVER = 'The class has not answered for ten minutes, so you have left it. You can join again.'
 NOT_JOINED = 'You are in no class: join_class(address, code) joins one.'
 NO_LESSON = 'Nothing is sent, because this notebook is no lesson: do it in the lesson itself.'
-ONE_ANSWER = (
-    'A guess is one answer after the question: write 0.65 with a point, and several answers as a '
-    "list, such as ['A', 'B']. Change it and run the cell again."
-)
-NONE_IS_NO_GUESS = (
-    'None is no guess: write a number, True or False, or a text in quotes in its place, and run '
-    'the cell again.'
-)
 SENT = (
     'Sent to it: your guesses and what you measured, which tasks you tried and solved, at '
     'which step you are, and a raised hand. Not sent: your code and its outputs.'
@@ -107,111 +93,6 @@ class Class(NamedTuple):
 
 
 # --- What a notebook calls -----------------------------------------------------------------------
-
-
-def guess(
-    question: str,
-    *answers: object,
-    on: object = None,
-    several: bool | int = False,
-    unit: str = '',
-    line_m: float | None = None,
-    marks: Mapping[str, float | tuple[float, float]] | None = None,
-    start: Pose | None = None,
-    point: bool = False,
-) -> object:
-    """Return the answer that a student gives to a question; `...` if there is none yet.
-
-    It says that it was taken. If there is a class, it is told in the background. The class counts
-    the last guess of each student, of questions that the lesson has. An answer is a number, True or
-    False, a text, or a few of them in a list, a tuple or a set.
-
-    `on` is what one answers on, and then the cell shows it, and the result is a `Guess`, which
-    changes with what one sets there, or what one types in place of the dots:
-
-    - a floor: your robot stands where you put it, in front of a wall, on its way from `start`;
-      `line_m` (m) draws a line, or one of `marks` that has a name;
-    - a floor, and `point`: a point (x ahead of the robot, y to its left, in m), beside `marks`;
-    - a range, or a pair such as (0, 2) with a `unit`: a line on an axis, which also shows `marks`;
-    - `bool`, a tuple, or a dict of words and values: options, of which one is chosen, `several`
-      (True), or just so many (a number); they stand at the points (x, y in m) of `marks`;
-    - a dict of such options: a row for each, and one is chosen in each row.
-
-    What is no answer gets a sentence at once. Raises TypeError for another `on`.
-    """
-    if on is not None:
-        kind = _kind(on, several, unit, line_m, marks, start, point)
-        return _guess_on(kind, question, *(answers or [...]))
-    if len(answers) != 1:
-        print(*wrap(ONE_ANSWER), sep='\n')
-        return ...
-    [value] = answers
-    if value is None:
-        print(*wrap(NONE_IS_NO_GUESS), sep='\n')
-    elif value is not ...:
-        print('Your guess is saved:', value)
-        _tell('guess', question=question, value=value)
-        _outbox.say_trouble()
-    return value
-
-
-def _kind(
-    on: object,
-    several: bool | int,
-    unit: str,
-    line_m: float | None,
-    marks: Mapping[str, float | tuple[float, float]] | None,
-    start: Pose | None,
-    point: bool,
-) -> Kind:
-    # Slow to load, and most guesses have no floor.
-    from helpers.guesses import kind_of
-    from helpers.robot import Floor
-
-    if not isinstance(on, Floor):
-        return kind_of(on, several, unit, marks)
-    from helpers.robot_view import Place, Point
-
-    if point:
-        return Point(on, marks or {})
-    if marks:
-        [(line, line_m)] = marks.items()
-        return Place(on, line_m, start, line)
-    return Place(on, line_m, start)
-
-
-def _guess_on(kind: Kind, question: str, *answers: object) -> Guess:
-    """Show a guess, with what was typed, or else what was set before in this lesson."""
-    from helpers.guesses import Guess, show
-
-    typed = answers[0] if len(answers) == 1 else list(answers)
-    made, wrong = Guess(question, kind), ''
-    if typed is None or typed is ...:
-        # A class sees no old one.
-        remembers = somebody_watches() and not os.environ.get(BEGIN_EMPTY)
-        made.value = progress.kept_guess(question, _word_of(kind)) if remembers else None
-    else:
-        try:
-            made.value = kind.read(typed)
-        except ValueError as problem:
-            wrong = str(problem)
-    show(made, lambda value: _keep(made))
-    if wrong:
-        print(*wrap(wrong), sep='\n')
-    elif typed is not None and typed is not ...:
-        _keep(made)
-        _outbox.say_trouble()
-    return made
-
-
-def _keep(made: Guess) -> None:
-    """Keep what was guessed, for the next kernel, and tell the class."""
-    progress.keep_guess(made.question, _word_of(made.kind), made.value)
-    _tell('guess', question=made.question, value=made.kind.told(made.value))
-
-
-def _word_of(kind: Kind) -> str:
-    return type(kind).__name__.lower()
 
 
 def join_class(address: str = '', code: str = '', name: str = '') -> None:
@@ -255,6 +136,11 @@ def lower_hand() -> None:
 # --- What `checks` sends
 
 
+def tell_guess(question: str, value: object) -> None:
+    """Send what a student guesses."""
+    _tell('guess', question=question, value=value)
+
+
 def tell_outcome(question: str, value: object) -> None:
     """Send what was measured after a guess."""
     _tell('outcome', question=question, value=value)
@@ -268,6 +154,11 @@ def tell_task(task: str, solved: bool) -> None:
 def tell_about(task: str, about: str) -> None:
     """Tell the class about what a task was that is solved, if each student has another one."""
     _tell('about', about=about, task=task)
+
+
+def say_trouble() -> None:
+    """Print one line if the class has not answered since the last line."""
+    _outbox.say_trouble()
 
 
 # --- In the background ---------------------------------------------------------------------------

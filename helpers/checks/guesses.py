@@ -1,9 +1,10 @@
 """Guesses: what the student expected, and what came out.
 
     my_guess = guess('How many?', ...)                          the student writes a guess
+    my_place = guess('Where does it end?', ..., on=CORRIDOR)    or sets it in the picture
     compare_prediction('How many?', my_guess, 20)               later: was it right?
 
-The function prints and returns None, so that a cell shows its text and nothing else. The text is
+A comparison prints and returns None, so that a cell shows its text and nothing else. The text is
 the same in every fresh run from top to bottom.
 """
 
@@ -20,12 +21,126 @@ from IPython.display import display
 
 from helpers.checks import classroom, progress
 from helpers.checks.portrait import record_of
-from helpers.notebook import BEGIN_EMPTY, can_ask
+from helpers.notebook import BEGIN_EMPTY, can_ask, somebody_watches, wrap
 
 if TYPE_CHECKING:
-    from helpers.guesses import Guess
+    from helpers.guesses import Guess, Kind
+    from helpers.robot import Pose
 
 NO_GUESS = 'No guess yet. Write one in place of the three dots, run that cell, then this one again.'
+ONE_ANSWER = (
+    'A guess is one answer after the question: write 0.65 with a point, and several answers as a '
+    "list, such as ['A', 'B']. Change it and run the cell again."
+)
+NONE_IS_NO_GUESS = (
+    'None is no guess: write a number, True or False, or a text in quotes in its place, and run '
+    'the cell again.'
+)
+
+
+def guess(
+    question: str,
+    *answers: object,
+    on: object = None,
+    several: bool | int = False,
+    unit: str = '',
+    line_m: float | None = None,
+    marks: Mapping[str, float | tuple[float, float]] | None = None,
+    start: Pose | None = None,
+    point: bool = False,
+) -> object:
+    """Return the answer that a student gives to a question; `...` if there is none yet.
+
+    It says that it was taken. If there is a class, it is told in the background. The class counts
+    the last guess of each student, of questions that the lesson has. An answer is a number, True or
+    False, a text, or a few of them in a list, a tuple or a set.
+
+    `on` is what one answers on, and then the cell shows it, and the result is a `Guess`, which
+    changes with what one sets there, or what one types in place of the dots:
+
+    - a floor: your robot stands where you put it, in front of a wall, on its way from `start`;
+      `line_m` (m) draws a line, or one of `marks` that has a name;
+    - a floor, and `point`: a point (x ahead of the robot, y to its left, in m), beside `marks`;
+    - a range, or a pair such as (0, 2) with a `unit`: a line on an axis, which also shows `marks`;
+    - `bool`, a tuple, or a dict of words and values: options, of which one is chosen, `several`
+      (True), or just so many (a number); they stand at the points (x, y in m) of `marks`;
+    - a dict of such options: a row for each, and one is chosen in each row.
+
+    What is no answer gets a sentence at once. Raises TypeError for another `on`.
+    """
+    if on is not None:
+        kind = _kind_of(on, several, unit, line_m, marks, start, point)
+        return _guess_on(kind, question, *(answers or [...]))
+    if len(answers) != 1:
+        print(*wrap(ONE_ANSWER), sep='\n')
+        return ...
+    [value] = answers
+    if value is None:
+        print(*wrap(NONE_IS_NO_GUESS), sep='\n')
+    elif value is not ...:
+        print('Your guess is saved:', value)
+        classroom.tell_guess(question, value)
+        classroom.say_trouble()
+    return value
+
+
+def _kind_of(
+    on: object,
+    several: bool | int,
+    unit: str,
+    line_m: float | None,
+    marks: Mapping[str, float | tuple[float, float]] | None,
+    start: Pose | None,
+    point: bool,
+) -> Kind:
+    # Slow to load, and most guesses have no floor.
+    from helpers.guesses import kind_of
+    from helpers.robot import Floor
+
+    if not isinstance(on, Floor):
+        return kind_of(on, several, unit, marks)
+    from helpers.robot_view import Place, Point
+
+    if point:
+        return Point(on, marks or {})
+    if marks:
+        [(line, line_m)] = marks.items()
+        return Place(on, line_m, start, line)
+    return Place(on, line_m, start)
+
+
+def _guess_on(kind: Kind, question: str, *answers: object) -> Guess:
+    """Show a guess, with what was typed, or else what was set before in this lesson."""
+    from helpers.guesses import Guess, show
+
+    typed = answers[0] if len(answers) == 1 else list(answers)
+    made, wrong = Guess(question, kind), ''
+    if typed is None or typed is ...:
+        # A class sees no old one.
+        remembers = somebody_watches() and not os.environ.get(BEGIN_EMPTY)
+        made.value = progress.kept_guess(question, _word_of(kind)) if remembers else None
+    else:
+        try:
+            made.value = kind.read(typed)
+        except ValueError as problem:
+            wrong = str(problem)
+    show(made, lambda value: _keep(made))
+    if wrong:
+        print(*wrap(wrong), sep='\n')
+    elif typed is not None and typed is not ...:
+        _keep(made)
+        classroom.say_trouble()
+    return made
+
+
+def _keep(made: Guess) -> None:
+    """Keep what was guessed, for the next kernel, and tell the class."""
+    progress.keep_guess(made.question, _word_of(made.kind), made.value)
+    classroom.tell_guess(made.question, made.kind.told(made.value))
+
+
+def _word_of(kind: Kind) -> str:
+    return type(kind).__name__.lower()
 
 
 def compare_prediction(
