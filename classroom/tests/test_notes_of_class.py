@@ -12,6 +12,9 @@ LESSONS = [lesson for lesson in lessons() if lesson.number != GLOSSARY]
 @pytest.mark.parametrize('lesson', LESSONS, ids=[lesson.file for lesson in LESSONS])
 def test_minutes_grow_to_those_of_the_lesson_and_each_note_is_shown(lesson):
     notes = Known(lesson).notes
+    for step in notes:
+        number, dot, _ = step['step'].partition('. ')
+        assert step['number'] == (int(number) if dot and number.isdigit() else 0), step['step']
     planned = [step['planned'] for step in notes]
     assert planned == sorted(planned)
     assert sum(step['own'] for step in notes) == planned[-1] == notes[-1]['all'] == lesson.minutes
