@@ -282,7 +282,9 @@ class Session:
     def _findings(self) -> list[str]:
         nodes = [node for node in find(Node, self._context) if is_used(node)]
         nodes = [node for node in nodes if node.get_name() != LOG_NODE]
-        callbacks = explain_callbacks()
+        callbacks = ''
+        with contextlib.suppress(Exception):  # what explains a wait must not end it
+            callbacks = explain_callbacks()
         return [*connections.findings(nodes, self._spinning), *([callbacks] if callbacks else [])]
 
     def wait_until_quiet(self, executor: Executor, timeout_s: float = 30.0) -> bool:
