@@ -40,6 +40,20 @@ def test_a_command_of_a_cell_can_be_interrupted_and_knows_its_variables():
         assert kernel.run(in_a_function).strip() == 'twice twice'
 
 
+def test_an_import_that_ends_its_cell_leaves_no_interrupt_to_the_next(tmp_path):
+    (tmp_path / 'a_library.py').write_text(PRESS)
+    with Kernel() as kernel:
+        kernel.run(
+            'import sys\n'
+            'from helpers.notebook import interrupts\n'
+            'interrupts.is_students = lambda file: False\n'
+            f'sys.path.insert(0, {str(tmp_path)!r})\n'
+        )
+        kernel.run('import a_library')
+        # For longer than the time after which an Interrupt comes again.
+        assert kernel.run('a_library.time.sleep(0.5)\nprint("its end")') == 'its end\n'
+
+
 PRESS = 'import os, signal, time\nos.kill(os.getpid(), signal.SIGINT)\n'
 LONG = 'time.sleep(60)\n'
 

@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from subprocess import CalledProcessError
 from traceback import walk_tb
 from types import FrameType, TracebackType
@@ -98,17 +99,22 @@ def _watch_interrupts(shell) -> list:
         if main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             signal.signal(signal.SIGINT, handler)  # ipykernel sets its own after the cell
 
-    shell.events.register('pre_run_cell', begin)
-    _begins[shell] = begin
+    def end(*_) -> None:
+        handler.forget()
+
+    _watches[shell] = {'pre_run_cell': begin, 'post_run_cell': end}
+    for event, watch in _watches[shell].items():
+        shell.events.register(event, watch)
     return told
 
 
-_begins: dict[object, object] = {}
+_watches: dict[object, dict[str, Callable]] = {}
 
 
 def unload_ipython_extension(shell) -> None:
     """Let the shell be as IPython has it."""
-    shell.events.unregister('pre_run_cell', _begins.pop(shell))
+    for event, watch in _watches.pop(shell).items():
+        shell.events.unregister(event, watch)
     shell.set_custom_exc((), None)
     del shell.system
 

@@ -85,14 +85,18 @@ class AfterImports:
             self._again.daemon = True
             self._again.start()
             return
-        if pressed_again:
-            self._again.cancel()
-        self._again, self._asked = None, False
+        self.forget()
         self._interrupt(number, frame)
 
     def _ask(self, number: int) -> None:
         self._asked = True
         os.kill(os.getpid(), number)
+
+    def forget(self) -> None:
+        """Let an Interrupt that waits come no more. Between two cells it would break the kernel."""
+        if self._again is not None:
+            self._again.cancel()
+        self._again, self._asked = None, False
 
 
 def _is_importing(frame: FrameType | None) -> bool:
