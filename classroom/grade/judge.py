@@ -286,15 +286,16 @@ class Witness:
         return blake2b(data, key=self._key, digest_size=16).hexdigest()
 
 
-def _what_is_forged(task: str, outputs: list[dict], changed: str, told: list[tuple]) -> str:
+def what_is_forged(task: str, outputs: list[dict], changed: str, told: list[tuple]) -> str:
     """Return why a verdict that says solved does not count, or nothing."""
-    points = [shown.get('points') for shown in filter(None, map(verdict_in, outputs))]
+    shown = [verdict.get('points') for verdict in map(verdict_in, outputs) if verdict is not None]
+    counts = [len(points) if isinstance(points, list) else None for points in shown]
     seen = [line[2:] for line in told if line[1] == 'point']
     changed = changed or next((line[-1] for line in seen if line[-1]), '')
     if changed:
         return f'its code has changed what judges it: {changed[:80]}'
     right = [(task, True)] * len(seen)
-    if [(name, ok) for name, _, ok, _ in seen] != right or [len(seen)] != [*map(len, points)]:
+    if [(name, ok) for name, _, ok, _ in seen] != right or counts != [len(seen)]:
         return 'its verdict is not what its check found'
     return ''
 
@@ -351,7 +352,7 @@ def judge(job: dict, folder: Path) -> Iterator[dict]:
                     yield from _deeds_of(told, task)
                     if task in answered - given_up and _is_solved(outputs):
                         passed.add(task)
-                        if why := _what_is_forged(task, outputs, changed, told):
+                        if why := what_is_forged(task, outputs, changed, told):
                             yield {'forged': task, 'why': why}
                 if cell['kind'] in ('exercise', 'check'):
                     yield {'cell': cell['id'], 'outputs': outputs}

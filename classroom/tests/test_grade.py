@@ -15,7 +15,7 @@ import pytest
 from classroom.grade import alike, limits, runner
 from classroom.grade.__main__ import main
 from classroom.grade.answers import answers_of, handed_out, lesson_of
-from classroom.grade.judge import FULL, LIMIT_MET, HungError, Kernel, Witness
+from classroom.grade.judge import FULL, LIMIT_MET, HungError, Kernel, Witness, what_is_forged
 from classroom.grade.marking import Marking
 from classroom.grade.results import Kept, Outcome, Result, digest_of, job_of, result_of
 from classroom.grade.source import code_only
@@ -300,6 +300,11 @@ def test_a_verdict_counts_if_it_is_one(lessons, verdicts, solved):
     _, answers = read(notebook(**{STARTER: RIGHT}), lessons)
     result = result_of(lessons['start_here'], answers, {}, said_of(*verdicts), 'digest')
     assert result.tasks['through_the_door'].solved == solved
+
+
+@pytest.mark.parametrize('verdict', [{}, {'solved': True}, {'points': 7}])
+def test_a_verdict_without_points_is_none_that_a_check_shows(verdict):
+    assert what_is_forged('be_the_queue', [{'metadata': {KEY: verdict}}], '', [])
 
 
 def test_without_a_verdict_the_error_is_said(lessons):
