@@ -28,7 +28,6 @@ from helpers.lesson import (
     check_call,
     code_of_solution,
     has_heading,
-    is_folded,
     is_question,
     links_to_tasks,
     name_of_solution,
@@ -228,7 +227,7 @@ def tagged(lesson: Lesson) -> Iterator[str]:
         for tag in sorted(tags(cell) - TAGS):
             yield f'{name} has the unknown tag {tag!r}.'
         folded = tags(cell) & FOLDED.keys()
-        if is_folded(cell) != bool(folded):
+        if ('jupyter' in cell.metadata) != bool(folded):
             yield (
                 f'{name}: fold cells with the tag {" or ".join(FOLDED)}, by a click on the bar '
                 'at their left, and no others.'
