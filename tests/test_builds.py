@@ -1,13 +1,9 @@
-"""What checks say of builds that failed, what they ask setup.py, and what they give back."""
-
-import os
-from types import SimpleNamespace
+"""What checks say of builds that failed, and what they ask setup.py."""
 
 import pytest
 
 from helpers.checks.builds import build
 from helpers.checks.errors import Failed
-from helpers.trials import build_anew
 from helpers.workspace import Workspace
 
 
@@ -47,23 +43,3 @@ def test_a_package_that_is_not_there_is_named(package, asked):
     setup(package, "packages=['robot']")
     with pytest.raises(Failed, match='there is no package camera in src'):
         build(package, *asked)
-
-
-@pytest.mark.parametrize(('since', 'is_back'), [(None, 'mine'), ('newer', 'newer')])
-def test_a_check_that_was_killed_in_its_build_gives_the_file_back(tmp_path, since, is_back):
-    cmake = tmp_path / 'src/scan_tools/CMakeLists.txt'
-    cmake.parent.mkdir(parents=True)
-    cmake.write_text('mine')
-
-    def workspace_that(build):
-        return SimpleNamespace(file=tmp_path.joinpath, build=build)
-
-    worker = os.fork()
-    if worker == 0:
-        build_anew(workspace_that(lambda *_: os._exit(0)), library='ours')
-    os.waitpid(worker, 0)
-    assert cmake.read_text() == 'ours'
-    if since:
-        cmake.write_text(since)
-    assert build_anew(workspace_that(lambda *_: cmake.read_text())) == is_back
-    assert [*cmake.parent.iterdir()] == [cmake]

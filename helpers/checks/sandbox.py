@@ -14,8 +14,9 @@ Three processes take part:
 - the child of the guard, the worker, runs the function.
 
 A worker opens a ROS session like any process; a session that is still open here is closed before.
-What a killed worker leaves in shared memory is removed, and what is left by programs that a judge
-has killed, to see what a student's code does then.
+What a killed worker leaves in shared memory and in the temporary folder is removed, also that of
+programs that a judge has killed, to see what a student's code does then. Files of the student in
+which a judge has put other texts are given back.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ import psutil
 
 from helpers.notebook import uninterrupted
 from helpers.ros import fork, leave_ros, remove_dead_segments
+from helpers.workspace import give_files_back
 
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 POLL_S = 0.05
@@ -138,7 +140,10 @@ def _be_guard(
         os.setsid()  # an Interrupt of the kernel's group must not reach it
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
-        with tempfile.TemporaryFile(buffering=0) as dump:
+        with (
+            tempfile.TemporaryFile(buffering=0) as dump,
+            tempfile.TemporaryDirectory(prefix='check-', ignore_cleanup_errors=True) as folder,
+        ):
             from_worker, workers_end = Pipe(duplex=False)
             printed, printer = os.pipe()
             worker = fork()
@@ -146,16 +151,20 @@ def _be_guard(
                 messages.close()
                 for unused in (from_worker.fileno(), printed, alive):
                     os.close(unused)
+                os.environ['TMPDIR'] = tempfile.tempdir = folder  # also of programs that it starts
                 _be_worker(function, limits, workers_end, printer, dump.fileno())
             workers_end.close()
             os.close(printer)
             ending = _watch(worker, limits, from_worker, printed, messages, alive, dump.fileno())
-        _end_all()
+            _end_all()
         remove_dead_segments()
+        give_files_back()
         _send(messages, ending)
     finally:
-        _end_all()
-        os._exit(0)
+        try:
+            _end_all()
+        finally:
+            os._exit(0)
 
 
 def _watch(

@@ -6,6 +6,7 @@ import difflib
 import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -301,20 +302,18 @@ def build(cases: Sequence[Case]) -> None:
     """
     linked = [case for case in cases if not case.fault.installed]
     copied = [case for case in cases if case.fault.installed]
-    in_src = {case: case.given | case.files for case in copied}
-    for case in copied:
-        case.write(case.fault.installed)
-    try:
+    old = {
+        f'src/{case.name}/{case.named(path)}': case.named(text)
+        for case in copied
+        for path, text in case.fault.installed.items()
+    }
+    with cases[0].workspace.replaced(old) if old else nullcontext():
         for some, symlink_install in ((linked, True), (copied, False)):
             if some:
                 names = [case.name for case in some]
                 result = some[0].workspace.build(*names, symlink_install=symlink_install)
                 if not result.ok:
                     raise RuntimeError(str(result))
-    finally:
-        for case in copied:
-            for path in map(case.named, case.fault.installed):
-                case.workspace.write(f'src/{case.name}/{path}', in_src[case][path])
 
 
 def forget(workspace: Workspace, names: Iterable[str]) -> None:

@@ -76,41 +76,26 @@ def make_three_changes(workspace: Workspace) -> tuple[set[str], set[str]]:
         letters = {letter for letter, file in files.items() if (install / file).exists()}
         return letters | ({'A'} if imports(workspace, 'brake_tools.word') is True else set())
 
-    before = workspace.file(setup).read_text()
+    given = workspace.file(setup).read_text()
     marker = "('share/' + package_name, ['package.xml']),"
-    after = before.replace(marker, f"{marker} ('share/brake/config', ['config/fast.yaml']),")
-    workspace.write(setup, after.replace("['brake =", "['stop = brake.brake:main', 'brake ="))
+    changed = given.replace(marker, f"{marker} ('share/brake/config', ['config/fast.yaml']),")
+    changed = changed.replace("['brake =", "['stop = brake.brake:main', 'brake =")
     workspace.write('src/brake/brake_tools/brake_tools/word.py', "WORD = 'new'\n")
     workspace.write('src/brake/brake/config/fast.yaml', 'speed: 1.0\n')
     for file in files.values():
         (install / file).unlink(missing_ok=True)
-    at_once = in_effect()
-    workspace.build('brake', symlink_install=True)  # the change of brake_tools is A
-    built = in_effect()
-    workspace.write(setup, before)
-    return at_once, built
+    with workspace.replaced({setup: changed}):
+        at_once = in_effect()
+        workspace.build('brake', symlink_install=True)  # the change of brake_tools is A
+        return at_once, in_effect()
 
 
 def build_anew(workspace: Workspace, *packages: str, library: str | None = None) -> BuildResult:
     """Build packages from an empty `install`, and return the result.
 
-    With `library`, this text is the CMakeLists.txt of scan_tools for the time of the build. A check
-    that is killed meanwhile restores nothing: the next call does, from a file beside it.
+    With `library`, this text is the CMakeLists.txt of scan_tools for the time of the build.
     """
-    file = workspace.file(LIBRARY_FILE)
-    kept = file.with_name(f'{file.name}.yours')
-    if kept.exists():
-        if kept.stat().st_mtime_ns == file.stat().st_mtime_ns:  # nobody has written it since
-            file.write_text(kept.read_text())
-        kept.unlink()
-    yours = file.read_text()
     for folder in ('install', 'build/try_library', 'build/look'):
         shutil.rmtree(workspace.file(folder), ignore_errors=True)
-    try:
-        kept.write_text(yours)
-        file.write_text(library or yours)
-        shutil.copystat(kept, file)
+    with workspace.replaced({LIBRARY_FILE: library} if library else {}):
         return workspace.build(*packages)
-    finally:
-        file.write_text(yours)
-        kept.unlink(missing_ok=True)

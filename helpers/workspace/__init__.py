@@ -13,6 +13,7 @@ terminal gives and a running kernel lacks: a clean environment, the effect of
     small_rclcpp  a package in C++: the part of rclcpp that write_a_node_in_cpp needs, over rcl
     given         files of somebody else: a repository, a package, a program
     rosdep        rosdep, with rules of a lesson
+    replaced      other texts in files for a while, and the student's own back
     sourcing      what `source install/setup.bash` gives, for a kernel that already runs
 """
 
@@ -33,7 +34,7 @@ from helpers.workspace.processes import DIED, Process, end_together, show_launch
 from helpers.workspace.rosdep import rosdep, run_rosdep
 from helpers.workspace.tf2_msgs import begin_tf2_msgs, provide_tf2_msgs
 from helpers.workspace.wheels import fix_wheels
-from helpers.workspace.workspace import SMALL_RCLCPP, Workspace
+from helpers.workspace.workspace import SMALL_RCLCPP, Workspace, give_files_back
 
 __all__ = [
     'play_colleague',
@@ -59,6 +60,7 @@ __all__ = [
     'Process',
     'Workspace',
     'fix_wheels',
+    'give_files_back',
     'lines_that_matter',
     'begin_tf2_msgs',
     'provide_tf2_msgs',

@@ -9,7 +9,7 @@ import re
 import shutil
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path, PurePosixPath
 
 from ros2_command.api import CommandError, command_of
@@ -29,6 +29,7 @@ from helpers.notebook import BEGIN_EMPTY, ProgressBar, somebody_watches, uninter
 from helpers.ros import graph_environment
 from helpers.workspace.build_output import BuildResult, read_result, without_folders
 from helpers.workspace.processes import POLL_S, Process
+from helpers.workspace.replaced import give_back, replaced
 from helpers.workspace.sourcing import source, use
 from helpers.workspace.wheels import fix_wheels
 
@@ -104,6 +105,7 @@ class Workspace:
 
     def _open(self) -> None:
         """Go on with what a person has left, or begin with an empty folder."""
+        give_back(self.path)
         is_left = somebody_watches() and not os.environ.get(BEGIN_EMPTY)
         if not is_left:
             self._put_aside()
@@ -176,6 +178,13 @@ class Workspace:
             file.write_text(text, encoding='utf-8')
             self._parts[name] = parts
             (self.path / PARTS).write_text(json.dumps(self._parts), encoding='utf-8')
+
+    def replaced(self, files: Mapping[str, str]) -> contextlib.AbstractContextManager[None]:
+        """Give files other texts within a `with` block: {relative path: text}.
+
+        After it they are as they were, a new one is gone; also if this process is killed within it.
+        """
+        return replaced(self.path, files)
 
     def print_tree(self, relative_path: str = 'src', hide: Sequence[str] = ()) -> None:
         """Print the files below a folder of the workspace. `hide` holds patterns such as '*.zsh'.
@@ -387,6 +396,13 @@ class Workspace:
             self._building.stop()
         self._processes.clear()
         self.terminals.clear()
+
+
+def give_files_back() -> None:
+    """Give back what a process that was killed has replaced in the open workspace."""
+    if _open_workspace is not None:
+        for workspace in (_open_workspace, *_open_workspace._overlays.values()):
+            give_back(workspace.path)
 
 
 class Build:

@@ -177,9 +177,8 @@ def slow_down(workspace, links, change):
 
     def is_linked():
         needs(is_built)
-        workspace.write(file, 'speed: 0.5')
-        found = installed()
-        workspace.write(file, given)
+        with workspace.replaced({file: 'speed: 0.5'}):
+            found = installed()
         if not found:
             return 'config/brake.yaml is not installed'
         return found == ['speed:', '0.5'] or f'in src it is 0.5, in install {found[-1]}'

@@ -245,9 +245,9 @@ def install_the_files(workspace):
     @cached
     def built():
         workspace.terminal('rm -rf build install')
-        # As a launch file in Python leaves it.
-        workspace.write('src/fleet_pkg/launch/__pycache__/robot.launch.pyc', '')
-        return builds(workspace, 'fleet_pkg')
+        compiled = 'src/fleet_pkg/launch/__pycache__/robot.launch.pyc'
+        with workspace.replaced({compiled: ''}):  # as a launch file in Python leaves it
+            return builds(workspace, 'fleet_pkg')
 
     def is_installed():
         needs(built, 'it is not built')

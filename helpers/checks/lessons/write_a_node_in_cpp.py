@@ -74,14 +74,11 @@ OUR_XML = """<package format="3"><name>@PACKAGE@</name><version>0.0.0</version>
 def run_ours(workspace, name, code):
     """Build a program of ours that includes what the student wrote, and return what it prints."""
     files = {f'{name}.cpp': code, 'CMakeLists.txt': OUR_CMAKE, 'package.xml': OUR_XML}
-    for file, text in files.items():
-        workspace.write(f'src/{name}/{file}', text.replace('@PACKAGE@', name))
-    try:
+    ours = {f'src/{name}/{file}': text.replace('@PACKAGE@', name) for file, text in files.items()}
+    with workspace.replaced(ours):
         install_anew(workspace, name)
         with workspace.run(name, name) as process:
             process.wait(TRY_S)
-    finally:
-        shutil.rmtree(workspace.file(f'src/{name}'))
     return process.lines
 
 

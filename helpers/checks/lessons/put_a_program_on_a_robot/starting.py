@@ -28,12 +28,8 @@ def install_it(workspace):
         needs(it_builds, NOT_BUILT)
         # The launch file is the next task: here any file in its folder must be installed.
         launch_file = workspace.file(f'{PACKAGE}/launch/patrol.launch.xml')
-        planted_file = workspace.file(f'{PACKAGE}/launch/planted.launch.xml')
-        planted_file.write_text('<launch/>\n')
-        try:
+        with workspace.replaced({f'{PACKAGE}/launch/planted.launch.xml': '<launch/>\n'}):
             workspace.build('patrol_pkg')
-        finally:
-            planted_file.unlink()
         share = workspace.file('install/patrol_pkg/share/patrol_pkg')
         wanted = ['config/rooms.yaml', 'launch/planted.launch.xml']
         wanted += ['launch/patrol.launch.xml'] if launch_file.exists() else []
@@ -45,15 +41,9 @@ def install_it(workspace):
 
     def survives_pycache():
         needs(it_builds, NOT_BUILT)
-        folders = [workspace.file(f'{PACKAGE}/{name}/__pycache__') for name in ('launch', 'config')]
-        new = [folder for folder in folders if not folder.exists()]
-        for folder in new:
-            folder.mkdir(parents=True)
-        try:
+        compiled = {f'{PACKAGE}/{name}/__pycache__/a.pyc': '' for name in ('launch', 'config')}
+        with workspace.replaced(compiled):
             return builds(workspace, 'patrol_pkg')
-        finally:
-            for folder in new:
-                folder.rmdir()
 
     def wants_pytest():
         needs(it_builds, NOT_BUILT)

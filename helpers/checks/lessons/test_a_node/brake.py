@@ -243,13 +243,13 @@ def without_run(text):
 def run_them(workspace):
     def is_run():
         build(workspace, 'brake_pkg', anew=True)
-        file = f'{PACKAGE}/test/test_planted.py'
-        workspace.write(file, 'def test_planted():\n    assert 1 == 2\n')
-        summary = workspace.terminal(
-            'colcon test --packages-select brake_pkg --pytest-args -k "not flake8 and not pep257"'
-            ' > test.txt 2>&1; colcon test-result | tail -1'
-        )
-        workspace.file(file).unlink()
+        planted = 'def test_planted():\n    assert 1 == 2\n'
+        with workspace.replaced({f'{PACKAGE}/test/test_planted.py': planted}):
+            summary = workspace.terminal(
+                'colcon test --packages-select brake_pkg'
+                ' --pytest-args -k "not flake8 and not pep257"'
+                ' > test.txt 2>&1; colcon test-result | tail -1'
+            )
         counts = {word: int(n) for n, word in re.findall(r'(\d+) (\w+?)s?\b', summary)}
         right = counts['test'] > 2 and counts['failure'] == 1 and not counts['error']
         return right or f'it ran {counts["test"]} tests, of which {counts["failure"]} failed'

@@ -35,12 +35,8 @@ def is_caught(runs, version, pass_for_right_ones):
 
 def run_ours(workspace, name, source, module, versions):
     """Run tests of ours beside the student's, each with its version. Their file goes again."""
-    file = workspace.file(f'{PACKAGE}/test/{name}')
-    file.write_text(source)
-    try:
+    with workspace.replaced({f'{PACKAGE}/test/{name}': source}):
         return run_tests(workspace, PACKAGE, f'test/{name}', module, versions, only=True)
-    finally:
-        file.unlink()
 
 
 def ours_pass(runs, version):
