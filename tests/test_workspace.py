@@ -10,6 +10,7 @@ import sys
 import threading
 from importlib.util import find_spec, module_from_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import psutil
 import pytest
@@ -30,7 +31,14 @@ from support.waits import wait_for
 from helpers.machine import folders
 from helpers.ros import ros_session
 from helpers.ros.domain import reserve_domain_id
-from helpers.workspace import Workspace, begin_tf2_msgs, given, processes
+from helpers.workspace import (
+    Workspace,
+    begin_tf2_msgs,
+    given,
+    processes,
+    provide_tf2_msgs,
+    tf2_msgs,
+)
 from helpers.workspace.build_output import _packages, lines_that_matter
 from helpers.workspace.processes import Process
 from helpers.workspace.wheels import fix_wheels
@@ -325,6 +333,21 @@ def test_tf2_msgs_is_built_anew_where_an_emptied_workspace_had_it(other, monkeyp
     module.unlink()
     begin_tf2_msgs(other)
     assert (other.path / 'src/tf2_msgs/package.xml').is_file()
+
+
+def test_tf2_msgs_is_built_anew_if_its_build_was_stopped(other, monkeypatch):
+    monkeypatch.setattr(tf2_msgs, '_is_there', lambda: False)
+    begin_tf2_msgs(other)
+    other.begin_anew()
+    begun = []
+    monkeypatch.setattr(other, 'begin_build', lambda *_: begun.append(True) or built_at_once())
+    monkeypatch.setattr(other, 'use', lambda: None)
+    provide_tf2_msgs(other)
+    assert begun == [True]
+
+
+def built_at_once():
+    return SimpleNamespace(stopped=False, result=lambda: SimpleNamespace(ok=True))
 
 
 def test_a_built_library_is_one_of_this_process(used):

@@ -55,7 +55,8 @@ def provide_tf2_msgs(workspace: Workspace) -> None:
     """
     if _is_there():
         return
-    if workspace.path not in _begun:
+    begun = _begun.get(workspace.path)
+    if begun is None or begun.stopped:  # by an Interrupt of a cell that waited for it
         begin_tf2_msgs(workspace)
     result = _begun.pop(workspace.path).result()
     if not result.ok:

@@ -408,6 +408,8 @@ def give_files_back() -> None:
 class Build:
     """A build that was begun. `result()` waits until it has ended, with a progress bar."""
 
+    stopped = False  # before it had ended
+
     def __init__(
         self, path: Path, command: str, packages: Sequence[str], total: int, colcon: Process
     ) -> None:
@@ -436,6 +438,7 @@ class Build:
         """End it, as an Interrupt does."""
         with uninterrupted():
             if self._colcon.running:
+                self.stopped = True
                 self._colcon.stop()
                 self._note_half_built()
 
