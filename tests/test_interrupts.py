@@ -1,15 +1,21 @@
 """An Interrupt waits for the end of what must not be cut in two."""
 
 import importlib
+import inspect
+import os
 import signal
 import sys
 import threading
 
 import pytest
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
 from support.kernel import Kernel
 
 from helpers.notebook import interrupts
-from helpers.notebook.interrupts import AfterImports, uninterrupted
+from helpers.notebook.interrupts import PatientInterrupt, uninterrupted
+from helpers.ros import ros_session
 
 
 def test_an_interrupt_waits_for_the_end():
@@ -70,7 +76,7 @@ def test_an_interrupt_comes_after_an_import(name, source, is_whole, tmp_path, mo
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / f'{name}.py').write_text(source)
     monkeypatch.setattr(interrupts, 'is_students', lambda file: file.endswith('my_module.py'))
-    before = signal.signal(signal.SIGINT, AfterImports(signal.default_int_handler))
+    before = signal.signal(signal.SIGINT, PatientInterrupt(signal.default_int_handler))
     try:
         with pytest.raises(KeyboardInterrupt):
             importlib.import_module(name)
@@ -78,3 +84,32 @@ def test_an_interrupt_comes_after_an_import(name, source, is_whole, tmp_path, mo
     finally:
         signal.signal(signal.SIGINT, before)
     assert (name in sys.modules) == is_whole
+
+
+PRESSES = """
+def __init__(self, **fields):
+    os.kill(os.getpid(), signal.SIGINT)
+    original(self, **fields)
+"""
+
+
+def test_an_interrupt_comes_after_a_message_is_taken(monkeypatch):
+    names = {'original': String.__init__, 'os': os, 'signal': signal}
+    exec(compile(PRESSES, inspect.getfile(String), 'exec'), names)
+    heard = []
+    with ros_session():
+        node = Node('node')
+        node.create_subscription(String, 'topic', lambda message: heard.append(message.data), 1)
+        publisher = node.create_publisher(String, 'topic', 1)
+        message = String(data='whole')
+        monkeypatch.setattr(String, '__init__', names['__init__'])
+        before = signal.signal(signal.SIGINT, PatientInterrupt(signal.default_int_handler))
+        try:
+            with pytest.raises(KeyboardInterrupt):
+                publisher.publish(message)
+                while True:
+                    rclpy.spin_once(node, timeout_sec=0.1)
+        finally:
+            signal.signal(signal.SIGINT, before)
+            node.destroy_node()
+    assert heard == ['whole']

@@ -17,7 +17,7 @@ from IPython.core.error import UsageError
 from IPython.display import display
 from IPython.utils.process import system
 
-from helpers.notebook import AfterImports, own_line, run_command
+from helpers.notebook import PatientInterrupt, own_line, run_command
 
 # The first cells of each lesson load one of them.
 IN_IMPORT, IN_TRACKER = '<frozen importlib', 'resource_tracker.py'
@@ -91,7 +91,7 @@ def _watch_interrupts(shell) -> list:
                 told[:] = [tell_interrupt(frame)]
         signal.default_int_handler(number, frame)
 
-    handler = AfterImports(interrupt)
+    handler = PatientInterrupt(interrupt)
 
     def begin(*_) -> None:
         told.clear()

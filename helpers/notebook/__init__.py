@@ -9,7 +9,7 @@ from helpers.notebook.on_demand import load_on_demand
 
 MODULES = {
     'fresh': ('AS_SAVED', 'MARK'),
-    'interrupts': ('AfterImports', 'at_each_signal', 'run_command', 'uninterrupted'),
+    'interrupts': ('PatientInterrupt', 'at_each_signal', 'run_command', 'uninterrupted'),
     'kernel': ('can_ask', 'hear_while_a_cell_runs'),
     'look': ('LOOK', 'LOOK_CSS'),
     'names': ('names_of',),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import signal
 import socket
 import threading
@@ -13,6 +14,8 @@ from types import FrameType
 from helpers.notebook.own_code import is_students, places
 
 MOMENT_S = 0.1
+MESSAGE = re.compile(r'/(msg|srv|action)/_\w+\.py$')  # a module that rosidl generates
+RCLPY = '/rclpy/'
 
 
 @contextlib.contextmanager
@@ -65,11 +68,13 @@ def at_each_signal(call: Callable[[], None]) -> Iterator[None]:
         reader.close()
 
 
-class AfterImports:
-    """A handler of SIGINT that lets an import end first, then calls `interrupt` with the signal.
+class PatientInterrupt:
+    """A handler of SIGINT that lets some things end first, then calls `interrupt` with the signal.
 
     Python cannot repeat an import of NumPy or PyYAML that was cut in two: from then on each cell
-    would fail. A second Interrupt does not wait, nor one in a module that the student has written.
+    would fail. A message that rclpy is just taking would become a RuntimeError, 'Unable to convert
+    call argument', in place of the KeyboardInterrupt. A second Interrupt does not wait, nor one in
+    a module that the student has written.
     """
 
     def __init__(self, interrupt: Callable[[int, FrameType | None], object]) -> None:
@@ -79,7 +84,7 @@ class AfterImports:
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         pressed_again = self._again is not None and not self._asked
-        if _is_importing(frame) and not pressed_again:
+        if _must_end(frame) and not pressed_again:
             self._asked = False
             self._again = threading.Timer(MOMENT_S, self._ask, (number,))
             self._again.daemon = True
@@ -99,12 +104,17 @@ class AfterImports:
         self._again, self._asked = None, False
 
 
-def _is_importing(frame: FrameType | None) -> bool:
-    """Return whether a module is being imported in this frame, and it is none of the student's."""
+def _must_end(frame: FrameType | None) -> bool:
+    """Return whether this frame imports a module, or makes or reads a message for rclpy's C code.
+
+    A module that the student has written is none that must end.
+    """
+    in_message = False
     for file, _ in places(frame):
-        if file.startswith('<frozen importlib'):
+        if file.startswith('<frozen importlib') or (in_message and RCLPY in file):
             return True
-        if is_students(file):
+        in_message = MESSAGE.search(file) is not None
+        if not in_message and is_students(file):
             return False
     return False
 
