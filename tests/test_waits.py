@@ -19,10 +19,11 @@ from pathlib import Path
 
 import pytest
 from support.kernel import Kernel
+from support.waits import wait_for
 
 from helpers.lesson import outlines
 from helpers.ros.domain import reserve_domain_id
-from helpers.waits import NOTHING
+from helpers.waits import NOTHING, find_waits
 from helpers.waits.blockers import nearly
 from helpers.waits.sentences import CURES
 
@@ -264,6 +265,22 @@ def test_a_cell_draws_the_circle_of_an_executor_behind_it():
         assert circles_of(kernel.nb.cells[-1].outputs) == [CIRCLE]
         # All that hung has ended with its cell.
         assert kernel.run('what_waits()').strip() == NOTHING
+
+
+def test_a_thread_that_an_open_barrier_lets_go_does_not_wait():
+    barrier = threading.Barrier(2)
+    thread = threading.Thread(target=lambda: barrier.wait(), daemon=True)
+    thread.start()
+
+    def finding():
+        return next((one for one in find_waits() if one.activity.thread is thread), None)
+
+    wait_for(finding)
+    assert finding().what.startswith('a Barrier: 1 of 2 threads')
+    with barrier._cond:  # private: of threading, Python 3.11 to 3.14
+        barrier._release()  # as the second thread does; the first has not woken yet
+        assert finding() is None
+    thread.join()
 
 
 def test_what_helps_names_lessons_of_today():

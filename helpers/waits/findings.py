@@ -287,6 +287,8 @@ class Look:
 
     def barrier(self, activity: Activity, frame: FrameType) -> Finding:
         barrier = frame.f_locals['self']
+        if not barrier.n_waiting:  # all have come: this one is about to go on
+            return Finding(activity, 'sleep', 'a Barrier that is open', limited=True)
         what = f'a Barrier: {barrier.n_waiting} of {barrier.parties} threads have come to it'
         return self._by_name(activity, 'event', what, {'wait', 'abort'}, False)
 
