@@ -6,7 +6,6 @@ import difflib
 import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -300,6 +299,9 @@ def build(cases: Sequence[Case]) -> None:
 
     Raises RuntimeError if one of them cannot be built.
     """
+    if not cases:
+        return
+    workspace = cases[0].workspace
     linked = [case for case in cases if not case.fault.installed]
     copied = [case for case in cases if case.fault.installed]
     old = {
@@ -307,11 +309,11 @@ def build(cases: Sequence[Case]) -> None:
         for case in copied
         for path, text in case.fault.installed.items()
     }
-    with cases[0].workspace.replaced(old) if old else nullcontext():
+    with workspace.replaced(old):
         for some, symlink_install in ((linked, True), (copied, False)):
             if some:
                 names = [case.name for case in some]
-                result = some[0].workspace.build(*names, symlink_install=symlink_install)
+                result = workspace.build(*names, symlink_install=symlink_install)
                 if not result.ok:
                     raise RuntimeError(str(result))
 
